@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from osimlite.mechanics.kernels.record import STOPPED
+from osimlite.mechanics.kernels.record import ENDING
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import HuntCrossleyForce
@@ -215,7 +215,7 @@ class Legs:
         # It swings through until it is ahead.
         ahead = Watch("ahead", coordinate=f"{legs[swing]}_rz", level=-self.slope, stops=1)
         runs = self._run(y, self.without[swing], 5.0, [ahead])
-        if runs.endings[0] != STOPPED:
+        if runs.endings[0] != ENDING.STOPPED:
             return None
         y, passed = runs.states[0], passed + float(runs.times[0])
         # And on until it comes down on the slope.
@@ -228,7 +228,7 @@ class Legs:
             stops=-1,
         )
         runs = self._run(y, self.without[swing], 5.0, [down])
-        if runs.endings[0] != STOPPED:
+        if runs.endings[0] != ENDING.STOPPED:
             return None
         return passed + float(runs.times[0]), runs.states[0]
 

@@ -17,7 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from osimlite.mechanics.kernels.walks import FORCES
+from osimlite.mechanics.kernels.walks import PROGRESS
 from osimlite.models.walking import write_scenario
 from osimlite.studies.reflexes.scenario import Scenario
 
@@ -56,7 +56,7 @@ def main(file: Path, seconds: float) -> None:
     walked = scenario.walk(best, duration=seconds)
     rows, evaluations = (
         len(walked.states.times) - 1,
-        int(scenario.get_walkers(1).progress[0, FORCES]),
+        int(scenario.get_walkers(1).progress[0, PROGRESS.FORCES]),
     )
     scenario.walk(best, CANDIDATES, duration=0.1)
     alone, many, theirs = [], [], []

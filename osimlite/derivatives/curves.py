@@ -16,7 +16,7 @@ from osimlite.derivatives.symbols import (
     simplify_number,
     times,
 )
-from osimlite.mechanics.kernels.functions import PIECES_OF_OPENSIM, evaluate_piecewise
+from osimlite.mechanics.kernels.functions import FUNCTION_TYPE, evaluate_piecewise
 from osimlite.mechanics.laws.bezier import (
     FIRST,
     HEAD,
@@ -45,7 +45,7 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     Args:
         table: table of the pieces.
         z: argument.
-        kind: PIECES or PIECES_OF_OPENSIM.
+        kind: PIECES or PIECES_OF_OPENSIM of `FUNCTION_TYPE`.
 
     Returns:
         Value, first and second derivative; for PIECES_OF_OPENSIM the second one is the first, as in
@@ -80,7 +80,7 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
         curvature = plus(times(curvature, t), slope)
         slope = plus(times(slope, t), value)
         value = plus(times(value, t), select_coefficient(4 + knots + k, width))
-    return value, slope, slope if kind == PIECES_OF_OPENSIM else times(2.0, curvature)
+    return value, slope, slope if kind == FUNCTION_TYPE.PIECES_OF_OPENSIM else times(2.0, curvature)
 
 
 def evaluate_curve(c: Any, x: Any) -> tuple[Any, Any]:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from math import nan
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from osimlite.mechanics.kernels.layout import INERTIA, INERTIA_AT, LINK, LINK_WORK, MODEL
-from osimlite.mechanics.kernels.paths import LENGTH, SPEED
+from osimlite.mechanics.kernels.layout import INERTIA, LINK, LINK_WORK, MODEL, REALS
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.kernels.points import (
     angular_velocity,
     direction,
@@ -207,7 +207,7 @@ def _compute_mass_center(
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
         # Read from the numbers, which may be symbols or dual numbers: masses may be parameters.
-        first = INERTIA_AT + INERTIA.SIZE * link
+        first = REALS.INERTIA + INERTIA.SIZE * link
         parts.append(
             (
                 workspace.reals[first],
@@ -298,8 +298,8 @@ def compute_path_columns(
         ):
             record = items[-2][0]
             names.append(element.path)
-            lengths.append(workspace.data[record + LENGTH])
-            speeds.append(workspace.data[record + SPEED])
+            lengths.append(workspace.data[record + PATH_WORK.LENGTH])
+            speeds.append(workspace.data[record + PATH_WORK.SPEED])
     return names, workspace.mask_failures(lengths), workspace.mask_failures(speeds)
 
 

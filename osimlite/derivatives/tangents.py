@@ -18,7 +18,7 @@ from osimlite.derivatives.differentiable_model import DifferentiableModel
 from osimlite.derivatives.outputs import compute_output_columns, list_probe_items, locate_stations
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels import merson
-from osimlite.mechanics.kernels.error_control import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
+from osimlite.mechanics.kernels.error_control import ERRORS, METHOD_WORK
 from osimlite.mechanics.kernels.layout import (
     CONSTRAINED,
     CONSTRAINT,
@@ -511,10 +511,10 @@ class TangentSteps:
                 machine.x[:] = self._numbers[number]
             machine.begin(t0)
             h = self._h
-            h[REACHED] = t0
-            h[LAST_TIME] = t1
-            h[NEXT_STEP] = t1 - t0
-            h[ACCEPTED] = self._accepted
+            h[METHOD_WORK.REACHED] = t0
+            h[METHOD_WORK.LAST_TIME] = t1
+            h[METHOD_WORK.NEXT_STEP] = t1 - t0
+            h[METHOD_WORK.ACCEPTED] = self._accepted
             self._start[:size] = block
             # A step that fails leaves NaN, since the kernel then does not write its end.
             self._end[0] = np.nan

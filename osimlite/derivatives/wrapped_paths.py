@@ -18,9 +18,9 @@ import numpy as np
 from osimlite.base.records import replace
 from osimlite.derivatives.symbolic import register_symbolic
 from osimlite.derivatives.symbols import casadi
-from osimlite.mechanics.kernels.function_paths import ARMS, DERIVATIVES
+from osimlite.mechanics.kernels.function_paths import FUNCTION_PATH_WORK, FUNCTION_WORK
 from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME
-from osimlite.mechanics.kernels.paths import LENGTH, SPEED
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -72,10 +72,10 @@ class SymbolicPath:
 
         def write_length(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
             record = w.rest(s[item + ITEM.RECORD])
-            record[LENGTH] = self.symbols[0]
+            record[PATH_WORK.LENGTH] = self.symbols[0]
             for k in range(count):
                 # The moment arm is minus the derivative of the length.
-                record[DERIVATIVES + k] = -self.symbols[1 + k]
+                record[FUNCTION_WORK.DERIVATIVES + k] = -self.symbols[1 + k]
             return OUTCOME.OK
 
         def write_speed(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
@@ -89,7 +89,7 @@ class SymbolicPath:
         write_length.takes_symbols = write_speed.takes_symbols = True  # type: ignore[attr-defined]
         given = ForceRecord(
             "",
-            record_size=DERIVATIVES + count,
+            record_size=FUNCTION_WORK.DERIVATIVES + count,
             is_part=True,
             python=register_symbolic(write_length),
         )
@@ -98,7 +98,12 @@ class SymbolicPath:
         before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
         backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
         ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
-        return [*before, ForceRecord("function_path", ints, record_size=ARMS + count, is_part=True)]
+        return [
+            *before,
+            ForceRecord(
+                "function_path", ints, record_size=FUNCTION_PATH_WORK.ARMS + count, is_part=True
+            ),
+        ]
 
 
 class WrappedPaths:
@@ -159,7 +164,7 @@ class WrappedPaths:
             moving = np.zeros(len(pose))
             moving[group] = 1.0
             # No path depends on two of these coordinates, so that one evaluation serves all.
-            result[:, group] = self._system.measure_paths(pose, moving, SPEED)[:, None]
+            result[:, group] = self._system.measure_paths(pose, moving, PATH_WORK.SPEED)[:, None]
         return [
             row[[*item.coordinates]] for row, item in zip(result, self.symbolic_paths, strict=True)
         ]
@@ -206,7 +211,7 @@ class WrappedPaths:
         """
         pose = self._default.copy()
         pose[self._order] = q
-        lengths = self._system.measure_paths(pose, self._still, LENGTH)
+        lengths = self._system.measure_paths(pose, self._still, PATH_WORK.LENGTH)
         (arms,) = self._system.compute_pulls(pose[None])
         speeds = self._measure_speeds(pose)
         parts = zip(lengths, arms, speeds, self.symbolic_paths, strict=True)

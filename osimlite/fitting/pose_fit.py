@@ -16,9 +16,9 @@ from osimlite.fitting.pose_layout import (
     SensorTarget,
     separate_couplers,
 )
-from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
+from osimlite.mechanics.kernels.pose_record import FIT
 from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.links import Places
@@ -116,7 +116,7 @@ class PoseFit:
         self.layout = FitLayout(
             self.system, places, markers, sensors, kept, list(self._held), self._couplers
         )
-        self._history = self.layout.work[self.layout.ints[fit.HISTORY] :]
+        self._history = self.layout.work[self.layout.ints[FIT.HISTORY] :]
         self.width = self.measured + len(kept) + len(self._held)
         self.sensors = len(sensors)
         self.found = len(self.order) + 3 * (len(markers) + len(sensors)) + 3

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
 from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import POSES
+from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.function_tables import function_table
 from osimlite.mechanics.multibody.links import Places
@@ -112,27 +112,30 @@ class FitLayout:
         equations = 0
         if s[MODEL.CONSTRAINED]:
             equations = int(s[s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
-        ints = [0] * fit.FIT_HEAD
+        ints = [0] * FIT.HEAD
         numbers = list[float]()
         self._append_list(
             ints,
-            fit.MARKERS,
-            fit.MARKER_AT,
+            FIT.MARKERS,
+            FIT.MARKER_AT,
             list(self._list_marker_links(places, markers, numbers)),
         )
         self._append_list(
             ints,
-            fit.SENSORS,
-            fit.SENSOR_AT,
+            FIT.SENSORS,
+            FIT.SENSOR_AT,
             list(self._list_sensor_links(places, sensors, numbers)),
         )
         # The kernel reads the numbers in this order: markers, sensors, goals, ranges, couplers.
         numbers += [goal.weight for goal in goals]
         self._append_list(
-            ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals]
+            ints,
+            FIT.GOALS,
+            FIT.GOAL_AT,
+            [places.freedom(goal.coordinate) for goal in goals],
         )
-        self._append_list(ints, fit.HELD, fit.HELD_AT, [places.freedom(index) for index in held])
-        ints[fit.RANGES_AT] = len(numbers)
+        self._append_list(ints, FIT.HELD, FIT.HELD_AT, [places.freedom(index) for index in held])
+        ints[FIT.RANGES_AT] = len(numbers)
         for low, high in compute_ranges(system.mechanism, system.order, couplers):
             numbers += low, high
         records = []
@@ -143,33 +146,33 @@ class FitLayout:
             # Arguments that are locked have no degree of freedom, but a value.
             numbers += [places.locked_value(index) for index in coupler.independent]
             numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
-        self._append_list(ints, fit.COUPLERS, fit.COUPLER_AT, records)
+        self._append_list(ints, FIT.COUPLERS, FIT.COUPLER_AT, records)
         self._append_axes(ints, s, system.numbers, links)
-        ints[fit.RESOLVED_AT] = len(ints)
-        known = dict.fromkeys(map(places.freedom, held), fit.GIVEN)
-        known |= {places.freedom(item.dependent): fit.DEPENDENT for item in couplers}
-        ints += [known.get(k, fit.VARIABLE) for k in range(size)]
-        ints[fit.FREE_AT] = len(ints)
+        ints[FIT.RESOLVED_AT] = len(ints)
+        known = dict.fromkeys(map(places.freedom, held), FREEDOM.GIVEN)
+        known |= {places.freedom(item.dependent): FREEDOM.DEPENDENT for item in couplers}
+        ints += [known.get(k, FREEDOM.VARIABLE) for k in range(size)]
+        ints[FIT.FREE_AT] = len(ints)
         ints += [0] * size
         # The sum of all scratch vectors that the kernel uses at one time.
         room = 2 * size + factor_size(equations, size) + 2 * equations + 3 * size * size + 4 * size
         lengths = {
-            fit.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held),
-            fit.WEIGHTS: len(markers) + len(sensors) + len(goals),
-            fit.SLOPE: size,
-            fit.STIFFNESS: size * size,
-            fit.BEND: size * size,
-            fit.TURNED: 9 * links,
-            fit.ROWS: equations * size,
-            fit.ERRORS: equations,
-            fit.ROOM: max(
+            FIT.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held),
+            FIT.WEIGHTS: len(markers) + len(sensors) + len(goals),
+            FIT.SLOPE: size,
+            FIT.STIFFNESS: size * size,
+            FIT.BEND: size * size,
+            FIT.TURNED: 9 * links,
+            FIT.ROWS: equations * size,
+            FIT.ERRORS: equations,
+            FIT.ROOM: max(
                 room, 2 * size + max([len(item.independent) for item in couplers], default=0)
             ),
-            fit.HISTORY: 2 + (POSES + 2) * size,
-            fit.TRIAL: 2 * size,
-            fit.STEP: size,
-            fit.CURVES: (size * size + equations) * (equations > 0),
-            fit.PATTERN: len(markers) + len(sensors) + len(goals) + 1,
+            FIT.HISTORY: 2 + (POSES + 2) * size,
+            FIT.TRIAL: 2 * size,
+            FIT.STEP: size,
+            FIT.CURVES: (size * size + equations) * (equations > 0),
+            FIT.PATTERN: len(markers) + len(sensors) + len(goals) + 1,
         }
         work = 0
         for entry, length in lengths.items():
@@ -227,9 +230,9 @@ class FitLayout:
                         parts.reverse()
                 axes += [(operation, part) for part in parts]
             first.append(len(axes))
-        ints[fit.AXES_AT] = len(ints)
+        ints[FIT.AXES_AT] = len(ints)
         ints += [*first, *(number for axis in axes for number in axis)]
-        FitLayout._append_list(ints, fit.BALLS, fit.BALL_AT, balls)
+        FitLayout._append_list(ints, FIT.BALLS, FIT.BALL_AT, balls)
 
 
 def compute_ranges(

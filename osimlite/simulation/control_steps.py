@@ -19,9 +19,9 @@ from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
+from osimlite.mechanics.kernels.reflexes import LEG_STATE, REFLEXES
 from osimlite.mechanics.kernels.sensors import SENSES
-from osimlite.mechanics.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
+from osimlite.mechanics.kernels.walks import LEGS, PROGRESS
 from osimlite.mechanics.multibody.functions import ConstantValue, PiecewiseConstant, SmoothFunction
 from osimlite.simulation.options import INITIAL_STEP_S
 from osimlite.simulation.run_controls import find_constant_offsets
@@ -254,9 +254,11 @@ class ControllerRuns:
         self._room = np.zeros((count, plan[REFLEXES.ROOM]))
         rows = np.zeros((count, senses[SENSES.SIZE]))
         # UNKNOWN lets the first sensors decide the state of a leg; legs without states keep 0.
-        self._room[:, :LEGS] = UNKNOWN if plan[REFLEXES.HAS_STATES] else EARLY_STANCE
+        self._room[:, :LEGS] = (
+            LEG_STATE.UNKNOWN if plan[REFLEXES.HAS_STATES] else LEG_STATE.EARLY_STANCE
+        )
         self._excitations = np.zeros((count, len(held.paths)))
-        self._progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
+        self._progress: Ints = np.zeros((count, PROGRESS.SIZE), dtype=np.int64)
         if before is not None:
             self._resume(plan, before)
         if to > 0.0:
@@ -291,7 +293,7 @@ class ControllerRuns:
             last[LEGS:-1],
             float(last[-1]),
         )
-        self._progress[0, [STEPS, FRAMES]] = plan[REFLEXES.FIRST] = frames
+        self._progress[0, [PROGRESS.STEPS, PROGRESS.FRAMES]] = plan[REFLEXES.FIRST] = frames
 
     def table(self, end: float = inf) -> StoTable:
         """Return the record of a single run.
@@ -305,9 +307,11 @@ class ControllerRuns:
         Returns:
             One row for each control step, with the columns of the controller.
         """
-        new = int(self._progress[0, STEPS] - self._plan[REFLEXES.FIRST])
+        new = int(self._progress[0, PROGRESS.STEPS] - self._plan[REFLEXES.FIRST])
         times = self.controller.step * np.arange(
-            self._progress[0, STEPS] - new, self._progress[0, STEPS], dtype=np.float64
+            self._progress[0, PROGRESS.STEPS] - new,
+            self._progress[0, PROGRESS.STEPS],
+            dtype=np.float64,
         )
         rows = self._record[:new].copy()
         if self._before is not None:

@@ -393,7 +393,7 @@ class StateEvaluator:
         Args:
             item: offset of the item in the structure.
         """
-        from osimlite.mechanics.kernels.paths import LENGTH
+        from osimlite.mechanics.kernels.paths import PATH_WORK
         from osimlite.simulation.elements.force_type import DeclaredForce
         from osimlite.simulation.elements.geometries.path import PATH
 
@@ -403,7 +403,7 @@ class StateEvaluator:
         # A path that cannot be wrapped has the length NaN, and then the muscle has no solution
         # either.
         on_path = isinstance(element, DeclaredForce) and element.force_type.geometry is PATH
-        if on_path and isnan(self._w[parts[-1][0] + LENGTH]):
+        if on_path and isnan(self._w[parts[-1][0] + PATH_WORK.LENGTH]):
             return f"'{element.path}', whose path has no length in this pose"
         return element.describe_failure(self._w[place : place + room].tolist())
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.batched_curves import LANES, ROWS
+from osimlite.mechanics.kernels.batched_curves import CURVE_ROW, LANES
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, EQUILIBRIUM, ITEM, MODEL, RESPONSE, RUN
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.record import STATES
@@ -199,7 +199,7 @@ class Packer(LinkPacker):
                 SENSE=response.sense,
             )
         # All runs share one workspace, since they are evaluated one after the other.
-        room = self.reserve_work(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
+        room = self.reserve_work(LANES * CURVE_ROW.SIZE) if any(kernel for kernel, _ in runs) else 0
         self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
         for (kernel, first), end in zip(
             runs, [*(run[1] for run in runs[1:]), len(records)], strict=False

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
-from osimlite.mechanics.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
-from osimlite.mechanics.kernels.wrapping import SURFACE_LENGTH
+from osimlite.mechanics.kernels.paths import NODE_WORK, PATH_WORK
+from osimlite.mechanics.kernels.wrapping import WRAP_WORK
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.force_records import ForceRecord, Silent
@@ -85,7 +85,7 @@ class PathSystem(System):
         Args:
             q: coordinate values (n,).
             u: generalized speeds (n,).
-            what: `LENGTH` or `SPEED`.
+            what: `PATH_WORK.LENGTH` or `SPEED`.
 
         Returns:
             Lengths (m) or speeds (m/s) (p,).
@@ -136,9 +136,13 @@ class PathSystem(System):
         for (name, route), items in zip(routes.items(), self._items, strict=True):
             if isinstance(route, ThroughPoints):
                 record = self._w[items[-1][0] :]
-                order = record[ORDER : ORDER + int(record[COUNT])].astype(int)
-                work = record[ORDER + len(route.points) + 2 * len(route.surfaces) :]
-                result[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
+                order = record[
+                    PATH_WORK.ORDER : PATH_WORK.ORDER + int(record[PATH_WORK.COUNT])
+                ].astype(int)
+                work = record[PATH_WORK.ORDER + len(route.points) + 2 * len(route.surfaces) :]
+                result[name] = [
+                    (int(k), work[NODE_WORK.SIZE * k + NODE_WORK.PLACE :][:3].copy()) for k in order
+                ]
         return result
 
     def measure_on_surfaces(
@@ -204,10 +208,15 @@ class PathSystem(System):
                 laws = iter([place for place, _ in items[1:-1]])
                 points = len(route.points)
                 size = points + 2 * len(route.surfaces)
-                order = path + COUNT, *range(path + ORDER, path + ORDER + size)
+                order = (
+                    path + PATH_WORK.COUNT,
+                    *range(path + PATH_WORK.ORDER, path + PATH_WORK.ORDER + size),
+                )
                 for second, surface in zip(range(points + 1, size, 2), route.surfaces, strict=True):
-                    law = next(laws) + SURFACE_LENGTH if surface.law else -1
-                    length = path + ORDER + size + NODE_WORK * second + SURFACE
+                    law = next(laws) + WRAP_WORK.SURFACE_LENGTH if surface.law else -1
+                    length = (
+                        path + PATH_WORK.ORDER + size + NODE_WORK.SIZE * second + NODE_WORK.SURFACE
+                    )
                     yield _OnSurface(name, surface.tangent.name, second, order, (length, law))
 
     @staticmethod
@@ -229,7 +238,9 @@ class PathSystem(System):
         Returns:
             Lengths (k, p), m; NaN in a pose in which they cannot be computed.
         """
-        return self.read_work_vector(poses, [items[-1][0] + LENGTH for items in self._items])
+        return self.read_work_vector(
+            poses, [items[-1][0] + PATH_WORK.LENGTH for items in self._items]
+        )
 
     def measure_one_path(self, paths: Sequence[int], poses: Array) -> Array:
         """Return the length of one path in each of many poses.
@@ -243,7 +254,7 @@ class PathSystem(System):
         """
         column = {path: k for k, path in enumerate(dict.fromkeys(paths))}
         result = self.read_work_vector(
-            poses, [self._items[path][-1][0] + LENGTH for path in column], paths
+            poses, [self._items[path][-1][0] + PATH_WORK.LENGTH for path in column], paths
         )
         of_each: Array = result[range(len(result)), [column[path] for path in paths]]
         return of_each

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.lazy import make_notebook_repr
-from osimlite.mechanics.kernels.paths import LENGTH, SPEED
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.kernels.projection import REDUNDANT
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock
@@ -148,7 +148,7 @@ class Paths:
             Lengths (m) by owner.
         """
         lengths = self.system.measure_paths(
-            self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH
+            self.mechanism.values(q), np.zeros(len(self._coordinates)), PATH_WORK.LENGTH
         )
         return dict(zip(self.names, lengths.tolist(), strict=True))
 
@@ -167,7 +167,7 @@ class Paths:
             Speeds (m/s) by owner.
         """
         speeds = self.system.measure_paths(
-            self.mechanism.values(q), self.mechanism.speeds(u), SPEED
+            self.mechanism.values(q), self.mechanism.speeds(u), PATH_WORK.SPEED
         )
         return dict(zip(self.names, speeds.tolist(), strict=True))
 

@@ -74,7 +74,7 @@ def assemble_motion(
     )
     result: Array = np.empty_like(values)
     result[:, order] = found[:, :size]
-    for row in np.flatnonzero(found[:, size] != assembly.ASSEMBLED).tolist():
+    for row in np.flatnonzero(found[:, size] != assembly.POSE_STATUS.ASSEMBLED).tolist():
         # The search in Python raises an error with an explanation.
         result[row] = mechanism.assemble(values[row], float(times[row]))
     return result
@@ -99,7 +99,7 @@ def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
     # Without constraints on bodies the positions of the links need not be computed, which is much
     # faster.
     result = [int(program.on_bodies or turning), len(couplers)]
-    result += [assembly.HELD_BY_USER if info.locked else assembly.FREED for info in infos]
+    result += [assembly.HOLD.HELD_BY_USER if info.locked else assembly.HOLD.FREED for info in infos]
     result += [int(not info.yielding) for info in infos]
     result += [int(info.clamped) for info in infos]
     result += [0] * len(infos)

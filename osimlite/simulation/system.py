@@ -222,7 +222,7 @@ class System(StateEvaluator):
     def inertia(self) -> Floats:
         """Mass (kg), mass centre (m) and inertia about it (kg·m²) of all links, in their frames (l, 10)."""
         size = layout.INERTIA.SIZE
-        return self.numbers[layout.INERTIA_AT :][: size * len(self._links)].reshape(-1, size)
+        return self.numbers[layout.REALS.INERTIA :][: size * len(self._links)].reshape(-1, size)
 
     @cached_property
     def masses_in_ground(self) -> list[tuple[float, Floats]]:

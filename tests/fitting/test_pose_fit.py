@@ -54,16 +54,16 @@ def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
         shape.numbers,
         shape.work,
     )
-    m.v[m.p[pose_record.MEASURED] :][: fit.width] = frame
+    m.v[m.p[pose_record.FIT.MEASURED] :][: fit.width] = frame
     assert compute_weights(m)
     y = np.zeros(2 * size)
     y[:size] = q[fit.order]
     value = pose_cost.evaluate_cost(m, y)
     stiffness, bend = (
         m.v[m.p[part] :][: size * size].reshape(size, size)
-        for part in (pose_record.STIFFNESS, pose_record.BEND)
+        for part in (pose_record.FIT.STIFFNESS, pose_record.FIT.BEND)
     )
-    return value, m.v[m.p[pose_record.SLOPE] :][:size].copy(), stiffness + bend
+    return value, m.v[m.p[pose_record.FIT.SLOPE] :][:size].copy(), stiffness + bend
 
 
 @given(cases(max_bodies=4), st.integers(0, 99))

@@ -186,9 +186,9 @@ def test_endings_are_those_of_the_machine_code():
     from osimlite.mechanics.kernels import record
 
     words = {
-        record.DONE: "done",
-        record.FAILED: "failed",
-        record.STOPPED: "stopped",
-        record.TOO_MANY: "too many steps",
+        record.ENDING.DONE: "done",
+        record.ENDING.FAILED: "failed",
+        record.ENDING.STOPPED: "stopped",
+        record.ENDING.TOO_MANY: "too many steps",
     }
     assert words == ENDINGS

@@ -26,7 +26,11 @@ SIDES = {
     "z": (2, 1),
     "-z": (2, -1),
 }
-METHODS = {"hybrid": wrapping.HYBRID, "midpoint": wrapping.MIDPOINT, "axial": wrapping.AXIAL}
+METHODS = {
+    "hybrid": wrapping.ELLIPSOID_METHOD.HYBRID,
+    "midpoint": wrapping.ELLIPSOID_METHOD.MIDPOINT,
+    "axial": wrapping.ELLIPSOID_METHOD.AXIAL,
+}
 
 with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:
     TABLE = json.load(file)
@@ -43,14 +47,14 @@ def numbers(surface, *, alone):
 
 def bent(law, p, first, second):
     """What a law says of a piece of a path."""
-    e = np.full(wrapping.ENDS, 7.0)
-    e[wrapping.FIRST_END : wrapping.FIRST_TANGENT] = *first, *second
+    e = np.full(wrapping.WRAP_WORK.END, 7.0)
+    e[wrapping.WRAP_WORK.FIRST_END : wrapping.WRAP_WORK.FIRST_TANGENT] = *first, *second
     item, state = np.zeros(ITEM.OWN, dtype=np.int64), np.zeros(1)
     says = law(item, p, e, state, state, 0)
     return (
         says,
-        e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3),
-        e[wrapping.SURFACE_LENGTH],
+        e[wrapping.WRAP_WORK.FIRST_TANGENT : wrapping.WRAP_WORK.SURFACE_LENGTH].reshape(2, 3),
+        e[wrapping.WRAP_WORK.SURFACE_LENGTH],
     )
 
 
@@ -64,7 +68,7 @@ def test_surface(name, code):
         to_surface = invert_transform(make_transform(case["R_W"], case["p_W"]) @ frame)
         ends = [(to_surface @ [*case[end], 1.0])[:3] for end in ("p_A", "p_B")]
         says, points, length = bent(law, p, *ends)
-        wraps = says > wrapping.NONE and not np.isnan(points).any()
+        wraps = says > wrapping.WRAPPING.NONE and not np.isnan(points).any()
         assert wraps == (len(case["points"]) == 4)
         if not wraps:
             assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(case["length"], abs=1e-15)

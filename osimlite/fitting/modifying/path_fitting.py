@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.mechanics.kernels.paths import LENGTH
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -68,7 +68,7 @@ def fit_paths(
     mechanism = known.mechanism
     q, free = _sample_poses(mechanism, poses)
     still = np.zeros(len(mechanism.coordinates))
-    lengths = np.array([known.system.measure_paths(row, still, LENGTH) for row in q])
+    lengths = np.array([known.system.measure_paths(row, still, PATH_WORK.LENGTH) for row in q])
     arms = known.compute_moment_arms(q)
     tree = model.tree()
     result = []

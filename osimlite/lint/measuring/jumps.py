@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.lint.measures import PathJump
 from osimlite.lint.measuring.sweeps import Sweep
-from osimlite.mechanics.kernels.paths import CONDITIONAL
+from osimlite.mechanics.kernels.paths import NODE_TYPE
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.paths import Paths
@@ -99,7 +99,7 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
         if not isinstance(route, ThroughPoints):
             continue
         for point in route.points:
-            if point.kind == CONDITIONAL and point.coordinate == sweep.place:
+            if point.kind == NODE_TYPE.CONDITIONAL and point.coordinate == sweep.place:
                 for end in point.range:
                     yield JumpSuspect(inf, 0.0, sweep, path, 0, (end, end))
         for k in np.flatnonzero(excess[:, path] > MIN_JUMP_M) if route.surfaces else ():

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.lint.measures import CoordinateSetting, MovingPoint
-from osimlite.mechanics.kernels.paths import MOVING
+from osimlite.mechanics.kernels.paths import NODE_TYPE
 from osimlite.mechanics.multibody.functions import ScaledFunction
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
@@ -23,7 +23,7 @@ def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
     """Yield each moving point at both ends of the range of its coordinate."""
     for name, route in paths.routes.items():
         for point in route.points if isinstance(route, ThroughPoints) else ():
-            if point.kind != MOVING:
+            if point.kind != NODE_TYPE.MOVING:
                 continue
             info = paths.mechanism.coordinates[point.coordinate]
             low, high = _find_defined_range(point)

@@ -7,18 +7,29 @@ axes. To reproduce OpenSim's motions, an operation of the type
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME, WORK
+from osimlite.mechanics.kernels.layout import (
+    MODEL,
+    OPERATION,
+    OPERATION_WORK,
+    OUTCOME,
+    WORK,
+    Record,
+)
 from osimlite.mechanics.kernels.motion import set_spatial_vector
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 from osimlite.mechanics.laws.vectors import ZERO, add_scaled, cross, minus, times, vector
 
-SIGN = 0
-"""Index among the operation's integers of 1, or -1 if the joint is traversed from child to parent."""
-COORDINATES = 1
-"""Offset of the degrees of freedom of the joint's first two coordinates, -1 for a constant one."""
-TURNS = 3
-"""Offset of the operations that are the joint's three rotations, -1 for one that does not move."""
+
+class DRIFT(metaclass=Record):
+    """Arguments of the operation."""
+
+    SIGN = 0
+    """1, or -1 if the joint is traversed from child to parent."""
+    COORDINATES = 1
+    """Degrees of freedom of the joint's first two coordinates, -1 for a constant one."""
+    TURNS = 3
+    """Operations that are the joint's three rotations, -1 for one that does not move."""
 
 
 def place_drift(
@@ -72,7 +83,7 @@ def move_drift(
     # The first axis is fixed in the parent, so that only the second and third rotation have an
     # error.
     for row in range(1, 3):
-        last = own[TURNS + row]
+        last = own[DRIFT.TURNS + row]
         if last < 0:
             continue
         # Simbody rotates the axis of this angle by wrong rates of the angles before it: it takes the
@@ -80,12 +91,12 @@ def move_drift(
         # rotations before the axis.
         drift = ZERO
         for turn in range(3):
-            number = own[TURNS + turn]
+            number = own[DRIFT.TURNS + turn]
             if number < 0:
                 continue
             wrong = 0.0
             for c in range(row):
-                freedom = own[COORDINATES + c]
+                freedom = own[DRIFT.COORDINATES + c]
                 if freedom >= 0:
                     wrong += operation_gradient(model, data, number, freedom) * u[freedom]
             if turn < row:
@@ -97,7 +108,7 @@ def move_drift(
         total = add_scaled(total, -operation_rate(model, data, u, last), cross(axis, drift))
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
     # Traversed from child to parent, the same error has the opposite sign.
-    total = times(float(own[SIGN]), total)
+    total = times(float(own[DRIFT.SIGN]), total)
     set_spatial_vector(result, ZERO, ZERO)
     # As a spatial acceleration about the common origin.
     set_spatial_vector(at(result, 6), cross(arm, total), total)

@@ -14,7 +14,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
-from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, STAGE, WORK, Record
 from osimlite.mechanics.kernels.linear_algebra import (
     REDUNDANT,
     ROUNDING,
@@ -31,39 +31,65 @@ from osimlite.mechanics.kernels.projection import collect_position_errors, write
 
 # Integers: the head; three arrays (n,) about the degrees of freedom; workspace for a list of free
 # ones (n,); per coupler the dependent degree of freedom and the number of its equation.
-MOVES_LINKS = 0
-"""Offset of 1 if the equations need positions of links, 0 if they need coordinates only."""
-COUPLERS = 1
-"""Offset of the number of couplers."""
-ASSEMBLY_HEAD = 2
-"""Length of the head."""
-HELD = 0
-"""Array of FREED, HELD_BY_USER or HELD_AT_END."""
-COUNTED = 1
-"""Array of 1 where a change of the coordinate adds to the cost, else 0."""
-CLAMPED = 2
-"""Array of 1 where the coordinate has a range, else 0."""
-FREE = 3
-"""Workspace for the list of free degrees of freedom."""
-COUPLER_AT = 4
-"""Records of the couplers."""
-FREED = 0
-"""State of a degree of freedom that the search moves."""
-HELD_BY_USER = 1
-"""State of a degree of freedom that the caller fixed, such as a locked coordinate."""
-HELD_AT_END = 2
-"""State of a degree of freedom that the search fixed at an end of its range."""
+
+
+class ASSEMBLY(metaclass=Record):
+    """Head of the integers of an assembly."""
+
+    MOVES_LINKS = 0
+    """1 if the equations need positions of links, 0 if they need coordinates only."""
+    COUPLERS = 1
+    """Number of couplers."""
+    HEAD = 2
+    """Length of the head."""
+
+
+class ASSEMBLY_ARRAY(metaclass=Record):
+    """Numbers of the arrays of integers, each of which has one entry per degree of freedom."""
+
+    HELD = 0
+    """FREED, HELD_BY_USER or HELD_AT_END of `HOLD`."""
+    COUNTED = 1
+    """1 where a change of the coordinate adds to the cost, else 0."""
+    CLAMPED = 2
+    """1 where the coordinate has a range, else 0."""
+    FREE = 3
+    """Workspace for the list of free degrees of freedom."""
+    COUPLER_AT = 4
+    """Records of the couplers."""
+
+
+class HOLD(metaclass=Record):
+    """What determines the value of a degree of freedom."""
+
+    FREED = 0
+    """Degree of freedom that the search moves."""
+    HELD_BY_USER = 1
+    """Degree of freedom that the caller fixed, such as a locked coordinate."""
+    HELD_AT_END = 2
+    """Degree of freedom that the search fixed at an end of its range."""
+
 
 # Numbers: the tolerance of the equations, and the range of each degree of freedom.
-TOLERANCE = 0
-"""Offset of the tolerance of the equations (m or rad)."""
-RANGES = 1
-"""Offset of the ranges (n, 2) in m or rad."""
 
-ASSEMBLED = 0.0
-"""Status of a pose that fulfils the constraints."""
-APART = 1.0
-"""Status of a pose near which no pose fulfils the constraints."""
+
+class ASSEMBLY_NUMBERS(metaclass=Record):
+    """Numbers of an assembly."""
+
+    TOLERANCE = 0
+    """Tolerance of the equations (m or rad)."""
+    RANGES = 1
+    """Ranges (n, 2) in m or rad."""
+
+
+class POSE_STATUS(metaclass=Record):
+    """Results for a pose."""
+
+    ASSEMBLED = 0.0
+    """Pose that fulfils the constraints."""
+    APART = 1.0
+    """Pose near which no pose fulfils the constraints."""
+
 
 MAX_STEPS = 100
 """Largest number of steps of a search."""
@@ -107,8 +133,8 @@ class Assembly(NamedTuple):
     data: Floats  # workspace of an evaluation
     y: Floats  # workspace of a state
     f: Floats  # workspace of its rates
-    p: Ints  # integers of the assembly, see MOVES_LINKS
-    c: Floats  # numbers of the assembly, see TOLERANCE
+    p: Ints  # integers of the assembly, see `ASSEMBLY`
+    c: Floats  # numbers of the assembly, see `ASSEMBLY_NUMBERS`
     w: Floats  # workspace, see `assembly_work_size`
 
 
@@ -146,7 +172,8 @@ def assemble_poses(
         c: numbers of the assembly.
         w: workspace, see `assembly_work_size`.
         frames: per pose the time (s) and the values of all degrees of freedom (n,).
-        solutions: filled per pose with the values that fulfil the constraints (n,), and ASSEMBLED or APART.
+        solutions: filled per pose with the values that fulfil the constraints (n,), and its
+            `POSE_STATUS`.
         count: number of poses.
     """
     a, size = Assembly(model, reals, data, y, f, p, c, w), model[MODEL.DOFS]
@@ -156,7 +183,9 @@ def assemble_poses(
     for number in range(count):
         frame, solution = at(frames, (1 + size) * number), at(solutions, (1 + size) * number)
         data[WORK.TIME] = frame[0]
-        solution[size] = ASSEMBLED if assemble_pose(a, at(frame, 1), solution) else APART
+        solution[size] = (
+            POSE_STATUS.ASSEMBLED if assemble_pose(a, at(frame, 1), solution) else POSE_STATUS.APART
+        )
     return OUTCOME.OK
 
 
@@ -171,19 +200,23 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     Returns:
         Whether there is one.
     """
-    size, status, ranges = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), at(a.c, RANGES)
-    clamped, fixed = at(status, CLAMPED * size), a.w
+    size, status, ranges = (
+        a.model[MODEL.DOFS],
+        at(a.p, ASSEMBLY.HEAD),
+        at(a.c, ASSEMBLY_NUMBERS.RANGES),
+    )
+    clamped, fixed = at(status, ASSEMBLY_ARRAY.CLAMPED * size), a.w
     for k in range(size):
         fixed[k] = target[k]
         # A coordinate that an earlier pose left at the end of its range is free again.
-        if status[k] == HELD_AT_END:
-            status[k] = FREED
+        if status[k] == HOLD.HELD_AT_END:
+            status[k] = HOLD.FREED
     while True:
         if not find_nearest(a, target, q):
             return False
         worst, most = -1, OUTSIDE
         for k in range(size):
-            if clamped[k] > 0 and status[k] == FREED:
+            if clamped[k] > 0 and status[k] == HOLD.FREED:
                 outside = max(ranges[2 * k] - q[k], q[k] - ranges[2 * k + 1])
                 if outside > most:
                     worst, most = k, outside
@@ -191,7 +224,7 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
             return True
         # Fix the coordinate that leaves its range furthest at the end of it; then the others may
         # fit.
-        status[worst] = HELD_AT_END
+        status[worst] = HOLD.HELD_AT_END
         fixed[worst] = min(max(q[worst], ranges[2 * worst]), ranges[2 * worst + 1])
 
 
@@ -206,7 +239,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     Returns:
         Whether there is one.
     """
-    size, tolerance = a.model[MODEL.DOFS], a.c[TOLERANCE]
+    size, tolerance = a.model[MODEL.DOFS], a.c[ASSEMBLY_NUMBERS.TOLERANCE]
     copy_numbers(size, a.w, q)
     list_freed(a)
     trial = at(a.w, 4 * size)
@@ -275,10 +308,10 @@ def list_freed(a: Assembly) -> int:
     Returns:
         Their number.
     """
-    size, status, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), 0
-    free = at(status, FREE * size)
+    size, status, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY.HEAD), 0
+    free = at(status, ASSEMBLY_ARRAY.FREE * size)
     for k in range(size):
-        if status[k] == FREED:
+        if status[k] == HOLD.FREED:
             free[count] = k
             count += 1
     return count
@@ -293,7 +326,7 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
         q: present values (n,).
     """
     size, total = a.model[MODEL.DOFS], 0.0
-    counted = at(a.p, ASSEMBLY_HEAD + COUNTED * size)
+    counted = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.COUNTED * size)
     for k in range(size):
         if counted[k] > 0:
             total += (q[k] - target[k]) * (q[k] - target[k])
@@ -313,7 +346,7 @@ def evaluate_equations(a: Assembly, q: Floats) -> float:
     model, size = a.model, a.model[MODEL.DOFS]
     copy_numbers(size, q, a.y)
     # Equations between coordinates only do not need the links, whose evaluation costs most.
-    if a.p[MOVES_LINKS] > 0:
+    if a.p[ASSEMBLY.MOVES_LINKS] > 0:
         call(model[MODEL.LAWS], model, a.reals, a.data, a.y, a.f, STAGE.VELOCITY)
     evaluate_constraints(model, a.reals, a.data, a.y, a.f)
     count, errors = count_equations(a), at(a.w, 7 * size)
@@ -349,12 +382,15 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
         a: the assembly.
         q: pose (n,); changed.
     """
-    size, status = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD)
-    counted, couplers = at(status, COUNTED * size), at(status, COUPLER_AT * size)
+    size, status = a.model[MODEL.DOFS], at(a.p, ASSEMBLY.HEAD)
+    counted, couplers = (
+        at(status, ASSEMBLY_ARRAY.COUNTED * size),
+        at(status, ASSEMBLY_ARRAY.COUPLER_AT * size),
+    )
     start = a.model[MODEL.CONSTRAINED]
-    for k in range(a.p[COUPLERS]):
+    for k in range(a.p[ASSEMBLY.COUPLERS]):
         dependent = couplers[2 * k]
-        if status[dependent] == FREED and counted[dependent] == 0:
+        if status[dependent] == HOLD.FREED and counted[dependent] == 0:
             # Evaluate again for each coupler, because its argument may depend on one before.
             evaluate_equations(a, q)
             # The error of a coupler is its function less the coordinate.
@@ -375,8 +411,11 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
         Their rank.
     """
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    status, rows, factor = at(a.p, ASSEMBLY_HEAD), equation_rows(a), equation_factor(a)
-    counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
+    status, rows, factor = at(a.p, ASSEMBLY.HEAD), equation_rows(a), equation_factor(a)
+    counted, free_list = (
+        at(status, ASSEMBLY_ARRAY.COUNTED * size),
+        at(status, ASSEMBLY_ARRAY.FREE * size),
+    )
     lengths, longest = at(a.w, 7 * size + count), 1.0
     for i in range(count):
         total = 0.0
@@ -410,9 +449,16 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     Returns:
         Whether they do.
     """
-    size, count, tolerance = a.model[MODEL.DOFS], count_equations(a), a.c[TOLERANCE]
-    status, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), equation_factor(a)
-    counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
+    size, count, tolerance = (
+        a.model[MODEL.DOFS],
+        count_equations(a),
+        a.c[ASSEMBLY_NUMBERS.TOLERANCE],
+    )
+    status, errors, factor = at(a.p, ASSEMBLY.HEAD), at(a.w, 7 * size), equation_factor(a)
+    counted, free_list = (
+        at(status, ASSEMBLY_ARRAY.COUNTED * size),
+        at(status, ASSEMBLY_ARRAY.FREE * size),
+    )
     step, trial, work = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_size(count, size))
     lengths, values = at(errors, count), at(errors, 2 * count)
     free, largest = list_freed(a), evaluate_equations(a, q)
@@ -456,8 +502,11 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
         The largest change of a coordinate (rad or m).
     """
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    status, factor, step = at(a.p, ASSEMBLY_HEAD), equation_factor(a), at(a.w, size)
-    counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
+    status, factor, step = at(a.p, ASSEMBLY.HEAD), equation_factor(a), at(a.w, size)
+    counted, free_list = (
+        at(status, ASSEMBLY_ARRAY.COUNTED * size),
+        at(status, ASSEMBLY_ARRAY.FREE * size),
+    )
     gradient, along = (
         at(a.w, 5 * size),
         at(factor, factor_size(count, size) + count * size + count * count),
@@ -532,7 +581,7 @@ def add_curvature(
         at(a.w, 7 * size + count),
         at(a.w, 7 * size + 2 * count),
     )
-    free_list, trial = at(a.p, ASSEMBLY_HEAD + FREE * size), at(a.w, 3 * size)
+    free_list, trial = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.FREE * size), at(a.w, 3 * size)
     unit = at(factor, factor_size(count, size))
     normal, row_change = at(unit, count * size), at(along, 2 * size * size)
     for i in range(count):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.bezier import (
     FIRST,
@@ -30,20 +31,25 @@ LANES = 64
 """Largest number of requests at once."""
 COEFFICIENTS = STARTS - X
 """Number of coefficients of a section."""
-VALUE = 0
-"""Row of the workspace of the results."""
-INSIDE = 1
-"""Row of 0.0 for an argument beyond the curve, whose result is known at once, else 1.0."""
-GOES_ON = 2
-"""Row of 1.0 while the search continues, else 0.0."""
-REST = 3
-"""Row of the distances of the arguments from the start of their sections."""
-U = 4
-"""Row of the parameters u."""
-OF_X = 5
-"""First row of the coefficients of the sections."""
-ROWS = 5 + COEFFICIENTS
-"""Number of rows, each of LANES numbers."""
+
+
+class CURVE_ROW(metaclass=Record):
+    """Rows of the workspace, each of LANES numbers."""
+
+    VALUE = 0
+    """Results."""
+    INSIDE = 1
+    """0.0 for an argument beyond the curve, whose result is known at once, else 1.0."""
+    GOES_ON = 2
+    """1.0 while the search continues, else 0.0."""
+    REST = 3
+    """The distances of the arguments from the start of their sections."""
+    U = 4
+    """The parameters u."""
+    OF_X = 5
+    """First row of the coefficients of the sections."""
+    SIZE = 5 + COEFFICIENTS
+    """Number of rows, each of LANES numbers."""
 
 
 def request_value(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
@@ -61,15 +67,21 @@ def request_value(x: Floats, room: Floats, number: int, place: int, z: float) ->
     lane = at(room, number)
     end = FIRST if not z >= c[FIRST] else LAST
     if end == FIRST or z > c[LAST]:
-        lane[LANES * VALUE] = c[end + 1] + c[end + 2] * (z - c[end])
+        lane[LANES * CURVE_ROW.VALUE] = c[end + 1] + c[end + 2] * (z - c[end])
         # A linear section whose search converges at once.
-        lane[LANES * INSIDE] = lane[LANES * REST] = lane[LANES * U] = 0.0
-        lane[LANES * OF_X] = 1.0
+        lane[LANES * CURVE_ROW.INSIDE] = lane[LANES * CURVE_ROW.REST] = lane[
+            LANES * CURVE_ROW.U
+        ] = 0.0
+        lane[LANES * CURVE_ROW.OF_X] = 1.0
         return
     section, rest, u = find_section(c, z)
-    lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, u
+    lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.U] = (
+        1.0,
+        rest,
+        u,
+    )
     for k in range(COEFFICIENTS):
-        lane[LANES * (OF_X + k)] = c[section + X + k]
+        lane[LANES * (CURVE_ROW.OF_X + k)] = c[section + X + k]
 
 
 def request_sum(
@@ -90,20 +102,26 @@ def request_sum(
     lane = at(room, number)
     end = end_beyond_sum(c, of_y, of_x, total)
     if end > 0:
-        lane[LANES * VALUE] = extrapolate_sum(c, of_y, of_x, total, end)
-        lane[LANES * INSIDE] = lane[LANES * U] = 0.0
+        lane[LANES * CURVE_ROW.VALUE] = extrapolate_sum(c, of_y, of_x, total, end)
+        lane[LANES * CURVE_ROW.INSIDE] = lane[LANES * CURVE_ROW.U] = 0.0
         # total - total is 0, or NaN for an undefined total, which must show in the result.
-        lane[LANES * REST], lane[LANES * OF_X] = total - total, 1.0
+        lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.OF_X] = total - total, 1.0
         for k in range(1, COEFFICIENTS):
-            lane[LANES * (OF_X + k)] = 0.0
+            lane[LANES * (CURVE_ROW.OF_X + k)] = 0.0
         return
     section, rest, u = find_section_of_sum(c, of_y, of_x, total)
-    lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, u
+    lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.U] = (
+        1.0,
+        rest,
+        u,
+    )
     # The polynomial in u that the lane solves is that of the sum instead of that of x.
     for k in range(Y - X):
-        lane[LANES * (OF_X + k)] = of_y * c[section + Y + 1 + k] + of_x * c[section + X + k]
+        lane[LANES * (CURVE_ROW.OF_X + k)] = (
+            of_y * c[section + Y + 1 + k] + of_x * c[section + X + k]
+        )
     for k in range(Y - X, COEFFICIENTS):
-        lane[LANES * (OF_X + k)] = c[section + X + k]
+        lane[LANES * (CURVE_ROW.OF_X + k)] = c[section + X + k]
 
 
 def request_residual(room: Any, number: int) -> float:
@@ -114,7 +132,11 @@ def request_residual(room: Any, number: int) -> float:
         number: number of the request.
     """
     return search_residual(
-        room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number]
+        room,
+        LANES * CURVE_ROW.OF_X + number,
+        LANES,
+        room[LANES * CURVE_ROW.U + number],
+        room[LANES * CURVE_ROW.REST + number],
     )
 
 
@@ -125,7 +147,7 @@ def request_result(room: Floats, number: int) -> float:
         room: workspace of the requests.
         number: number of the request.
     """
-    return room[LANES * VALUE + number]
+    return room[LANES * CURVE_ROW.VALUE + number]
 
 
 def compute_requests(room: Any, asked: int, rounds: int) -> None:
@@ -138,7 +160,7 @@ def compute_requests(room: Any, asked: int, rounds: int) -> None:
     """
     # Separate loops over the lanes, so that each becomes vector instructions.
     for lane in range(asked):
-        room[LANES * GOES_ON + lane] = 1.0
+        room[LANES * CURVE_ROW.GOES_ON + lane] = 1.0
     for _ in range(rounds):
         for lane in range(asked):
             step_lane(room, lane)
@@ -146,10 +168,12 @@ def compute_requests(room: Any, asked: int, rounds: int) -> None:
         store_result(room, lane)
     # Lanes that need more steps than most continue alone.
     for lane in range(asked):
-        if room[LANES * GOES_ON + lane] > 0.0:
-            u, rest = room[LANES * U + lane], room[LANES * REST + lane]
-            u, _, _, _ = search_section(room, LANES * OF_X + lane, LANES, u, rest, ROUNDS - rounds)
-            room[LANES * U + lane] = u
+        if room[LANES * CURVE_ROW.GOES_ON + lane] > 0.0:
+            u, rest = room[LANES * CURVE_ROW.U + lane], room[LANES * CURVE_ROW.REST + lane]
+            u, _, _, _ = search_section(
+                room, LANES * CURVE_ROW.OF_X + lane, LANES, u, rest, ROUNDS - rounds
+            )
+            room[LANES * CURVE_ROW.U + lane] = u
             store_result(room, lane)
 
 
@@ -160,13 +184,16 @@ def step_lane(room: Any, lane: int) -> None:
         room: workspace of the requests.
         lane: number of the lane.
     """
-    before, is_going = room[LANES * U + lane], room[LANES * GOES_ON + lane] > 0.0
+    before, is_going = (
+        room[LANES * CURVE_ROW.U + lane],
+        room[LANES * CURVE_ROW.GOES_ON + lane] > 0.0,
+    )
     u, goes_on = take_halley_step(
-        room, LANES * OF_X + lane, LANES, before, room[LANES * REST + lane]
+        room, LANES * CURVE_ROW.OF_X + lane, LANES, before, room[LANES * CURVE_ROW.REST + lane]
     )
     # Select instead of branching, since lanes of one vector instruction do the same.
-    room[LANES * U + lane] = u if is_going else before
-    room[LANES * GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
+    room[LANES * CURVE_ROW.U + lane] = u if is_going else before
+    room[LANES * CURVE_ROW.GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
 
 
 def store_result(room: Any, lane: int) -> None:
@@ -176,6 +203,10 @@ def store_result(room: Any, lane: int) -> None:
         room: workspace of the requests.
         lane: number of the lane.
     """
-    value, _ = evaluate_section(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
-    is_inside = room[LANES * INSIDE + lane] > 0.0
-    room[LANES * VALUE + lane] = value if is_inside else room[LANES * VALUE + lane]
+    value, _ = evaluate_section(
+        room, LANES * CURVE_ROW.OF_X + lane, LANES, room[LANES * CURVE_ROW.U + lane]
+    )
+    is_inside = room[LANES * CURVE_ROW.INSIDE + lane] > 0.0
+    room[LANES * CURVE_ROW.VALUE + lane] = (
+        value if is_inside else room[LANES * CURVE_ROW.VALUE + lane]
+    )

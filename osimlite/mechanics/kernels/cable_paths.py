@@ -18,34 +18,20 @@ from __future__ import annotations
 from math import isnan, nan, radians
 
 from osimlite.mechanics.kernels.cable_surfaces import (
-    A_RATE,
-    ACROSS,
-    ACROSS_BENDS,
-    ALONG,
-    ALONG_BENDS,
-    ARC,
-    END,
     END_NUMBERS,
-    GEODESIC_NUMBERS,
+    GEODESIC,
     GEODESIC_ROOM,
-    NORMAL,
-    POINT,
-    R_RATE,
-    START,
-    TORSION,
-    A,
-    R,
     nearest_on_line,
     shoot_geodesic,
     surface_value,
 )
-from osimlite.mechanics.kernels.layout import ITEM, OUTCOME
+from osimlite.mechanics.kernels.layout import ITEM, OUTCOME, Record
 from osimlite.mechanics.kernels.linear_algebra import (
     factor_size,
     factorise_equations,
     solve_minimum_norm,
 )
-from osimlite.mechanics.kernels.paths import LENGTH, SPEED, TENSION
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import apply_force, place_frame, station, velocity
 from osimlite.mechanics.laws.vectors import (
@@ -64,64 +50,102 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-COUNT = ITEM.OWN + 1
-"""Index in the integers of a cable of the number of its elements."""
-SOLVER = ITEM.OWN + 2
-"""Index of the offset in the record of the workspace of the search."""
-ELEMENTS = ITEM.OWN + 3
-"""Offset of the elements."""
-ELEMENT_INTS = 4
-"""Number of integers of an element."""
-IS_OBSTACLE = 0
-"""Index in an element of 1 for an obstacle, 0 for a point."""
-LINK = 1
-"""Index of its link."""
-AT = 2
-"""Index of the offset of its numbers."""
-KEPT = 3
-"""Index of the offset of its part of the record."""
-FIRST = 3
-"""Offset in the record of the parts of the elements."""
 
-PLACE = 0
-"""Offset in the numbers of a point of the station that the cable passes (m)."""
-PULLED = 3
-"""Offset of the station at which the cable pulls (m)."""
-BEFORE = 3
-"""Offset in the record of a point of the direction before it; its position in ground comes first."""
-AFTER = 6
-"""Offset of the direction after it."""
-POINT_WORK = 9
-"""Length of the record of a point."""
+class CABLE(metaclass=Record):
+    """Integers of a cable."""
 
-STATE = 0
-"""Index in the record of an obstacle of its state, such as TOUCHES."""
-TRACKED = 1
-"""Offset of the point of a line that was nearest to the surface, or of a guess."""
-GEODESIC = 4
-"""Offset of the geodesic."""
-TOUCH_NUMBERS = GEODESIC + GEODESIC_NUMBERS
-"""Length of state, point and geodesic."""
-POSE = 0
-"""Offset in the numbers of an obstacle of its rotation in the link by rows, then its origin."""
-BEGIN = 12
-"""Offset of state, point and geodesic at the start of the search."""
-SURFACE = 12 + TOUCH_NUMBERS
-"""Offset of the numbers of its surface."""
-IN_GROUND = TOUCH_NUMBERS
-"""Offset in the record of an obstacle of its pose in ground."""
-GROUND_START = TOUCH_NUMBERS + 12
-"""Offset of the first end of the geodesic in ground."""
-GROUND_END = TOUCH_NUMBERS + 12 + END_NUMBERS
-"""Offset of the last end of the geodesic in ground."""
-OBSTACLE_WORK = GROUND_END + END_NUMBERS
-"""Length of the record of an obstacle."""
-TOUCHES = 0.0
-"""State of an obstacle that the cable touches."""
-GUESSED = 1.0
-"""State of an obstacle that the cable touches near a guess."""
-LIFTED = 2.0
-"""State of an obstacle that the cable does not touch."""
+    COUNT = ITEM.OWN + 1
+    """Number of its elements."""
+    SOLVER = ITEM.OWN + 2
+    """Offset in the record of the workspace of the search."""
+    ELEMENTS = ITEM.OWN + 3
+    """Elements."""
+
+
+class ELEMENT(metaclass=Record):
+    """Integers of an element of a cable."""
+
+    IS_OBSTACLE = 0
+    """1 for an obstacle, 0 for a point."""
+    LINK = 1
+    """Link."""
+    AT = 2
+    """Offset of its numbers."""
+    KEPT = 3
+    """Offset of its part of the record."""
+    SIZE = 4
+    """Number of integers of an element."""
+
+
+class CABLE_WORK(metaclass=Record):
+    """Record of a cable behind that of any path, see `PATH_WORK`."""
+
+    FIRST = 3
+    """Parts of the elements."""
+
+
+class CABLE_POINT(metaclass=Record):
+    """Numbers of a point of a cable."""
+
+    PLACE = 0
+    """Station that the cable passes (m)."""
+    PULLED = 3
+    """Station at which the cable pulls (m)."""
+
+
+class CABLE_POINT_WORK(metaclass=Record):
+    """Record of a point; its position in ground comes first."""
+
+    BEFORE = 3
+    """Direction before it."""
+    AFTER = 6
+    """Direction after it."""
+    SIZE = 9
+    """Length of the record of a point."""
+
+
+class OBSTACLE_WORK(metaclass=Record):
+    """Record of an obstacle."""
+
+    STATE = 0
+    """State, such as OBSTACLE_STATE.TOUCHES."""
+    TRACKED = 1
+    """Point of a line that was nearest to the surface, or of a guess."""
+    CURVE = 4
+    """Geodesic, see `GEODESIC`."""
+    TOUCH_SIZE = CURVE + GEODESIC.SIZE
+    """Length of state, point and geodesic."""
+    IN_GROUND = TOUCH_SIZE
+    """Pose in ground."""
+    GROUND_START = TOUCH_SIZE + 12
+    """First end of the geodesic in ground."""
+    GROUND_END = TOUCH_SIZE + 12 + END_NUMBERS.SIZE
+    """Last end of the geodesic in ground."""
+    SIZE = GROUND_END + END_NUMBERS.SIZE
+    """Length of the record of an obstacle."""
+
+
+class OBSTACLE(metaclass=Record):
+    """Numbers of an obstacle."""
+
+    POSE = 0
+    """Rotation in the link by rows, then its origin."""
+    BEGIN = 12
+    """State, point and geodesic at the start of the search."""
+    SURFACE = 12 + OBSTACLE_WORK.TOUCH_SIZE
+    """Numbers of its surface."""
+
+
+class OBSTACLE_STATE(metaclass=Record):
+    """States of an obstacle."""
+
+    TOUCHES = 0.0
+    """Obstacle that the cable touches."""
+    GUESSED = 1.0
+    """Obstacle that the cable touches near a guess."""
+    LIFTED = 2.0
+    """Obstacle that the cable does not touch."""
+
 
 UNKNOWNS = 4
 """Number of unknowns of an obstacle: the natural variations of its geodesic."""
@@ -163,17 +187,17 @@ def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
-    elements = at(i, ELEMENTS)
-    for k in range(i[COUNT]):
-        place_element(model, data, at(elements, ELEMENT_INTS * k), p, result)
+    elements = at(i, CABLE.ELEMENTS)
+    for k in range(i[CABLE.COUNT]):
+        place_element(model, data, at(elements, ELEMENT.SIZE * k), p, result)
     length, first = 0.0, 0
-    for k in range(1, i[COUNT]):
-        if elements[ELEMENT_INTS * k + IS_OBSTACLE] == 0:
-            length += find_cable(elements, p, result, first, k, at(result, i[SOLVER]))
+    for k in range(1, i[CABLE.COUNT]):
+        if elements[ELEMENT.SIZE * k + ELEMENT.IS_OBSTACLE] == 0:
+            length += find_cable(elements, p, result, first, k, at(result, i[CABLE.SOLVER]))
             first = k
-    result[LENGTH], result[SPEED] = (
+    result[PATH_WORK.LENGTH], result[PATH_WORK.SPEED] = (
         length,
-        lengthening_speed(model, data, i[COUNT], elements, result),
+        lengthening_speed(model, data, i[CABLE.COUNT], elements, result),
     )
     return OUTCOME.OK
 
@@ -188,15 +212,19 @@ def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: F
         p: numbers of the cable.
         record: record of the cable; the part of the element is filled.
     """
-    numbers, part, link = at(p, element[AT]), at(record, element[KEPT]), element[LINK]
-    if element[IS_OBSTACLE] == 0:
-        store_vector(part, 0, station(model, data, link, vector(numbers, PLACE)))
+    numbers, part, link = (
+        at(p, element[ELEMENT.AT]),
+        at(record, element[ELEMENT.KEPT]),
+        element[ELEMENT.LINK],
+    )
+    if element[ELEMENT.IS_OBSTACLE] == 0:
+        store_vector(part, 0, station(model, data, link, vector(numbers, CABLE_POINT.PLACE)))
         return
-    place_frame(model, data, link, numbers, vector(numbers, 9), at(part, IN_GROUND))
+    place_frame(model, data, link, numbers, vector(numbers, 9), at(part, OBSTACLE_WORK.IN_GROUND))
     # Every search starts from the contact in the default pose, so that it depends on the pose
     # alone.
-    for k in range(TOUCH_NUMBERS):
-        part[k] = numbers[BEGIN + k]
+    for k in range(OBSTACLE_WORK.TOUCH_SIZE):
+        part[k] = numbers[OBSTACLE.BEGIN + k]
 
 
 def surface_to_ground(pose: Floats, point: Vector) -> Vector:
@@ -244,15 +272,23 @@ def find_cable(
         if not correct_geodesics(elements, p, record, first, last, count, rough, work):
             return nan
     # Directions at the points, for the forces.
-    store_vector(at(record, elements[ELEMENT_INTS * first + KEPT]), AFTER, vector(lines, 0))
-    store_vector(at(record, elements[ELEMENT_INTS * last + KEPT]), BEFORE, vector(lines, 4 * count))
+    store_vector(
+        at(record, elements[ELEMENT.SIZE * first + ELEMENT.KEPT]),
+        CABLE_POINT_WORK.AFTER,
+        vector(lines, 0),
+    )
+    store_vector(
+        at(record, elements[ELEMENT.SIZE * last + ELEMENT.KEPT]),
+        CABLE_POINT_WORK.BEFORE,
+        vector(lines, 4 * count),
+    )
     length = 0.0
     for k in range(count + 1):
         length += lines[4 * k + 3]
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT_INTS * k + KEPT])
-        if part[STATE] == TOUCHES:
-            length += part[GEODESIC + ARC]
+        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            length += part[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
     return length
 
 
@@ -273,39 +309,50 @@ def update_contact(
     Returns:
         False if a neighbouring point is inside the obstacle or there is no geodesic.
     """
-    element = at(elements, ELEMENT_INTS * number)
-    numbers, part = at(p, element[AT]), at(record, element[KEPT])
-    geodesic, pose, surface = at(part, GEODESIC), at(part, IN_GROUND), at(numbers, SURFACE)
+    element = at(elements, ELEMENT.SIZE * number)
+    numbers, part = at(p, element[ELEMENT.AT]), at(record, element[ELEMENT.KEPT])
+    geodesic, pose, surface = (
+        at(part, OBSTACLE_WORK.CURVE),
+        at(part, OBSTACLE_WORK.IN_GROUND),
+        at(numbers, OBSTACLE.SURFACE),
+    )
     # A geodesic with a length touches for certain; only one that has shrunk to a point may lift
     # off.
-    if part[STATE] != TOUCHES or not geodesic[ARC] > 0.0:
+    if part[OBSTACLE_WORK.STATE] != OBSTACLE_STATE.TOUCHES or not geodesic[GEODESIC.ARC] > 0.0:
         before = find_neighbour(elements, record, pose, number, -1, first)
         after = find_neighbour(elements, record, pose, number, 1, last)
         # No cable starts from inside an obstacle.
         if surface_value(surface, before) > 0.0 or surface_value(surface, after) > 0.0:
             return False
         chord = minus(after, before)
-        if part[STATE] == GUESSED:
-            part[STATE] = TOUCHES
-            if not shoot_geodesic(surface, vector(part, TRACKED), chord, 0.0, geodesic, work):
+        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.GUESSED:
+            part[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.TOUCHES
+            if not shoot_geodesic(
+                surface, vector(part, OBSTACLE_WORK.TRACKED), chord, 0.0, geodesic, work
+            ):
                 return False
-        elif part[STATE] == TOUCHES:
-            point, normal = vector(geodesic, START + POINT), vector(geodesic, START + NORMAL)
+        elif part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            point, normal = (
+                vector(geodesic, GEODESIC.START + END_NUMBERS.POINT),
+                vector(geodesic, GEODESIC.START + END_NUMBERS.NORMAL),
+            )
             # Both neighbours above the tangent plane: the line passes over the surface.
             if dot(minus(before, point), normal) > 0.0 and dot(minus(after, point), normal) > 0.0:
-                part[STATE] = LIFTED
-                store_vector(part, TRACKED, point)
+                part[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.LIFTED
+                store_vector(part, OBSTACLE_WORK.TRACKED, point)
         else:
-            below, point = nearest_on_line(surface, before, after, vector(part, TRACKED))
-            store_vector(part, TRACKED, point)
+            below, point = nearest_on_line(
+                surface, before, after, vector(part, OBSTACLE_WORK.TRACKED)
+            )
+            store_vector(part, OBSTACLE_WORK.TRACKED, point)
             if below:
-                part[STATE] = TOUCHES
+                part[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.TOUCHES
                 # A touch begins with a geodesic of zero length in the direction of the chord.
                 if not shoot_geodesic(surface, point, chord, 0.0, geodesic, work):
                     return False
-    if part[STATE] == TOUCHES:
-        end_to_ground(pose, at(geodesic, START), at(part, GROUND_START))
-        end_to_ground(pose, at(geodesic, END), at(part, GROUND_END))
+    if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+        end_to_ground(pose, at(geodesic, GEODESIC.START), at(part, OBSTACLE_WORK.GROUND_START))
+        end_to_ground(pose, at(geodesic, GEODESIC.END), at(part, OBSTACLE_WORK.GROUND_END))
     return True
 
 
@@ -323,14 +370,24 @@ def find_neighbour(
         limit: number of the point at which the cable ends on this side.
     """
     k = number + step
-    while k != limit and record[elements[ELEMENT_INTS * k + KEPT] + STATE] == LIFTED:
+    while (
+        k != limit
+        and record[elements[ELEMENT.SIZE * k + ELEMENT.KEPT] + OBSTACLE_WORK.STATE]
+        == OBSTACLE_STATE.LIFTED
+    ):
         k += step
-    part = at(record, elements[ELEMENT_INTS * k + KEPT])
+    part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
     if k == limit:
         point = vector(part, 0)
     else:
         point = surface_to_ground(
-            at(part, IN_GROUND), vector(part, GEODESIC + (END if step < 0 else START) + POINT)
+            at(part, OBSTACLE_WORK.IN_GROUND),
+            vector(
+                part,
+                OBSTACLE_WORK.CURVE
+                + (GEODESIC.END if step < 0 else GEODESIC.START)
+                + END_NUMBERS.POINT,
+            ),
         )
     return rotate_back(pose, minus(point, vector(pose, 9)))
 
@@ -343,11 +400,11 @@ def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
         end: end of the geodesic in the frame of the surface.
         ground: filled with the end in ground.
     """
-    store_vector(ground, POINT, surface_to_ground(pose, vector(end, POINT)))
-    for place in (ALONG, NORMAL, ACROSS):
+    store_vector(ground, END_NUMBERS.POINT, surface_to_ground(pose, vector(end, END_NUMBERS.POINT)))
+    for place in (END_NUMBERS.ALONG, END_NUMBERS.NORMAL, END_NUMBERS.ACROSS):
         store_vector(ground, place, rotate(pose, vector(end, place)))
     # Curvatures and torsion do not depend on the frame.
-    for place in (ALONG_BENDS, ACROSS_BENDS, TORSION):
+    for place in (END_NUMBERS.ALONG_BENDS, END_NUMBERS.ACROSS_BENDS, END_NUMBERS.TORSION):
         ground[place] = end[place]
 
 
@@ -365,15 +422,18 @@ def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Flo
         The number of touched obstacles.
     """
     count = 0
-    start = vector(record, elements[ELEMENT_INTS * first + KEPT])
+    start = vector(record, elements[ELEMENT.SIZE * first + ELEMENT.KEPT])
     for k in range(first + 1, last + 1):
-        part = at(record, elements[ELEMENT_INTS * k + KEPT])
-        if k == last or part[STATE] == TOUCHES:
-            chord = minus(vector(part, 0 if k == last else GROUND_START + POINT), start)
+        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if k == last or part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            chord = minus(
+                vector(part, 0 if k == last else OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT),
+                start,
+            )
             store_vector(lines, 4 * count, unit(chord))
             lines[4 * count + 3] = norm(chord)
             if k < last:
-                start = vector(part, GROUND_END + POINT)
+                start = vector(part, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
                 count += 1
     return count
 
@@ -399,11 +459,13 @@ def measure_kinks(
     """
     most, number = 0.0, 0
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT_INTS * k + KEPT])
-        if part[STATE] == TOUCHES:
-            for end in (GROUND_START, GROUND_END):
-                line = vector(lines, 4 * (number // 4 + (0 if end == GROUND_START else 1)))
-                for axis in (NORMAL, ACROSS):
+        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            for end in (OBSTACLE_WORK.GROUND_START, OBSTACLE_WORK.GROUND_END):
+                line = vector(
+                    lines, 4 * (number // 4 + (0 if end == OBSTACLE_WORK.GROUND_START else 1))
+                )
+                for axis in (END_NUMBERS.NORMAL, END_NUMBERS.ACROSS):
                     error = dot(line, vector(part, end + axis))
                     if isnan(error):
                         return nan
@@ -447,22 +509,38 @@ def correct_geodesics(
         a[k] = 0.0
     number, before = 0, first
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT_INTS * k + KEPT])
-        if part[STATE] == TOUCHES:
+        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             line, next_line, row = (
                 at(lines, 4 * number),
                 at(lines, 4 * number + 4),
                 at(a, 4 * number * size),
             )
-            set_rows(part, GROUND_START, line, at(row, 4 * number), size)
-            set_rows(part, GROUND_END, next_line, at(row, 2 * size + 4 * number), size)
+            set_rows(part, OBSTACLE_WORK.GROUND_START, line, at(row, 4 * number), size)
+            set_rows(
+                part, OBSTACLE_WORK.GROUND_END, next_line, at(row, 2 * size + 4 * number), size
+            )
             if number > 0:
-                other = at(record, elements[ELEMENT_INTS * before + KEPT])
+                other = at(record, elements[ELEMENT.SIZE * before + ELEMENT.KEPT])
                 set_far_rows(
-                    part, GROUND_START, line, other, GROUND_END, at(row, 4 * number - 4), size
+                    part,
+                    OBSTACLE_WORK.GROUND_START,
+                    line,
+                    other,
+                    OBSTACLE_WORK.GROUND_END,
+                    at(row, 4 * number - 4),
+                    size,
                 )
                 back = at(a, (4 * number - 2) * size + 4 * number)
-                set_far_rows(other, GROUND_END, line, part, GROUND_START, back, size)
+                set_far_rows(
+                    other,
+                    OBSTACLE_WORK.GROUND_END,
+                    line,
+                    part,
+                    OBSTACLE_WORK.GROUND_START,
+                    back,
+                    size,
+                )
             # Penalize changes of the length in proportion to the kinks, as Scholz et al. do.
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
@@ -476,20 +554,20 @@ def correct_geodesics(
     # same part.
     step, number = 1.0, 0
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT_INTS * k + KEPT])
-        if part[STATE] == TOUCHES:
+        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             most = largest_turn(part, at(corrections, 4 * number))
             if most > LARGEST:
                 step = min(step, LARGEST / most)
             number += 1
     number = 0
     for k in range(first + 1, last):
-        element = at(elements, ELEMENT_INTS * k)
-        part = at(record, element[KEPT])
-        if part[STATE] == TOUCHES:
-            surface = at(p, element[AT] + SURFACE)
+        element = at(elements, ELEMENT.SIZE * k)
+        part = at(record, element[ELEMENT.KEPT])
+        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            surface = at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE)
             if not shoot_again(
-                surface, at(part, GEODESIC), at(corrections, 4 * number), step, work
+                surface, at(part, OBSTACLE_WORK.CURVE), at(corrections, 4 * number), step, work
             ):
                 return False
             number += 1
@@ -504,16 +582,17 @@ def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> N
 
     Args:
         part: record of the obstacle.
-        end: GROUND_START or GROUND_END.
+        end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         line: direction and length of the line at this end.
         rows: filled with two rows (2, size).
         size: length of a row.
     """
     e = vector(line, 0)
     for k in range(2):
-        a = vector(part, end + (NORMAL if k == 0 else ACROSS))
+        a = vector(part, end + (END_NUMBERS.NORMAL if k == 0 else END_NUMBERS.ACROSS))
         shift = times(
-            (1.0 if end == GROUND_START else -1.0) / line[3], add_scaled(a, -dot(e, a), e)
+            (1.0 if end == OBSTACLE_WORK.GROUND_START else -1.0) / line[3],
+            add_scaled(a, -dot(e, a), e),
         )
         differentiate_end(part, end, shift, cross(a, e), at(rows, k * size))
 
@@ -525,18 +604,19 @@ def set_far_rows(
 
     Args:
         part: record of the obstacle of the end.
-        end: GROUND_START or GROUND_END.
+        end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         line: direction and length of the line between both geodesics.
         other: record of the other obstacle.
-        far: end of the other geodesic, GROUND_END or GROUND_START.
+        far: end of the other geodesic, GROUND_END or GROUND_START of `OBSTACLE_WORK`.
         rows: filled with two rows (2, size).
         size: length of a row.
     """
     e = vector(line, 0)
     for k in range(2):
-        a = vector(part, end + (NORMAL if k == 0 else ACROSS))
+        a = vector(part, end + (END_NUMBERS.NORMAL if k == 0 else END_NUMBERS.ACROSS))
         shift = times(
-            (-1.0 if end == GROUND_START else 1.0) / line[3], add_scaled(a, -dot(e, a), e)
+            (-1.0 if end == OBSTACLE_WORK.GROUND_START else 1.0) / line[3],
+            add_scaled(a, -dot(e, a), e),
         )
         differentiate_end(other, far, shift, (0.0, 0.0, 0.0), at(rows, k * size))
 
@@ -549,16 +629,16 @@ def jacobi_fields(part: Floats, end: int) -> tuple[float, float, float, float]:
 
     Args:
         part: record of the obstacle.
-        end: GROUND_START or GROUND_END.
+        end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
 
     Returns:
         A, R, A', R'.
     """
-    if end == GROUND_START:
+    if end == OBSTACLE_WORK.GROUND_START:
         # At the start: a displacement is kept, and a rotation displaces nothing yet.
         return 1.0, 0.0, 0.0, 1.0
-    g = at(part, GEODESIC)
-    return g[A], g[R], g[A_RATE], g[R_RATE]
+    g = at(part, OBSTACLE_WORK.CURVE)
+    return g[GEODESIC.A], g[GEODESIC.R], g[GEODESIC.A_RATE], g[GEODESIC.R_RATE]
 
 
 def differentiate_end(part: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> None:
@@ -566,24 +646,30 @@ def differentiate_end(part: Floats, end: int, shift: Vector, turn: Vector, row: 
 
     Args:
         part: record of the obstacle.
-        end: GROUND_START or GROUND_END.
+        end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         shift: derivative of the function by the position of the end.
         turn: derivative of the function by the rotation of its frame.
         row: filled (4,).
     """
     a, r, a_rate, r_rate = jacobi_fields(part, end)
     frame = at(part, end)
-    t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
+    t, n, b = (
+        vector(frame, END_NUMBERS.ALONG),
+        vector(frame, END_NUMBERS.NORMAL),
+        vector(frame, END_NUMBERS.ACROSS),
+    )
     # The Darboux frame along the geodesic: moving forwards rotates it by torsion about t and by
     # normal curvature about b.
     tt, nt, bt = dot(t, turn), dot(n, turn), dot(b, turn)
-    forwards = dot(t, shift) + frame[TORSION] * tt + frame[ALONG_BENDS] * bt
-    sideways = dot(b, shift) - frame[ACROSS_BENDS] * tt - frame[TORSION] * bt
+    forwards = dot(t, shift) + frame[END_NUMBERS.TORSION] * tt + frame[END_NUMBERS.ALONG_BENDS] * bt
+    sideways = (
+        dot(b, shift) - frame[END_NUMBERS.ACROSS_BENDS] * tt - frame[END_NUMBERS.TORSION] * bt
+    )
     row[0] = forwards
     row[1] = a * sideways - a_rate * nt
     row[2] = r * sideways - r_rate * nt
     # A longer geodesic moves its last end forwards only.
-    row[3] = forwards if end == GROUND_END else 0.0
+    row[3] = forwards if end == OBSTACLE_WORK.GROUND_END else 0.0
 
 
 def largest_turn(part: Floats, corrections: Floats) -> float:
@@ -596,12 +682,20 @@ def largest_turn(part: Floats, corrections: Floats) -> float:
         corrections: corrections of the four variations.
     """
     most = 0.0
-    for end in (GROUND_START, GROUND_END):
+    for end in (OBSTACLE_WORK.GROUND_START, OBSTACLE_WORK.GROUND_END):
         a, r, a_rate, r_rate = jacobi_fields(part, end)
         frame = at(part, end)
-        t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
-        forwards = add_scaled(times(frame[TORSION], t), frame[ALONG_BENDS], b)
-        sideways = add_scaled(times(-frame[ACROSS_BENDS], t), -frame[TORSION], b)
+        t, n, b = (
+            vector(frame, END_NUMBERS.ALONG),
+            vector(frame, END_NUMBERS.NORMAL),
+            vector(frame, END_NUMBERS.ACROSS),
+        )
+        forwards = add_scaled(
+            times(frame[END_NUMBERS.TORSION], t), frame[END_NUMBERS.ALONG_BENDS], b
+        )
+        sideways = add_scaled(
+            times(-frame[END_NUMBERS.ACROSS_BENDS], t), -frame[END_NUMBERS.TORSION], b
+        )
         most = max(most, corrections[0] * largest_component(forwards))
         most = max(
             most, corrections[1] * largest_component(add_scaled(times(a, sideways), -a_rate, n))
@@ -609,7 +703,7 @@ def largest_turn(part: Floats, corrections: Floats) -> float:
         most = max(
             most, corrections[2] * largest_component(add_scaled(times(r, sideways), -r_rate, n))
         )
-        if end == GROUND_END:
+        if end == OBSTACLE_WORK.GROUND_END:
             most = max(most, corrections[3] * largest_component(forwards))
     return most
 
@@ -636,16 +730,20 @@ def shoot_again(
         Whether the new geodesic exists.
     """
     forwards, sideways, turn = step * corrections[0], step * corrections[1], step * corrections[2]
-    length = geodesic[ARC] + step * corrections[3]
+    length = geodesic[GEODESIC.ARC] + step * corrections[3]
     # A geodesic that would become shorter than zero shrinks to a point in its middle.
     if length < 0.0:
         forwards += 0.5 * length
         length = 0.0
-    start = at(geodesic, START)
-    t, n, b = vector(start, ALONG), vector(start, NORMAL), vector(start, ACROSS)
-    point = add_scaled(add_scaled(vector(start, POINT), forwards, t), sideways, b)
+    start = at(geodesic, GEODESIC.START)
+    t, n, b = (
+        vector(start, END_NUMBERS.ALONG),
+        vector(start, END_NUMBERS.NORMAL),
+        vector(start, END_NUMBERS.ACROSS),
+    )
+    point = add_scaled(add_scaled(vector(start, END_NUMBERS.POINT), forwards, t), sideways, b)
     # The tangent turns with the surface as the start moves, and by the correction of the direction.
-    tilt = start[ALONG_BENDS] * forwards - start[TORSION] * sideways
+    tilt = start[END_NUMBERS.ALONG_BENDS] * forwards - start[END_NUMBERS.TORSION] * sideways
     turning = add_scaled(times(tilt, b), -turn, n)
     return shoot_geodesic(surface, point, plus(t, cross(turning, t)), length, geodesic, work)
 
@@ -666,20 +764,24 @@ def lengthening_speed(
         record: record of the cable.
     """
     total = 0.0
-    here = vector(record, elements[KEPT])
-    moves = velocity(model, data, elements[LINK], here)
+    here = vector(record, elements[ELEMENT.KEPT])
+    moves = velocity(model, data, elements[ELEMENT.LINK], here)
     for k in range(1, count):
-        element = at(elements, ELEMENT_INTS * k)
-        part = at(record, element[KEPT])
-        if element[IS_OBSTACLE] == 0 or part[STATE] == TOUCHES:
-            place = 0 if element[IS_OBSTACLE] == 0 else GROUND_START + POINT
+        element = at(elements, ELEMENT.SIZE * k)
+        part = at(record, element[ELEMENT.KEPT])
+        if element[ELEMENT.IS_OBSTACLE] == 0 or part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            place = (
+                0
+                if element[ELEMENT.IS_OBSTACLE] == 0
+                else OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT
+            )
             ahead = vector(part, place)
-            ahead_moves = velocity(model, data, element[LINK], ahead)
+            ahead_moves = velocity(model, data, element[ELEMENT.LINK], ahead)
             total += dot(unit(minus(ahead, here)), minus(ahead_moves, moves))
             here, moves = ahead, ahead_moves
-            if element[IS_OBSTACLE] != 0:
-                here = vector(part, GROUND_END + POINT)
-                moves = velocity(model, data, element[LINK], here)
+            if element[ELEMENT.IS_OBSTACLE] != 0:
+                here = vector(part, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
+                moves = velocity(model, data, element[ELEMENT.LINK], here)
     return total
 
 
@@ -700,24 +802,42 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         `OUTCOME.OK`.
     """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
-    result, elements = at(data, i[ITEM.RECORD]), at(i, ELEMENTS)
-    tension, last = result[TENSION], i[COUNT] - 1
+    result, elements = at(data, i[ITEM.RECORD]), at(i, CABLE.ELEMENTS)
+    tension, last = result[PATH_WORK.TENSION], i[CABLE.COUNT] - 1
     if tension < 0.0:
         return OUTCOME.OK
     for k in range(last + 1):
-        element = at(elements, ELEMENT_INTS * k)
-        numbers, part, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
-        if element[IS_OBSTACLE] == 0:
+        element = at(elements, ELEMENT.SIZE * k)
+        numbers, part, link = (
+            at(p, element[ELEMENT.AT]),
+            at(result, element[ELEMENT.KEPT]),
+            element[ELEMENT.LINK],
+        )
+        if element[ELEMENT.IS_OBSTACLE] == 0:
             # The station at which the cable pulls may differ from the point that it passes.
-            place = station(model, data, link, vector(numbers, PULLED))
+            place = station(model, data, link, vector(numbers, CABLE_POINT.PULLED))
             if k > 0:
-                apply_force(model, data, link, place, times(-tension, vector(part, BEFORE)))
+                apply_force(
+                    model, data, link, place, times(-tension, vector(part, CABLE_POINT_WORK.BEFORE))
+                )
             if k < last:
-                apply_force(model, data, link, place, times(tension, vector(part, AFTER)))
-        elif part[STATE] == TOUCHES:
-            start, end = at(part, GROUND_START), at(part, GROUND_END)
+                apply_force(
+                    model, data, link, place, times(tension, vector(part, CABLE_POINT_WORK.AFTER))
+                )
+        elif part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            start, end = at(part, OBSTACLE_WORK.GROUND_START), at(part, OBSTACLE_WORK.GROUND_END)
             apply_force(
-                model, data, link, vector(start, POINT), times(-tension, vector(start, ALONG))
+                model,
+                data,
+                link,
+                vector(start, END_NUMBERS.POINT),
+                times(-tension, vector(start, END_NUMBERS.ALONG)),
             )
-            apply_force(model, data, link, vector(end, POINT), times(tension, vector(end, ALONG)))
+            apply_force(
+                model,
+                data,
+                link,
+                vector(end, END_NUMBERS.POINT),
+                times(tension, vector(end, END_NUMBERS.ALONG)),
+            )
     return OUTCOME.OK

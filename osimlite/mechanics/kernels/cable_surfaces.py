@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
+from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.vectors import (
     EPSILON,
@@ -29,64 +30,82 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-SPHERE = 0.0
-"""Kind of surface: a sphere."""
-CYLINDER = 1.0
-"""Kind of surface: a cylinder about z."""
-ELLIPSOID = 2.0
-"""Kind of surface: an ellipsoid."""
-TORUS = 3.0
-"""Kind of surface: a torus about z."""
-PLANE = 4.0
-"""Kind of surface: the boundary x = 0 of a half-space that is solid where x is positive."""
-KIND = 0
-"""Index in the numbers of a surface of its kind."""
-RADIUS = 1
-"""Index of its radius, or of the radius of the ring of a torus (m)."""
-SQUARE = 2
-"""Index of the square s of a quadric: the surface is where s equals the weighted sum of squares."""
-WEIGHTS = 3
-"""Offset of the weights of the squared coordinates."""
-TUBE = 2
-"""Index of the radius of the tube of a torus (m)."""
-SURFACE_NUMBERS = 6
-"""Length of the numbers of a surface."""
 
-POINT = 0
-"""Offset in an end of a geodesic of its position (m)."""
-ALONG = 3
-"""Offset of the unit tangent of the geodesic."""
-NORMAL = 6
-"""Offset of the outward unit normal of the surface."""
-ACROSS = 9
-"""Offset of the unit binormal."""
-ALONG_BENDS = 12
-"""Index of the normal curvature along the geodesic (1/m)."""
-ACROSS_BENDS = 13
-"""Index of the normal curvature across it (1/m)."""
-TORSION = 14
-"""Index of the geodesic torsion (1/m)."""
-END_NUMBERS = 15
-"""Length of an end of a geodesic."""
+class SURFACE_TYPE(metaclass=Record):
+    """Types of surfaces."""
 
-START = 0
-"""Offset in a geodesic of its first end."""
-END = 15
-"""Offset of its last end."""
-A = 30
-"""Index of the Jacobi field of lateral displacement at the last end."""
-R = 31
-"""Index of the Jacobi field of rotation at the last end (m)."""
-A_RATE = 32
-"""Index of the derivative of A by the arc length (1/m)."""
-R_RATE = 33
-"""Index of the derivative of R by the arc length."""
-ARC = 34
-"""Index of the length of the geodesic (m)."""
-STEP = 35
-"""Index of the first step of the integration (m); 0 to integrate by extrapolation to rounding."""
-GEODESIC_NUMBERS = 36
-"""Length of a geodesic."""
+    SPHERE = 0.0
+    """A sphere."""
+    CYLINDER = 1.0
+    """A cylinder about z."""
+    ELLIPSOID = 2.0
+    """An ellipsoid."""
+    TORUS = 3.0
+    """A torus about z."""
+    PLANE = 4.0
+    """The boundary x = 0 of a half-space that is solid where x is positive."""
+
+
+class SURFACE(metaclass=Record):
+    """Numbers of a surface."""
+
+    KIND = 0
+    """Kind."""
+    RADIUS = 1
+    """Radius, or radius of the ring of a torus (m)."""
+    SQUARE = 2
+    """Square s of a quadric: the surface is where s equals the weighted sum of squares."""
+    WEIGHTS = 3
+    """Weights of the squared coordinates."""
+    TUBE = 2
+    """Radius of the tube of a torus (m)."""
+    SIZE = 6
+    """Length of the numbers of a surface."""
+
+
+class END_NUMBERS(metaclass=Record):
+    """Numbers of an end of a geodesic."""
+
+    POINT = 0
+    """Position (m)."""
+    ALONG = 3
+    """Unit tangent of the geodesic."""
+    NORMAL = 6
+    """Outward unit normal of the surface."""
+    ACROSS = 9
+    """Unit binormal."""
+    ALONG_BENDS = 12
+    """Normal curvature along the geodesic (1/m)."""
+    ACROSS_BENDS = 13
+    """Normal curvature across it (1/m)."""
+    TORSION = 14
+    """Geodesic torsion (1/m)."""
+    SIZE = 15
+    """Length of an end of a geodesic."""
+
+
+class GEODESIC(metaclass=Record):
+    """Numbers of a geodesic."""
+
+    START = 0
+    """First end."""
+    END = 15
+    """Last end."""
+    A = 30
+    """Jacobi field of lateral displacement at the last end."""
+    R = 31
+    """Jacobi field of rotation at the last end (m)."""
+    A_RATE = 32
+    """Derivative of A by the arc length (1/m)."""
+    R_RATE = 33
+    """Derivative of R by the arc length."""
+    ARC = 34
+    """Length of the geodesic (m)."""
+    STEP = 35
+    """First step of the integration (m); 0 to integrate by extrapolation to rounding."""
+    SIZE = 36
+    """Length of a geodesic."""
+
 
 SIZE = 10
 """Length of the state that is integrated along a geodesic: position, R, A, and their derivatives."""
@@ -133,11 +152,11 @@ def surface_value(p: Floats, a: Vector) -> float:
         a: point in the frame of the surface (m).
     """
     x, y, z = a
-    result = p[SQUARE] - dot(multiply_elementwise(vector(p, WEIGHTS), a), a)
-    if p[KIND] == TORUS:
-        across = p[RADIUS] - sqrt(x * x + y * y)
-        result = 1.0 - (across * across + z * z) / (p[TUBE] * p[TUBE])
-    if p[KIND] == PLANE:
+    result = p[SURFACE.SQUARE] - dot(multiply_elementwise(vector(p, SURFACE.WEIGHTS), a), a)
+    if p[SURFACE.KIND] == SURFACE_TYPE.TORUS:
+        across = p[SURFACE.RADIUS] - sqrt(x * x + y * y)
+        result = 1.0 - (across * across + z * z) / (p[SURFACE.TUBE] * p[SURFACE.TUBE])
+    if p[SURFACE.KIND] == SURFACE_TYPE.PLANE:
         result = x
     return float(result)
 
@@ -149,14 +168,14 @@ def surface_gradient(p: Floats, a: Vector) -> Vector:
         p: numbers of the surface.
         a: point in the frame of the surface (m), not on the axis of a torus.
     """
-    if p[KIND] == TORUS:
+    if p[SURFACE.KIND] == SURFACE_TYPE.TORUS:
         x, y, z = a
-        scale, distance = -2.0 / (p[TUBE] * p[TUBE]), sqrt(x * x + y * y)
-        inwards = 1.0 - p[RADIUS] / distance
+        scale, distance = -2.0 / (p[SURFACE.TUBE] * p[SURFACE.TUBE]), sqrt(x * x + y * y)
+        inwards = 1.0 - p[SURFACE.RADIUS] / distance
         return scale * inwards * x, scale * inwards * y, scale * z
-    if p[KIND] == PLANE:
+    if p[SURFACE.KIND] == SURFACE_TYPE.PLANE:
         return 1.0, 0.0, 0.0
-    return times(-2.0, multiply_elementwise(vector(p, WEIGHTS), a))
+    return times(-2.0, multiply_elementwise(vector(p, SURFACE.WEIGHTS), a))
 
 
 def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
@@ -169,17 +188,17 @@ def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
     Returns:
         Four entries.
     """
-    if p[KIND] == TORUS:
+    if p[SURFACE.KIND] == SURFACE_TYPE.TORUS:
         x, y, _ = a
-        scale, square = -2.0 / (p[TUBE] * p[TUBE]), x * x + y * y
-        ring = p[RADIUS] / (square * sqrt(square))
+        scale, square = -2.0 / (p[SURFACE.TUBE] * p[SURFACE.TUBE]), x * x + y * y
+        ring = p[SURFACE.RADIUS] / (square * sqrt(square))
         return (
             scale * (1.0 - ring * y * y),
             scale * (1.0 - ring * x * x),
             scale,
             scale * ring * x * y,
         )
-    xx, yy, zz = times(-2.0, vector(p, WEIGHTS))
+    xx, yy, zz = times(-2.0, vector(p, SURFACE.WEIGHTS))
     return xx, yy, zz, 0.0
 
 
@@ -248,10 +267,10 @@ def shoot_geodesic(
     Returns:
         Whether the geodesic exists.
     """
-    geodesic[ARC] = length
+    geodesic[GEODESIC.ARC] = length
     # On a sphere geodesics are great circles, with A = cos(s / r) and R = r sin(s / r).
-    if p[KIND] == SPHERE:
-        radius = p[RADIUS]
+    if p[SURFACE.KIND] == SURFACE_TYPE.SPHERE:
+        radius = p[SURFACE.RADIUS]
         normal = unit(point)
         tangent = cross(normal, unit(cross(direction, normal)))
         c, s = cos(length / radius), sin(length / radius)
@@ -259,26 +278,36 @@ def shoot_geodesic(
             add_scaled(times(c, normal), s, tangent),
             add_scaled(times(c, tangent), -s, normal),
         )
-        store_end(p, times(radius, normal), tangent, at(geodesic, START))
-        store_end(p, times(radius, end), end_tangent, at(geodesic, END))
-        geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = c, -s / radius, s * radius, c
+        store_end(p, times(radius, normal), tangent, at(geodesic, GEODESIC.START))
+        store_end(p, times(radius, end), end_tangent, at(geodesic, GEODESIC.END))
+        (
+            geodesic[GEODESIC.A],
+            geodesic[GEODESIC.A_RATE],
+            geodesic[GEODESIC.R],
+            geodesic[GEODESIC.R_RATE],
+        ) = c, -s / radius, s * radius, c
         return True
     # On a cylinder geodesics are helices; the surface is flat, so that A = 1 and R = s.
-    if p[KIND] == CYLINDER:
-        radius = p[RADIUS]
+    if p[SURFACE.KIND] == SURFACE_TYPE.CYLINDER:
+        radius = p[SURFACE.RADIUS]
         x, y, height = point
         nx, ny, _ = normal = unit((x, y, 0.0))
         tx, ty, tz = tangent = cross(normal, unit(cross(direction, normal)))
         _, _, turn = cross(normal, tangent)
         c, s = cos(length / radius * turn), sin(length / radius * turn)
-        store_end(p, (radius * nx, radius * ny, height), tangent, at(geodesic, START))
+        store_end(p, (radius * nx, radius * ny, height), tangent, at(geodesic, GEODESIC.START))
         end = radius * (c * nx - s * ny), radius * (s * nx + c * ny), height + length * tz
-        store_end(p, end, (c * tx - s * ty, s * tx + c * ty, tz), at(geodesic, END))
-        geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = 1.0, 0.0, length, 1.0
+        store_end(p, end, (c * tx - s * ty, s * tx + c * ty, tz), at(geodesic, GEODESIC.END))
+        (
+            geodesic[GEODESIC.A],
+            geodesic[GEODESIC.A_RATE],
+            geodesic[GEODESIC.R],
+            geodesic[GEODESIC.R_RATE],
+        ) = 1.0, 0.0, length, 1.0
         return True
-    # STEP is 0 for wrap objects, whose moment arms need exact lengths; Simbody's steps serve
+    # The step is 0 for wrap objects, whose moment arms need exact lengths; Simbody's steps serve
     # cables.
-    if geodesic[STEP] == 0.0:
+    if geodesic[GEODESIC.STEP] == 0.0:
         return integrate_by_extrapolation(p, point, direction, length, geodesic, work)
     return integrate_by_merson(p, point, direction, length, geodesic, work)
 
@@ -297,14 +326,14 @@ def store_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
     normal = times(-1.0, unit(g))
     across = unit(cross(direction, normal))
     tangent = cross(normal, across)
-    store_vector(end, POINT, point)
-    store_vector(end, ALONG, tangent)
-    store_vector(end, NORMAL, normal)
-    store_vector(end, ACROSS, across)
+    store_vector(end, END_NUMBERS.POINT, point)
+    store_vector(end, END_NUMBERS.ALONG, tangent)
+    store_vector(end, END_NUMBERS.NORMAL, normal)
+    store_vector(end, END_NUMBERS.ACROSS, across)
     bent = hessian_times(p, point, tangent)
-    end[ALONG_BENDS] = dot(tangent, bent) / norm(g)
-    end[ACROSS_BENDS] = dot(across, hessian_times(p, point, across)) / norm(g)
-    end[TORSION] = -dot(bent, cross(g, tangent)) / dot(g, g)
+    end[END_NUMBERS.ALONG_BENDS] = dot(tangent, bent) / norm(g)
+    end[END_NUMBERS.ACROSS_BENDS] = dot(across, hessian_times(p, point, across)) / norm(g)
+    end[END_NUMBERS.TORSION] = -dot(bent, cross(g, tangent)) / dot(g, g)
 
 
 def integrate_by_merson(
@@ -330,8 +359,8 @@ def integrate_by_merson(
     if not project_to_surface(p, y, 0.1 * CONSTRAINT):
         return False
     geodesic_derivative(p, y, rates)
-    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
-    t, step, first, second, taken = 0.0, geodesic[STEP], 0.0, 0.0, 0
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.START))
+    t, step, first, second, taken = 0.0, geodesic[GEODESIC.STEP], 0.0, 0.0, 0
     while t != length:
         next_t = t + step
         # Stretch the last step rather than add a tiny one.
@@ -366,11 +395,18 @@ def integrate_by_merson(
             longer = MOST * h if error == 0.0 else SAFETY * h * sqrt(sqrt(ACCURACY / error))
             step = min(longer if longer >= MORE * h else h, MOST * h)
         t = next_t
-    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
-    geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.END))
+    (
+        geodesic[GEODESIC.R],
+        geodesic[GEODESIC.A],
+        geodesic[GEODESIC.R_RATE],
+        geodesic[GEODESIC.A_RATE],
+    ) = y[3], y[4], y[8], y[9]
     # As in Simbody, the next geodesic begins with the size of the first or second step of this one.
     if taken >= 2:
-        geodesic[STEP] = first if first < geodesic[STEP] else max(geodesic[STEP], second)
+        geodesic[GEODESIC.STEP] = (
+            first if first < geodesic[GEODESIC.STEP] else max(geodesic[GEODESIC.STEP], second)
+        )
     return True
 
 
@@ -396,7 +432,7 @@ def integrate_by_extrapolation(
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
     if not project_to_surface(p, y, ROUNDED):
         return False
-    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.START))
     left = step = length
     while left > 0.0:
         step = min(step, left)
@@ -408,8 +444,13 @@ def integrate_by_extrapolation(
         left -= step
         if not project_to_surface(p, y, ROUNDED):
             return False
-    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
-    geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.END))
+    (
+        geodesic[GEODESIC.R],
+        geodesic[GEODESIC.A],
+        geodesic[GEODESIC.R_RATE],
+        geodesic[GEODESIC.A_RATE],
+    ) = y[3], y[4], y[8], y[9]
     return True
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.dual_numbers import settled
 from osimlite.mechanics.laws.vectors import Vector, add_scaled, component, minus, norm, plus, unit
@@ -23,16 +24,21 @@ SAMPLES = 300
 """Number of intervals of the chord; the fan has a blade at each inner point but the last."""
 LANES = 16
 """Number of blades that are computed together, so that compilers use vector instructions."""
-PART = 0
-"""Offset in the workspace of the positions of the blades on the chord."""
-X = LANES
-"""Offset of a a u u, then of the x component of the direction."""
-Y = 2 * LANES
-"""Offset of b b v v, then of the y component of the direction."""
-Z = 3 * LANES
-"""Offset of c c w w, then of the z component of the direction."""
-MULTIPLIER = 4 * LANES
-"""Offset of the multipliers t."""
+
+
+class BLADES(metaclass=Record):
+    """Workspace of the fan: LANES numbers of each kind."""
+
+    PART = 0
+    """Positions of the blades on the chord."""
+    X = LANES
+    """Numbers a a u u, then the x component of the direction."""
+    Y = 2 * LANES
+    """Numbers b b v v, then the y component of the direction."""
+    Z = 3 * LANES
+    """Numbers c c w w, then the z component of the direction."""
+    MULTIPLIER = 4 * LANES
+    """Multipliers t."""
 
 
 def closest_point(radii: Vector, point: Vector) -> Vector:
@@ -179,26 +185,31 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
             aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
             # The first step is that from t = 0, since the points of the chord are inside.
             value, slope = evaluate_polynomial(aa, bb, cc, aauu, bbvv, ccww)
-            work[PART + k], work[MULTIPLIER + k] = (
+            work[BLADES.PART + k], work[BLADES.MULTIPLIER + k] = (
                 part,
                 -value / slope if abs(value) >= SMALL else 0.0,
             )
-            work[X + k], work[Y + k], work[Z + k] = aauu, bbvv, ccww
+            work[BLADES.X + k], work[BLADES.Y + k], work[BLADES.Z + k] = aauu, bbvv, ccww
         for _ in range(STEPS):
             going = 0
             for k in range(LANES):
-                t = work[MULTIPLIER + k]
+                t = work[BLADES.MULTIPLIER + k]
                 value, slope = evaluate_polynomial(
-                    t + aa, t + bb, t + cc, work[X + k], work[Y + k], work[Z + k]
+                    t + aa,
+                    t + bb,
+                    t + cc,
+                    work[BLADES.X + k],
+                    work[BLADES.Y + k],
+                    work[BLADES.Z + k],
                 )
                 if abs(value) >= SMALL:
                     t -= value / slope
                     going += 1
-                work[MULTIPLIER + k] = t
+                work[BLADES.MULTIPLIER + k] = t
             if going == 0:
                 break
         for k in range(LANES):
-            part, t = work[PART + k], work[MULTIPLIER + k]
+            part, t = work[BLADES.PART + k], work[BLADES.MULTIPLIER + k]
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             P, Q, R = t + aa, t + bb, t + cc
             # Direction from the point to the closest one, times (t + aa)(t + bb)(t + cc): -t u / (t
@@ -206,10 +217,14 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
             x, y, z = -t * u * (Q * R), -t * v * (P * R), -t * w * (P * Q)
             size = sqrt(x * x + y * y + z * z)
             inverse = 1.0 / size if size > 0.0 else 0.0
-            work[X + k], work[Y + k], work[Z + k] = inverse * x, inverse * y, inverse * z
+            work[BLADES.X + k], work[BLADES.Y + k], work[BLADES.Z + k] = (
+                inverse * x,
+                inverse * y,
+                inverse * z,
+            )
         for k in range(min(LANES, SAMPLES - 1 - first)):
-            point = add_scaled(start, work[PART + k], chord)
-            blade = work[X + k], work[Y + k], work[Z + k]
+            point = add_scaled(start, work[BLADES.PART + k], chord)
+            blade = work[BLADES.X + k], work[BLADES.Y + k], work[BLADES.Z + k]
             u, v, w = point
             # In a plane of symmetry the formula degenerates.
             if min(abs(u), abs(v), abs(w)) <= FLAT:

@@ -28,9 +28,7 @@ from osimlite.mechanics.kernels.layout import (
     CONSTRAINED,
     CONTACT_WORK,
     DOF,
-    GRAVITY_AT,
     INERTIA,
-    INERTIA_AT,
     ITEM,
     LINK,
     LINK_WORK,
@@ -39,9 +37,11 @@ from osimlite.mechanics.kernels.layout import (
     OPERATION,
     OPERATION_WORK,
     OUTCOME,
+    REALS,
     RESPONSE,
     STAGE,
     WORK,
+    Record,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import (
@@ -72,36 +72,56 @@ WIDTH = 2 + MOST_STATES
 
 The first row is that of the force; the others are those of the rates of the states.
 """
-INVERSE = (1 + MOST_STATES) * WIDTH
-"""Offset in the record of a force of the inverse of 1 - c J of its states, after the derivatives."""
-GAINS = INVERSE + MOST_STATES * MOST_STATES
-"""Offset of the change of the states per unit of speed."""
-PULLS = GAINS + MOST_STATES
-"""Offset of the change of the force per unit of the states' right sides."""
-RIGHT = GAINS + 2 * MOST_STATES
-"""Offset of the right sides of the states."""
-FIRST = GAINS + 3 * MOST_STATES
-"""Index of the first degree of freedom that the force acts on."""
-END = GAINS + 3 * MOST_STATES + 1
-"""Index of the end of these degrees of freedom."""
-RESPONSE_WORK = GAINS + 3 * MOST_STATES + 2
-"""Length of the record of a force, without the generalized force per newton (n,) before it."""
-SYSTEM = 1
-"""Number in the workspace of the condensed matrix (n, n); number 0 is the mass matrix."""
-STIFFNESS = 2
-"""Number of the derivatives of generalized forces by coordinates, at constant states."""
-DAMPING = 3
-"""Number of the derivatives of generalized forces by speeds, at constant states."""
-LEVERS = 4
-"""Number of the derivatives of generalized forces by coordinates, with condensed states."""
-RIGHT_AT = 5
-"""Number of matrices, after which a right side (n,) follows."""
+
+
+class RESPONSE_WORK(metaclass=Record):
+    """Record of a force, which begins with its derivatives."""
+
+    INVERSE = (1 + MOST_STATES) * WIDTH
+    """Inverse of 1 - c J of its states, after the derivatives."""
+    GAINS = INVERSE + MOST_STATES * MOST_STATES
+    """Change of the states per unit of speed."""
+    PULLS = GAINS + MOST_STATES
+    """Change of the force per unit of the states' right sides."""
+    RIGHT = GAINS + 2 * MOST_STATES
+    """Right sides of the states."""
+    FIRST = GAINS + 3 * MOST_STATES
+    """First degree of freedom that the force acts on."""
+    END = GAINS + 3 * MOST_STATES + 1
+    """End of these degrees of freedom."""
+    SIZE = GAINS + 3 * MOST_STATES + 2
+    """Length of the record of a force, without the generalized force per newton (n,) before it."""
+
+
+class MATRIX(metaclass=Record):
+    """Numbers of the matrices (n, n) in the workspace."""
+
+    SYSTEM = 1
+    """Condensed matrix (n, n); number 0 is the mass matrix."""
+    STIFFNESS = 2
+    """Derivatives of generalized forces by coordinates, at constant states."""
+    DAMPING = 3
+    """Derivatives of generalized forces by speeds, at constant states."""
+    LEVERS = 4
+    """Derivatives of generalized forces by coordinates, with condensed states."""
+    COUNT = 5
+    """Number of matrices, after which a right side (n,) follows."""
+
 
 # In place of the inertia of a link, which has 10 numbers, and the first two of its wrench.
 LOAD = 12
 """Length of the load of a link: force (3,), and sum of products of positions and forces (3, 3)."""
-CENTER = 7
-"""Offset among the numbers of a contact of the centre of surface 2."""
+
+
+class CONTACT_NUMBERS(metaclass=Record):
+    """Numbers of a pair of contact surfaces."""
+
+    CENTER = 7
+    """Centre of surface 2."""
+    RADIUS = 10
+    """Radius of surface 2."""
+
+
 SLIGHT = 1e-12
 """Entries of a generalized force per newton below this are rounding errors."""
 
@@ -117,7 +137,7 @@ def condensation_size(size: int, responses: int) -> int:
         size: number of speeds.
         responses: number of forces.
     """
-    return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
+    return MATRIX.COUNT * size * size + size + responses * (size + RESPONSE_WORK.SIZE)
 
 
 def linearise_state(
@@ -156,7 +176,10 @@ def linearise_state(
     spatial_inertias_and_bias(model, reals, data)
     composite_rigid_body(model, data, right)
     fill_mass_matrix(model, data, work)
-    stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)
+    stiffness, damping = (
+        at(work, MATRIX.STIFFNESS * size * size),
+        at(work, MATRIX.DAMPING * size * size),
+    )
     for k in range(size * size):
         stiffness[k] = damping[k] = 0.0
     add_geometric_stiffness(model, reals, data, stiffness)
@@ -175,7 +198,7 @@ def linearise_state(
         if status != OUTCOME.OK:
             return status
         changes = response[RESPONSE.STATES] > 0
-        for k in range(INVERSE):
+        for k in range(RESPONSE_WORK.INVERSE):
             record[size + k] = data[WORK.SCRATCH + k]
             changes = changes or data[WORK.SCRATCH + k] != 0.0
         first, end = size, 0
@@ -186,7 +209,7 @@ def linearise_state(
             record[k] = right[k]
             if abs(right[k]) > SLIGHT:
                 first, end = min(first, k), k + 1
-        record[size + FIRST], record[size + END] = first, end
+        record[size + RESPONSE_WORK.FIRST], record[size + RESPONSE_WORK.END] = first, end
         if changes:
             sense, by_displacement, by_speed = (
                 response[RESPONSE.SENSE],
@@ -208,7 +231,7 @@ def linearise_state(
 def response_record(model: Ints, work: Floats, number: int) -> Floats:
     """Return the record of a force in the workspace.
 
-    It contains the generalized force per newton (n,), then RESPONSE_WORK numbers.
+    It contains the generalized force per newton (n,), then RESPONSE_WORK.SIZE numbers.
 
     Args:
         model: integers of the model.
@@ -216,7 +239,7 @@ def response_record(model: Ints, work: Floats, number: int) -> Floats:
         number: number of the force.
     """
     size = model[MODEL.DOFS]
-    return at(work, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
+    return at(work, MATRIX.COUNT * size * size + size + number * (size + RESPONSE_WORK.SIZE))
 
 
 def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
@@ -270,12 +293,12 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
     size = model[MODEL.DOFS]
     for link in range(model[MODEL.LINKS]):
         b, load = (
-            at(reals, INERTIA_AT + INERTIA.SIZE * link),
+            at(reals, REALS.INERTIA + INERTIA.SIZE * link),
             at(link_work(model, data, link), LINK_WORK.INERTIA),
         )
         for k in range(LOAD):
             load[k] = 0.0
-        weight = times(b[INERTIA.MASS], vector(reals, GRAVITY_AT))
+        weight = times(b[INERTIA.MASS], vector(reals, REALS.GRAVITY))
         add_load(
             model, data, link, station(model, data, link, vector(b, INERTIA.CENTER)), weight, ZERO
         )
@@ -287,7 +310,9 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
         # Contacts with ground only move one link; pairs of surfaces on ground have no degrees of
         # freedom.
         if contact[CONTACT_WORK.DEPTH] > 0.0 and max(one, two) >= 0:
-            center = station(model, data, two, vector(reals, i[ITEM.NUMBERS] + CENTER))
+            center = station(
+                model, data, two, vector(reals, i[ITEM.NUMBERS] + CONTACT_NUMBERS.CENTER)
+            )
             add_load(model, data, two, point, force, minus(center, point))
             add_load(model, data, one, point, times(-1.0, force), ZERO)
     # Inwards from the leaves: the load of a link contains those of its subtree.
@@ -395,8 +420,11 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
         Whether it is regular.
     """
     size = model[MODEL.DOFS]
-    system, levers = at(work, SYSTEM * size * size), at(work, LEVERS * size * size)
-    stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)
+    system, levers = at(work, MATRIX.SYSTEM * size * size), at(work, MATRIX.LEVERS * size * size)
+    stiffness, damping = (
+        at(work, MATRIX.STIFFNESS * size * size),
+        at(work, MATRIX.DAMPING * size * size),
+    )
     for k in range(size * size):
         # Coordinates follow the speeds as dq = c du, so that stiffness counts with c^2.
         system[k] = work[k] - c * (damping[k] + c * stiffness[k])
@@ -411,7 +439,12 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
         # Forces without states are complete in the stiffness and damping matrices.
         if count == 0:
             continue
-        inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
+        inverse, gains, pulls, driven = (
+            at(a, RESPONSE_WORK.INVERSE),
+            at(a, RESPONSE_WORK.GAINS),
+            at(a, RESPONSE_WORK.PULLS),
+            at(a, RESPONSE_WORK.RIGHT),
+        )
         for i in range(count):
             rates = at(a, WIDTH * (1 + i))
             # A negative index stands for a state that the model does not have; its row is that of
@@ -435,7 +468,11 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
             if states[i] >= 0:
                 by_speed += a[2 + i] * gains[i]
                 by_displacement += c * pulls[i] * a[WIDTH * (1 + i)]
-        first, end, sense = int(a[FIRST]), int(a[END]), response[RESPONSE.SENSE]
+        first, end, sense = (
+            int(a[RESPONSE_WORK.FIRST]),
+            int(a[RESPONSE_WORK.END]),
+            response[RESPONSE.SENSE],
+        )
         add_outer_product(
             size, -c * sense * by_speed, record, first, end, record, first, end, system
         )
@@ -524,10 +561,10 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
     size = model[MODEL.DOFS]
     du, system, right = (
         at(d, size),
-        at(work, SYSTEM * size * size),
-        at(work, RIGHT_AT * size * size),
+        at(work, MATRIX.SYSTEM * size * size),
+        at(work, MATRIX.COUNT * size * size),
     )
-    levers = at(work, LEVERS * size * size)
+    levers = at(work, MATRIX.LEVERS * size * size)
     # Multiply the right sides of speeds by the mass matrix, and add those of the eliminated
     # coordinates and states.
     for i in range(size):
@@ -546,9 +583,9 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
         )
         for k in range(response[RESPONSE.STATES]):
             if states[k] >= 0:
-                force += c * a[PULLS + k] * d[states[k]]
+                force += c * a[RESPONSE_WORK.PULLS + k] * d[states[k]]
         if force != 0.0:
-            for k in range(int(a[FIRST]), int(a[END])):
+            for k in range(int(a[RESPONSE_WORK.FIRST]), int(a[RESPONSE_WORK.END])):
                 right[k] += force * record[k]
     solve_factorised(size, system, right)
     # Back-substitution: the states follow from displacement and speed along each force.
@@ -561,17 +598,17 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
         states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
-        first, end = int(a[FIRST]), int(a[END])
+        first, end = int(a[RESPONSE_WORK.FIRST]), int(a[RESPONSE_WORK.END])
         displacement = response[RESPONSE.SENSE] * dot_range(first, end, record, d)
         speed = response[RESPONSE.SENSE] * dot_range(first, end, record, right)
         for i in range(count):
-            a[RIGHT + i] = (
+            a[RESPONSE_WORK.RIGHT + i] = (
                 d[states[i]] + c * a[WIDTH * (1 + i)] * displacement if states[i] >= 0 else 0.0
             )
         for i in range(count):
             if states[i] >= 0:
-                d[states[i]] = a[GAINS + i] * speed + dot_range(
-                    0, count, at(a, INVERSE + count * i), at(a, RIGHT)
+                d[states[i]] = a[RESPONSE_WORK.GAINS + i] * speed + dot_range(
+                    0, count, at(a, RESPONSE_WORK.INVERSE + count * i), at(a, RESPONSE_WORK.RIGHT)
                 )
     # Last of all the coordinates, whose right sides the states still needed.
     for k in range(size):

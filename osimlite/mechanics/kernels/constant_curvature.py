@@ -9,20 +9,24 @@ from __future__ import annotations
 
 from math import acos, cos, sin
 
-from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME
+from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 
-COMPONENT = 2
-"""Index in the table of the component of the end position."""
-LENGTH = 3
-"""Index in the table of the length of the rod (m)."""
-NEUTRAL = 4
-"""Offset in the table of the two angles where the arguments are zero (rad)."""
-TERMS = 6
-"""Index in the table of the number of terms of each series."""
-SERIES = 7
-"""Offset of the series by θ² of (sin θ) / θ and then of (1 - cos θ) / θ²."""
+
+class ROD(metaclass=Record):
+    """Table of a bent rod."""
+
+    COMPONENT = 2
+    """Component of the end position."""
+    LENGTH = 3
+    """Length of the rod (m)."""
+    NEUTRAL = 4
+    """Two angles where the arguments are zero (rad)."""
+    TERMS = 6
+    """Number of terms of each series."""
+    SERIES = 7
+    """Series by θ² of (sin θ) / θ and then of (1 - cos θ) / θ²."""
 
 
 def amount_by_arc(
@@ -51,8 +55,8 @@ def amount_by_arc(
         at(reals, j[OPERATION.EXTRA]),
     )
     table, u = at(p, 2), at(y, model[MODEL.DOFS])
-    a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
-    b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
+    a = (y[one] if one >= 0 else p[0]) + table[ROD.NEUTRAL]
+    b = (y[two] if two >= 0 else p[1]) + table[ROD.NEUTRAL + 1]
     ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
     value, da, db, daa, dab, dbb = evaluate_arc(table, a, b)
     data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
@@ -78,7 +82,7 @@ def evaluate_arc(
     sa, ca, sb, cb = sin(a), cos(a), sin(b), cos(b)
     # Cosine of the total angle, with its derivatives by both angles.
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
-    component = int(table[COMPONENT])
+    component = int(table[ROD.COMPONENT])
     # Along the rod the factor is sin(theta) / theta; across it, the sine of the direction is taken
     # out, so that a factor (1 - cos(theta)) / (theta sin(theta)) remains.
     share, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
@@ -95,7 +99,7 @@ def evaluate_arc(
         v, vb, vbb = -sb, -cb, sb
     elif component == 2:
         v, va, vb, vaa, vab, vbb = sa * cb, ca * cb, -sa * sb, -sa * cb, -ca * sb, -sa * cb
-    size = table[1] * table[LENGTH]
+    size = table[1] * table[ROD.LENGTH]
     da, db = size * (v * oa + share * va), size * (v * ob + share * vb)
     daa = size * (v * oaa + share * vaa + 2.0 * va * oa)
     dab = size * (v * oab + share * vab + va * ob + vb * oa)
@@ -114,7 +118,7 @@ def axial_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:
         Value, first and second derivative.
     """
     square = angle_squared(cosine)
-    h, h1, h2 = evaluate_series(at(table, SERIES), int(table[TERMS]), square)
+    h, h1, h2 = evaluate_series(at(table, ROD.SERIES), int(table[ROD.TERMS]), square)
     return differentiate_by_cosine(h, h1, h2, h, h1)
 
 
@@ -128,9 +132,9 @@ def transverse_ratio(table: Floats, cosine: float) -> tuple[float, float, float]
     Returns:
         Value, first and second derivative.
     """
-    square, count = angle_squared(cosine), int(table[TERMS])
-    h, h1, h2 = evaluate_series(at(table, SERIES), count, square)
-    m, m1, m2 = evaluate_series(at(table, SERIES + count), count, square)
+    square, count = angle_squared(cosine), int(table[ROD.TERMS])
+    h, h1, h2 = evaluate_series(at(table, ROD.SERIES), count, square)
+    m, m1, m2 = evaluate_series(at(table, ROD.SERIES + count), count, square)
     # Reciprocal of h with its derivatives, by which the series of (1 - cos) / theta^2 is
     # multiplied.
     k, k1 = 1.0 / h, -h1 / (h * h)

@@ -12,7 +12,11 @@ second derivative of g while udot = 0.
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.ball_joint import angle_acceleration_bias, angle_rate_row
-from osimlite.mechanics.kernels.functions import MONOMIALS, evaluate_function, evaluate_monomials
+from osimlite.mechanics.kernels.functions import (
+    FUNCTION_TYPE,
+    evaluate_function,
+    evaluate_monomials,
+)
 from osimlite.mechanics.kernels.layout import (
     CONSTRAINED,
     CONSTRAINT,
@@ -23,6 +27,7 @@ from osimlite.mechanics.kernels.layout import (
     MODEL,
     OUTCOME,
     WORK,
+    Record,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import (
@@ -48,18 +53,29 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-AXIS = 0
-"""Type of vector: an axis that is fixed in a link."""
-ARM = 1
-"""Type of vector: from a point of one link to a point of another."""
-MEETING = 2
-"""Type of vector: an arm whose rate is that of its end relative to the coincident point of link 1."""
-PRODUCT = 0
-"""Type of equation: the scalar product of two vectors has a given value."""
-DISTANCE = 1
-"""Type of equation: the second vector has a given length."""
-SLIP = 2
-"""Type of equation: a roller at the end of vector 2 does not slip along vector 1 on its start."""
+
+class VECTOR_TYPE(metaclass=Record):
+    """Types of vectors in equations."""
+
+    AXIS = 0
+    """An axis that is fixed in a link."""
+    ARM = 1
+    """From a point of one link to a point of another."""
+    MEETING = 2
+    """An arm whose rate is that of its end relative to the coincident point of link 1."""
+
+
+class EQUATION_TYPE(metaclass=Record):
+    """Types of equations."""
+
+    PRODUCT = 0
+    """The scalar product of two vectors has a given value."""
+    DISTANCE = 1
+    """The second vector has a given length."""
+    SLIP = 2
+    """A roller at the end of vector 2 does not slip along vector 1 on its start."""
+
+
 VECTOR_INTS = 3
 """Number of integers of a vector: type and two links, of which an axis uses the first."""
 EQUATION_INTS = 7
@@ -124,7 +140,7 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
     size, freedoms = own[COORDINATE.SIZE + 1], at(own, COORDINATE.SIZE + 2)
     others, gradient, constants = at(freedoms, size), at(data, own[COORDINATE.SIZE]), at(p, 1)
-    if int(constants[size]) >= MONOMIALS:
+    if int(constants[size]) >= FUNCTION_TYPE.MONOMIALS:
         # A function of one coordinate, or a constant.
         value, _, curvature = evaluate_monomials(size, freedoms, constants, y, f, gradient)
     else:
@@ -208,13 +224,13 @@ def bind_bodies(
         error = drift = 0.0
         # Second derivative of a scalar product: both vectors change, hence twice the product of
         # their rates.
-        if own[0] == PRODUCT:
+        if own[0] == EQUATION_TYPE.PRODUCT:
             error = dot(a, b) - wanted
             drift = dot(a, b_bias) + dot(b, a_bias) + 2.0 * dot(a_rate, b_rate)
             # The derivative of a . b is that of a along b, plus that of b along a.
             add_vector_row(model, data, one, p, b, to)
             add_vector_row(model, data, two, at(p, 6), a, to)
-        elif own[0] == DISTANCE:
+        elif own[0] == EQUATION_TYPE.DISTANCE:
             length = norm(b)
             error = length - wanted
             # At zero distance any direction of the rate is as good.
@@ -259,7 +275,7 @@ def differentiate_vector(
         Vector, rate and second derivative, along the axes of ground.
     """
     one, two = kind[1], kind[2]
-    if kind[0] == AXIS:
+    if kind[0] == VECTOR_TYPE.AXIS:
         axis, turning = (
             direction(model, data, one, vector(p, 0)),
             angular_velocity(model, data, one),
@@ -274,13 +290,13 @@ def differentiate_vector(
     arm = minus(end, start)
     # Both velocities at the same point of ground: what remains is the motion of the end relative to
     # link 1.
-    if kind[0] == MEETING:
+    if kind[0] == VECTOR_TYPE.MEETING:
         start = end
     rate = minus(velocity(model, data, two, end), velocity(model, data, one, start))
     bias = minus(
         acceleration(model, reals, data, two, end), acceleration(model, reals, data, one, start)
     )
-    if kind[0] == MEETING:
+    if kind[0] == VECTOR_TYPE.MEETING:
         # Subtract the Coriolis acceleration of the nearest common ancestor of both links.
         while one != two:
             if one > two:
@@ -306,13 +322,13 @@ def add_vector_row(
     """
     # An axis changes by w x a, whose component along `on` is w . (a x on): a torque.
     one, two = kind[1], kind[2]
-    if kind[0] == AXIS:
+    if kind[0] == VECTOR_TYPE.AXIS:
         add_wrench_row(
             model, data, one, cross(direction(model, data, one, vector(p, 0)), on), ZERO, row
         )
         return
     start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
-    if kind[0] == MEETING:
+    if kind[0] == VECTOR_TYPE.MEETING:
         start = end
     add_force_row(model, data, one, start, times(-1.0, on), row)
     add_force_row(model, data, two, end, on, row)

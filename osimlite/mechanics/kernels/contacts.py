@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.mechanics.kernels.condensation import CENTER, INVERSE
+from osimlite.mechanics.kernels.condensation import CONTACT_NUMBERS, RESPONSE_WORK
 from osimlite.mechanics.kernels.layout import (
     ITEM,
     LINK,
@@ -54,8 +54,6 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-RADIUS = 10
-"""Index among the numbers of a pair of the radius of surface 2."""
 SMOOTH = 9
 """Number of parameters of the law of smooth contact."""
 
@@ -168,7 +166,7 @@ def contact_response(
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
     pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
-    for k in range(INVERSE):
+    for k in range(RESPONSE_WORK.INVERSE):
         change[k] = 0.0
     d, radius, n, point = (
         measure_half_space(model, reals, data, pair)
@@ -183,7 +181,7 @@ def contact_response(
         )
         v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
         changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-        center = station(model, data, two, vector(p, CENTER))
+        center = station(model, data, two, vector(p, CONTACT_NUMBERS.CENTER))
         # The elastic force grows with d^(3/2), so that its relative derivative by the depth is 1.5
         # / d.
         write_response(
@@ -213,7 +211,7 @@ def smooth_contact_response(
         `OUTCOME.OK`.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
-    for k in range(INVERSE):
+    for k in range(RESPONSE_WORK.INVERSE):
         change[k] = 0.0
     contact = item + i[ITEM.OWN]
     p, g = at(reals, model[contact + ITEM.NUMBERS]), at(model, contact + ITEM.OWN)

@@ -14,32 +14,45 @@ from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, foot_position
 
-GAIT = 0
-"""Kind of criterion: steps of a gait."""
-JUMP = 1
-"""Kind of criterion: a jump."""
-NUMBER = 2
-"""Kind of criterion: excess of a number of the sensor row beyond a range."""
-LARGEST_LOAD = 3
-"""Kind of criterion: excess of the larger load of two legs beyond a range."""
-WHOLE_LOAD = 4
-"""Kind of criterion: excess of the total load of two legs beyond a range."""
-POWERS = 5
-"""Kind of criterion: sum of powers of activations; the kinds from here on are efforts."""
-TENSIONS = 6
-"""Kind of criterion: 1 plus the sum of tensions (N)."""
-WANG = 7
-"""Kind of criterion: metabolic power of Wang et al. (W)."""
+
+class CRITERION_TYPE(metaclass=Record):
+    """Types of criteria."""
+
+    GAIT = 0
+    """Steps of a gait."""
+    JUMP = 1
+    """A jump."""
+    NUMBER = 2
+    """Excess of a number of the sensor row beyond a range."""
+    LARGEST_LOAD = 3
+    """Excess of the larger load of two legs beyond a range."""
+    WHOLE_LOAD = 4
+    """Excess of the total load of two legs beyond a range."""
+    POWERS = 5
+    """Sum of powers of activations; the kinds from here on are efforts."""
+    TENSIONS = 6
+    """1 plus the sum of tensions (N)."""
+    WANG = 7
+    """Metabolic power of Wang et al. (W)."""
+
+
 QUARTER = 0.5 * pi
 """A right angle (rad)."""
-PREPARES = 0
-"""Phase of a jump before the mass centre rises."""
-TAKES_OFF = 1
-"""Phase of a jump on the ground, after the start of the rise."""
-FLIES = 2
-"""Phase of a jump without ground contact."""
-COMES_DOWN = 3
-"""Phase of a jump after its peak."""
+
+
+class JUMP_PHASE(metaclass=Record):
+    """Phases of a jump."""
+
+    PREPARES = 0
+    """Before the mass centre rises."""
+    TAKES_OFF = 1
+    """On the ground, after the start of the rise."""
+    FLIES = 2
+    """Without ground contact."""
+    COMES_DOWN = 3
+    """After its peak."""
+
+
 AT_REST = 1.51
 """Power of a body at rest, W/kg (J. M. Wang et al., ACM Trans. Graph. 31, 2012)."""
 
@@ -48,7 +61,7 @@ class CRITERION(metaclass=Record):
     """Integers of a criterion.
 
     Attributes:
-        KIND: kind, such as GAIT.
+        KIND: kind, such as CRITERION_TYPE.GAIT.
         PLACE: index in the sensor row, or a power.
         NUMBERS, ROOM: offsets of its numbers and its workspace.
     """
@@ -109,7 +122,7 @@ class JUMP_WORK(metaclass=Record):
         START, HERE, PEAK, PREPARED: height of the mass centre at the start, now, at the highest point,
             and at the start of take-off (m).
         ENDED: whether the jumper has sunk or come down.
-        DOES: phase, such as PREPARES.
+        DOES: phase, such as JUMP_PHASE.PREPARES.
     """
 
     START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)
@@ -127,17 +140,17 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
         noted, centre = at(room, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
-        if criterion[CRITERION.KIND] == GAIT:
+        if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
             noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = walked_distance(senses, row)
             noted[GAIT_WORK.HEIGHT] = row[centre + 1]
             noted[GAIT_WORK.FALLEN] = noted[GAIT_WORK.COUNT] = 0.0
             # Unknown contact, so that a foot that stands from the start does not count as one that
             # lands.
             noted[GAIT_WORK.TOUCHES] = noted[GAIT_WORK.TOUCHES + 1] = -1.0
-        elif criterion[CRITERION.KIND] == JUMP:
+        elif criterion[CRITERION.KIND] == CRITERION_TYPE.JUMP:
             for k in range(JUMP_WORK.ENDED):
                 noted[k] = row[centre + 1]
-            noted[JUMP_WORK.ENDED], noted[JUMP_WORK.DOES] = 0.0, PREPARES
+            noted[JUMP_WORK.ENDED], noted[JUMP_WORK.DOES] = 0.0, JUMP_PHASE.PREPARES
         else:
             for k in range(SAMPLE_WORK.SIZE):
                 noted[k] = 0.0
@@ -169,17 +182,17 @@ def update_criteria(
         # SCONE's measures see only what happens within their times.
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
-        if criterion[CRITERION.KIND] == GAIT:
+        if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
             note_gait(senses, numbers, t, row, noted)
             has_fallen = has_fallen or noted[GAIT_WORK.FALLEN] > 0.0
             continue
-        if criterion[CRITERION.KIND] == JUMP:
+        if criterion[CRITERION.KIND] == CRITERION_TYPE.JUMP:
             note_jump(senses, numbers, t, row, noted)
             has_fallen = has_fallen or noted[JUMP_WORK.ENDED] > 0.0
             continue
-        if criterion[CRITERION.KIND] == WANG:
+        if criterion[CRITERION.KIND] == CRITERION_TYPE.WANG:
             value = metabolic_power(senses, known, numbers, row, u)
-        elif criterion[CRITERION.KIND] >= POWERS:
+        elif criterion[CRITERION.KIND] >= CRITERION_TYPE.POWERS:
             value = muscle_effort(
                 senses, known, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], row
             )
@@ -289,14 +302,14 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
     noted[JUMP_WORK.HERE], noted[JUMP_WORK.PEAK] = height, max(noted[JUMP_WORK.PEAK], height)
     if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_WORK.START]:
         noted[JUMP_WORK.ENDED] = 1.0
-    elif does == PREPARES:
+    elif does == JUMP_PHASE.PREPARES:
         if t >= numbers[CRITERION_NUMBERS.PREPARE] and (rise > 0.0 or not has_load):
-            noted[JUMP_WORK.DOES], noted[JUMP_WORK.PREPARED] = TAKES_OFF, height
-    elif does == TAKES_OFF and not has_load:
-        noted[JUMP_WORK.DOES] = FLIES
-    elif does < COMES_DOWN and (rise < 0.0 or (does == FLIES and has_load)):
+            noted[JUMP_WORK.DOES], noted[JUMP_WORK.PREPARED] = JUMP_PHASE.TAKES_OFF, height
+    elif does == JUMP_PHASE.TAKES_OFF and not has_load:
+        noted[JUMP_WORK.DOES] = JUMP_PHASE.FLIES
+    elif does < JUMP_PHASE.COMES_DOWN and (rise < 0.0 or (does == JUMP_PHASE.FLIES and has_load)):
         noted[JUMP_WORK.DOES], noted[JUMP_WORK.ENDED] = (
-            COMES_DOWN,
+            JUMP_PHASE.COMES_DOWN,
             numbers[CRITERION_NUMBERS.AT_PEAK],
         )
 
@@ -308,15 +321,15 @@ def range_penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Flo
 
     Args:
         senses: plan of the sensor row.
-        kind: NUMBER, LARGEST_LOAD or WHOLE_LOAD.
+        kind: NUMBER, LARGEST_LOAD or WHOLE_LOAD of `CRITERION_TYPE`.
         place: index of the number in the row.
         numbers: numbers of the criterion.
         row: sensor row.
     """
     one, two = row[place], 0.0
-    if kind != NUMBER:
+    if kind != CRITERION_TYPE.NUMBER:
         one, two = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
-        one, two = (max(one, two), 0.0) if kind == LARGEST_LOAD else (one, two)
+        one, two = (max(one, two), 0.0) if kind == CRITERION_TYPE.LARGEST_LOAD else (one, two)
     value = numbers[CRITERION_NUMBERS.FACTOR] * (one + two)
     off = max(numbers[CRITERION_NUMBERS.LOW] - value, 0.0) + max(
         value - numbers[CRITERION_NUMBERS.HIGH], 0.0
@@ -332,15 +345,15 @@ def muscle_effort(senses: Ints, known: Floats, kind: int, power: int, row: Float
     Args:
         senses: plan of the sensor row.
         known: numbers of the sensor row.
-        kind: POWERS or TENSIONS.
+        kind: POWERS or TENSIONS of `CRITERION_TYPE`.
         power: exponent of the activations.
         row: sensor row.
     """
-    count, total = senses[SENSES.MUSCLES], 1.0 if kind == TENSIONS else 0.0
+    count, total = senses[SENSES.MUSCLES], 1.0 if kind == CRITERION_TYPE.TENSIONS else 0.0
     strengths = at(known, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
         each = 1.0
-        if kind == TENSIONS:
+        if kind == CRITERION_TYPE.TENSIONS:
             each = row[senses[SENSES.FORCES] + k] * strengths[k]
         else:
             # The exponent is an integer.

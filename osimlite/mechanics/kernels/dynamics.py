@@ -16,12 +16,12 @@ from osimlite.mechanics.kernels.layout import (
     DOF,
     EQUILIBRIUM,
     INERTIA,
-    INERTIA_AT,
     ITEM,
     LINK,
     LINK_WORK,
     MODEL,
     OUTCOME,
+    REALS,
     RUN,
     STAGE,
 )
@@ -208,7 +208,7 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         data: results with poses, velocities and accelerations; filled with inertias and wrenches.
     """
     for link in range(model[MODEL.LINKS]):
-        b, here = at(reals, INERTIA_AT + INERTIA.SIZE * link), link_work(model, data, link)
+        b, here = at(reals, REALS.INERTIA + INERTIA.SIZE * link), link_work(model, data, link)
         r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
         center = plus(
             minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)),

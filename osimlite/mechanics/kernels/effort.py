@@ -20,22 +20,33 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.mechanics.kernels.layout import OUTCOME
+from osimlite.mechanics.kernels.layout import OUTCOME, Record
 from osimlite.mechanics.kernels.linear_algebra import factorise_cholesky, solve_cholesky
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
-FRAMES = 0
-"""Index in `sizes` of the number of frames."""
-EQUATIONS = 1
-"""Index in `sizes` of the number m of equations."""
-UNKNOWNS = 2
-"""Index in `sizes` of the number n of unknowns."""
-ENTRIES = 3
-"""Offset in `sizes` of the sparsity of A (n, 1 + m): per column the count and rows of nonzeros."""
-POWER = 0
-"""Index in `numbers` of the exponent p."""
-BOUNDS = 1
-"""Offset in `numbers` of the bounds (2, n): all lower ones, then all upper ones."""
+
+class EFFORT_SIZES(metaclass=Record):
+    """Sizes of a problem."""
+
+    FRAMES = 0
+    """Number of frames."""
+    EQUATIONS = 1
+    """Number m of equations."""
+    UNKNOWNS = 2
+    """Number n of unknowns."""
+    ENTRIES = 3
+    """Sparsity of A (n, 1 + m): per column the count and rows of nonzeros."""
+
+
+class EFFORT_NUMBERS(metaclass=Record):
+    """Numbers of a problem."""
+
+    POWER = 0
+    """Exponent p."""
+    BOUNDS = 1
+    """Bounds (2, n): all lower ones, then all upper ones."""
+
+
 TIGHTEST = 1e-15
 """Relative residual of the regularized equations below which an iteration cannot improve it."""
 CLOSEST = 1e-13
@@ -84,8 +95,8 @@ def least_effort(
     """Distribute generalized forces over actuators with the least effort, frame by frame.
 
     Args:
-        sizes: numbers of frames, equations m and unknowns n, then the sparsity of A; see FRAMES.
-        numbers: exponent and bounds, see POWER.
+        sizes: see `EFFORT_SIZES`.
+        numbers: exponent and bounds, see `EFFORT_NUMBERS`.
         problems: per frame the columns of A (n, m) and the right side b (m,); scaled in place.
         solutions: filled per frame with x (n,), the residual b - A x (m,) and 1.0 if solved, else 0.0.
         work: workspace of `effort_size` numbers.
@@ -93,13 +104,13 @@ def least_effort(
     Returns:
         `OUTCOME.OK`.
     """
-    m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
+    m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     # Multipliers of the previous frame are stored for unscaled equations, since scales change.
     scales, previous, multipliers, inner_work = work, at(work, m), at(work, 2 * m), at(work, 3 * m)
     targets, compliances = inner_work, at(inner_work, n)
     for k in range(m):
         previous[k] = 0.0
-    for frame in range(sizes[FRAMES]):
+    for frame in range(sizes[EFFORT_SIZES.FRAMES]):
         columns, x = at(problems, (n + 1) * m * frame), at(solutions, (n + m + 1) * frame)
         scale_equations(sizes, columns, scales)
         # With targets 0 and compliances 1 the weighted problem is that for p = 2.
@@ -126,7 +137,7 @@ def least_effort(
         # After a frame that has no solution, start from zero.
         for k in range(m):
             previous[k] = multipliers[k] * scales[k] if is_solved else 0.0
-        if is_solved and numbers[POWER] != 2.0:
+        if is_solved and numbers[EFFORT_NUMBERS.POWER] != 2.0:
             minimize_powers(sizes, numbers, columns, x, multipliers, inner_work)
         # The residual is reported in the units of the generalized forces.
         for k in range(m):
@@ -143,7 +154,7 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
         columns: columns of A (n, m), followed by b (m,); scaled in place.
         scales: filled with the factor of each equation (m,).
     """
-    m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
+    m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     rhs = at(columns, m * n)
     # Zeros first: a tiny entry that remains would make its equation look solvable.
     most = 0.0
@@ -164,7 +175,11 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
         rhs[k] *= scales[k]
     # The list of nonzeros is made per frame, because moment arms vanish and appear.
     for j in range(n):
-        column, entries, count = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j), 0
+        column, entries, count = (
+            at(columns, m * j),
+            at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j),
+            0,
+        )
         for k in range(m):
             if column[k] != 0.0:
                 count += 1
@@ -186,7 +201,11 @@ def minimize_powers(
         multipliers: workspace for the multipliers (m,).
         work: workspace, which begins with targets and compliances, see `solve_weighted_least_squares`.
     """
-    m, n, power = sizes[EQUATIONS], sizes[UNKNOWNS], numbers[POWER]
+    m, n, power = (
+        sizes[EFFORT_SIZES.EQUATIONS],
+        sizes[EFFORT_SIZES.UNKNOWNS],
+        numbers[EFFORT_NUMBERS.POWER],
+    )
     targets, compliances, tried = work, at(work, n), at(work, 4 * n + m * (m + 5))
     terms = at(work, 4 * n + 3 * m)
     for _ in range(NEWTON_STEPS):
@@ -277,7 +296,7 @@ def solve_weighted_least_squares(
     Returns:
         The largest residual of an equation relative to the size of its terms.
     """
-    m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
+    m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     rhs = at(columns, m * n)
     y, change, centre = at(work, 2 * n), at(work, 3 * n), at(work, 4 * n)
     slope, step = at(centre, m), at(centre, 2 * m)
@@ -356,9 +375,9 @@ def restore_equations(
     Returns:
         Whether the equations hold afterwards.
     """
-    for j in range(sizes[UNKNOWNS]):
-        work[j], work[sizes[UNKNOWNS] + j] = x[j], 1.0
-    for k in range(sizes[EQUATIONS]):
+    for j in range(sizes[EFFORT_SIZES.UNKNOWNS]):
+        work[j], work[sizes[EFFORT_SIZES.UNKNOWNS] + j] = x[j], 1.0
+    for k in range(sizes[EFFORT_SIZES.EQUATIONS]):
         multipliers[k] = 0.0
     return (
         solve_weighted_least_squares(sizes, numbers, columns, x, residual, multipliers, work)
@@ -375,9 +394,13 @@ def transpose_times(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats
         multipliers: multipliers λ (m,).
         y: filled (n,).
     """
-    m = sizes[EQUATIONS]
-    for j in range(sizes[UNKNOWNS]):
-        column, entries, total = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j), 0.0
+    m = sizes[EFFORT_SIZES.EQUATIONS]
+    for j in range(sizes[EFFORT_SIZES.UNKNOWNS]):
+        column, entries, total = (
+            at(columns, m * j),
+            at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j),
+            0.0,
+        )
         for e in range(1, entries[0] + 1):
             total += column[entries[e]] * multipliers[entries[e]]
         y[j] = total
@@ -396,7 +419,7 @@ def primal_from_multipliers(numbers: Floats, n: int, j: int, work: Floats, y: fl
         y: entry j of Aᵀ λ.
     """
     x = work[j] + work[n + j] * y
-    return min(max(x, numbers[BOUNDS + j]), numbers[BOUNDS + n + j])
+    return min(max(x, numbers[EFFORT_NUMBERS.BOUNDS + j]), numbers[EFFORT_NUMBERS.BOUNDS + n + j])
 
 
 def update_primal(
@@ -422,7 +445,7 @@ def update_primal(
     Returns:
         The largest ratio of residual to terms.
     """
-    n = sizes[UNKNOWNS]
+    n = sizes[EFFORT_SIZES.UNKNOWNS]
     for j in range(n):
         x[j] = primal_from_multipliers(numbers, n, j, work, work[2 * n + j])
     return compute_residual(sizes, columns, x, residual, terms)
@@ -443,12 +466,12 @@ def compute_residual(
     Returns:
         The largest ratio of residual to terms.
     """
-    m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
+    m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     rhs, largest = at(columns, m * n), 0.0
     for k in range(m):
         residual[k], terms[k] = rhs[k], abs(rhs[k])
     for j in range(n):
-        column, entries = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j)
+        column, entries = at(columns, m * j), at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
         for e in range(1, entries[0] + 1):
             k = entries[e]
             term = column[k] * x[j]
@@ -477,14 +500,14 @@ def fill_dual_hessian(
         work: workspace of `solve_weighted_least_squares`, with y.
         matrix: filled (m, m).
     """
-    m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
+    m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     for k in range(m * m):
         matrix[k] = 0.0
     for j in range(n):
         x = work[j] + work[n + j] * work[2 * n + j]
-        if not numbers[BOUNDS + j] < x < numbers[BOUNDS + n + j]:
+        if not numbers[EFFORT_NUMBERS.BOUNDS + j] < x < numbers[EFFORT_NUMBERS.BOUNDS + n + j]:
             continue
-        column, entries = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j)
+        column, entries = at(columns, m * j), at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
         for e in range(1, entries[0] + 1):
             k = entries[e]
             row, factor = at(matrix, m * k), work[n + j] * column[k]
@@ -508,7 +531,14 @@ def line_search(
         multipliers: multipliers at the start of the step (m,).
         work: workspace of `solve_weighted_least_squares`, with y = Aᵀ λ and its change along the step.
     """
-    m, n, low, high, step_length, start = sizes[EQUATIONS], sizes[UNKNOWNS], 0.0, 1.0, 0.0, 0.0
+    m, n, low, high, step_length, start = (
+        sizes[EFFORT_SIZES.EQUATIONS],
+        sizes[EFFORT_SIZES.UNKNOWNS],
+        0.0,
+        1.0,
+        0.0,
+        0.0,
+    )
     y, change, centre, slight = (
         at(work, 2 * n),
         at(work, 3 * n),

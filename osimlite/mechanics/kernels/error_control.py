@@ -10,33 +10,38 @@ from __future__ import annotations
 
 from math import inf, isfinite, sqrt
 
-from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, WORK
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, WORK, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, call
 
-LAST_TIME = 0
-"""Index in the record of the latest time that a step may reach (s)."""
-ACCEPTED = 1
-"""Index of the accuracy: the largest accepted error norm of a step."""
-COUNTED_Q = 2
-"""Index of the divisor of the sum of squared errors of the coordinates, see `error_norm`."""
-COUNTED_U = 3
-"""Index of the divisor of the sum of squared errors of the speeds, see `error_norm`."""
-SHORTEST = 4
-"""Index of the shortest step (s), which is accepted whatever its error."""
-LONGEST = 5
-"""Index of the longest step (s)."""
-REACHED = 6
-"""Index of the time at the start of the step (s); if the step is accepted, the time at its end."""
-NEXT_STEP = 7
-"""Index of the step to try (s), then of the next step to try."""
-EVALUATED = 8
-"""Index of the number of evaluations that the step took."""
-HAS_DERIVATIVE = 9
-"""Index of 1.0 if the method wrote the derivative at the end after y1, else 0.0."""
-IS_EVALUATED = 10
-"""Index of 1.0 if the last evaluation was at the start of the step, else 0.0."""
-MEMORY = 11
-"""Offset of the numbers that a method keeps between steps; it restarts where the first of them is 0."""
+
+class METHOD_WORK(metaclass=Record):
+    """Head of the record of an integration method in data."""
+
+    LAST_TIME = 0
+    """Latest time that a step may reach (s)."""
+    ACCEPTED = 1
+    """Accuracy: the largest accepted error norm of a step."""
+    COUNTED_Q = 2
+    """Divisor of the sum of squared errors of the coordinates, see `error_norm`."""
+    COUNTED_U = 3
+    """Divisor of the sum of squared errors of the speeds, see `error_norm`."""
+    SHORTEST = 4
+    """Shortest step (s), which is accepted whatever its error."""
+    LONGEST = 5
+    """Longest step (s)."""
+    REACHED = 6
+    """Time at the start of the step (s); if the step is accepted, the time at its end."""
+    NEXT_STEP = 7
+    """Step to try (s), then the next step to try."""
+    EVALUATED = 8
+    """Number of evaluations that the step took."""
+    HAS_DERIVATIVE = 9
+    """1.0 if the method wrote the derivative at the end after y1, else 0.0."""
+    IS_EVALUATED = 10
+    """1.0 if the last evaluation was at the start of the step, else 0.0."""
+    MEMORY = 11
+    """Numbers that a method keeps between steps; it restarts where the first of them is 0."""
+
 
 ERRORS = 4
 """Offset of the errors of a step after WORK_STATE, in states."""
@@ -103,7 +108,7 @@ def step_end(h: Floats) -> float:
     A step that almost reaches the limit is extended to it.
     """
     # The extension avoids a tiny last step.
-    t0, limit, step = h[REACHED], h[LAST_TIME], h[NEXT_STEP]
+    t0, limit, step = h[METHOD_WORK.REACHED], h[METHOD_WORK.LAST_TIME], h[METHOD_WORK.NEXT_STEP]
     return limit if limit <= t0 + 1.001 * step else t0 + step
 
 
@@ -116,15 +121,20 @@ def judge_step(h: Floats, t1: float, error: float, order: float) -> None:
         error: norm of its error.
         order: order of the error.
     """
-    limit, step, accuracy = h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
+    limit, step, accuracy = (
+        h[METHOD_WORK.LAST_TIME],
+        h[METHOD_WORK.NEXT_STEP],
+        h[METHOD_WORK.ACCEPTED],
+    )
     # A step that was cut much shorter is no basis for the size of the next one.
-    cut = limit < h[REACHED] + 0.95 * step
-    h[NEXT_STEP] = min(
-        max(next_step_size(step, error, accuracy, cut, order), h[SHORTEST]), h[LONGEST]
+    cut = limit < h[METHOD_WORK.REACHED] + 0.95 * step
+    h[METHOD_WORK.NEXT_STEP] = min(
+        max(next_step_size(step, error, accuracy, cut, order), h[METHOD_WORK.SHORTEST]),
+        h[METHOD_WORK.LONGEST],
     )
     # As in Simbody, the shortest allowed step is accepted whatever its error.
-    if error <= accuracy or (step <= h[SHORTEST] and error < inf):
-        h[REACHED] = t1
+    if error <= accuracy or (step <= h[METHOD_WORK.SHORTEST] and error < inf):
+        h[METHOD_WORK.REACHED] = t1
 
 
 def project_by_law(
@@ -195,11 +205,11 @@ def project_and_measure(
     """
     error = error_norm(model, y0, errors, h, is_strict)
     # As in Simbody: a projection cannot repair an error that half a step would not.
-    if model[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
+    if model[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[METHOD_WORK.ACCEPTED]:
         return error
     # A projection is exact to a tenth of the accuracy. It may start as far away as the square root
     # of that, as in Simbody.
-    tolerance = h[ACCEPTED] / 10.0
+    tolerance = h[METHOD_WORK.ACCEPTED] / 10.0
     # The projection removes the normal component of the absolute errors, as Simbody's does.
     for k in range(model[MODEL.STATE_SIZE]):
         errors[k] = abs(errors[k])
@@ -236,8 +246,8 @@ def error_norm(model: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: in
         weighted = error_weight(y0[k]) * errors[k]
         square = weighted * weighted
         of_z = max(of_z, square) if is_strict else of_z + square
-    of_q /= max(h[COUNTED_Q], 1.0)
-    of_u /= max(h[COUNTED_U], 1.0)
+    of_q /= max(h[METHOD_WORK.COUNTED_Q], 1.0)
+    of_u /= max(h[METHOD_WORK.COUNTED_U], 1.0)
     if not is_strict:
         of_z /= max(size - 2 * n, 1)
     return sqrt(max(of_q, of_u, of_z)) if isfinite(of_q + of_u + of_z) else inf

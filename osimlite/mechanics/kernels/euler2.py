@@ -10,12 +10,8 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from osimlite.mechanics.kernels.error_control import (
-    ACCEPTED,
     ERRORS,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    MEMORY,
-    REACHED,
+    METHOD_WORK,
     error_norm,
     judge_step,
     project_by_law,
@@ -25,7 +21,7 @@ from osimlite.mechanics.kernels.layout import LINK, MODEL, MOTION, OPERATION, OU
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_ints, operation_ints
 
-HEAD = MEMORY + 1
+HEAD = METHOD_WORK.MEMORY + 1
 """Length of the head of the method's record, see `error_control`."""
 STATES = 3
 """Number of states of workspace after it."""
@@ -53,8 +49,8 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
     size = model[MODEL.STATE_SIZE]
     errors, whole = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
     # Constraints hold to a tenth of the accuracy, as in Simbody.
-    t0, t1, tolerance = h[REACHED], step_end(h), h[ACCEPTED] / 10.0
-    h[EVALUATED], h[HAS_DERIVATIVE] = 1.0, 0.0
+    t0, t1, tolerance = h[METHOD_WORK.REACHED], step_end(h), h[METHOD_WORK.ACCEPTED] / 10.0
+    h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 1.0, 0.0
     error = inf
     if take_half_steps(model, reals, data, t0, t1, y0, y1, whole, at(whole, size)) == OUTCOME.OK:
         for k in range(size):

@@ -7,37 +7,55 @@ begins with its value, followed by the derivatives by the arguments.
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.functions import evaluate_function
-from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME
-from osimlite.mechanics.kernels.paths import LENGTH, SPEED, TENSION
+from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME, Record
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.programs import run_program
 
-COUNT = ITEM.OWN + 1
-"""Index in the integers of a path of the number of its coordinates."""
-LENGTH_BACK = ITEM.OWN + 2
-"""Index of the distance back to the item of the length function."""
-SPEED_BACK = ITEM.OWN + 3
-"""Index of the distance back to the item of the speed function, 0 if moment arms give the speed."""
-COORDINATES = ITEM.OWN + 4
-"""Offset of the degrees of freedom of the coordinates, -1 for a locked one.
 
-They are followed by the distances back to the items of the moment arms, 0 for a moment arm that is
-the negative derivative of the length.
+class FUNCTION_PATH(metaclass=Record):
+    """Integers of a path whose length is a function of coordinates."""
+
+    COUNT = ITEM.OWN + 1
+    """Number of its coordinates."""
+    LENGTH_BACK = ITEM.OWN + 2
+    """Distance back to the item of the length function."""
+    SPEED_BACK = ITEM.OWN + 3
+    """Distance back to the item of the speed function, 0 if moment arms give the speed."""
+    COORDINATES = ITEM.OWN + 4
+    """Degrees of freedom of the coordinates, -1 for a locked one.
+
+    They are followed by the distances back to the items of the moment arms, 0 for a moment arm that is
+    the negative derivative of the length.
 """
-ARMS = 3
-"""Offset in the record of a path of its moment arms (m)."""
 
-SIZE = ITEM.OWN
-"""Index in the integers of a function of the number of its arguments."""
-ORDER = ITEM.OWN + 1
-"""Index of the order of a polynomial, or of the number of programs of a formula."""
-ARGUMENTS = ITEM.OWN + 2
-"""Offset of the indices of the arguments in a state, -1 for a constant one.
 
-The numbers of a function begin with the values of constant arguments.
+class FUNCTION_PATH_WORK(metaclass=Record):
+    """Record of such a path behind that of any path, see `PATH_WORK`."""
+
+    ARMS = 3
+    """Moment arms (m)."""
+
+
+class FUNCTION(metaclass=Record):
+    """Integers of a function."""
+
+    COUNT = ITEM.OWN
+    """Number of its arguments."""
+    ORDER = ITEM.OWN + 1
+    """Order of a polynomial, or number of programs of a formula."""
+    ARGUMENTS = ITEM.OWN + 2
+    """Indices of the arguments in a state, -1 for a constant one.
+
+    The numbers of a function begin with the values of constant arguments.
 """
-DERIVATIVES = 1
-"""Offset in the record of a function of its derivatives by the arguments."""
+
+
+class FUNCTION_WORK(metaclass=Record):
+    """Record of a function, which begins with its value."""
+
+    DERIVATIVES = 1
+    """Derivatives by the arguments."""
 
 
 def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -55,23 +73,23 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         `OUTCOME.OK`.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    count, coordinates = i[COUNT], at(i, COORDINATES)
-    length = evaluate_item(model, reals, data, y, f, item - i[LENGTH_BACK])
+    count, coordinates = i[FUNCTION_PATH.COUNT], at(i, FUNCTION_PATH.COORDINATES)
+    length = evaluate_item(model, reals, data, y, f, item - i[FUNCTION_PATH.LENGTH_BACK])
     speed = 0.0
     for k in range(count):
         back = coordinates[count + k]
         arm = (
             evaluate_item(model, reals, data, y, f, item - back)[0]
             if back > 0
-            else -length[DERIVATIVES + k]
+            else -length[FUNCTION_WORK.DERIVATIVES + k]
         )
-        result[ARMS + k] = arm
+        result[FUNCTION_PATH_WORK.ARMS + k] = arm
         if coordinates[k] >= 0:
             # OpenSim defines moment arms as negative derivatives of the length.
             speed -= arm * f[coordinates[k]]
-    if i[SPEED_BACK] > 0:
-        speed = evaluate_item(model, reals, data, y, f, item - i[SPEED_BACK])[0]
-    result[LENGTH], result[SPEED] = length[0], speed
+    if i[FUNCTION_PATH.SPEED_BACK] > 0:
+        speed = evaluate_item(model, reals, data, y, f, item - i[FUNCTION_PATH.SPEED_BACK])[0]
+    result[PATH_WORK.LENGTH], result[PATH_WORK.SPEED] = length[0], speed
     return OUTCOME.OK
 
 
@@ -109,10 +127,12 @@ def pull_coordinates(
         `OUTCOME.OK`.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    for k in range(i[COUNT]):
-        freedom = i[COORDINATES + k]
+    for k in range(i[FUNCTION_PATH.COUNT]):
+        freedom = i[FUNCTION_PATH.COORDINATES + k]
         if freedom >= 0:
-            f[model[MODEL.DOFS] + freedom] += result[ARMS + k] * result[TENSION]
+            f[model[MODEL.DOFS] + freedom] += (
+                result[FUNCTION_PATH_WORK.ARMS + k] * result[PATH_WORK.TENSION]
+            )
     return OUTCOME.OK
 
 
@@ -137,8 +157,8 @@ def function_of_one(
         at(reals, model[item + ITEM.NUMBERS]),
         at(data, model[item + ITEM.RECORD]),
     )
-    place = i[ARGUMENTS]
-    result[0], result[DERIVATIVES], _ = evaluate_function(
+    place = i[FUNCTION.ARGUMENTS]
+    result[0], result[FUNCTION_WORK.DERIVATIVES], _ = evaluate_function(
         at(p, 1), y[place] if place >= 0 else p[0]
     )
     return OUTCOME.OK
@@ -167,17 +187,17 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         at(reals, model[item + ITEM.NUMBERS]),
         at(data, model[item + ITEM.RECORD]),
     )
-    size, width = i[SIZE], i[ORDER] + 1
-    powers = at(result, DERIVATIVES + size)
+    size, width = i[FUNCTION.COUNT], i[FUNCTION.ORDER] + 1
+    powers = at(result, FUNCTION_WORK.DERIVATIVES + size)
     exponents, factors = at(powers, size * width), at(powers, size * width + size)
     for k in range(size):
-        place = i[ARGUMENTS + k]
+        place = i[FUNCTION.ARGUMENTS + k]
         # Powers once per argument, since many terms share them.
         argument = y[place] if place >= 0 else p[k]
         powers[k * width] = 1.0
         for power in range(1, width):
             powers[k * width + power] = powers[k * width + power - 1] * argument
-        result[DERIVATIVES + k] = exponents[k] = 0.0
+        result[FUNCTION_WORK.DERIVATIVES + k] = exponents[k] = 0.0
     value, term, total = 0.0, 0, 0
     while True:
         product = p[size + term]
@@ -191,17 +211,17 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         for k in range(size - 1, -1, -1):
             power = int(exponents[k])
             if power > 0:
-                result[DERIVATIVES + k] += (
+                result[FUNCTION_WORK.DERIVATIVES + k] += (
                     factors[k] * (power * powers[k * width + power - 1]) * after
                 )
             after *= powers[k * width + power]
         # Count exponents up like digits, as long as their sum does not exceed the order.
         k = size - 1
-        while k > 0 and total == i[ORDER]:
+        while k > 0 and total == i[FUNCTION.ORDER]:
             total -= int(exponents[k])
             exponents[k] = 0.0
             k -= 1
-        if total == i[ORDER]:
+        if total == i[FUNCTION.ORDER]:
             break
         exponents[k] += 1.0
         total += 1
@@ -232,11 +252,14 @@ def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item
         at(reals, model[item + ITEM.NUMBERS]),
         at(data, model[item + ITEM.RECORD]),
     )
-    size = i[SIZE]
-    program, registers = at(i, ARGUMENTS + size), at(result, DERIVATIVES + size)
-    for number in range(i[ORDER]):
+    size = i[FUNCTION.COUNT]
+    program, registers = (
+        at(i, FUNCTION.ARGUMENTS + size),
+        at(result, FUNCTION_WORK.DERIVATIVES + size),
+    )
+    for number in range(i[FUNCTION.ORDER]):
         for k in range(size):
-            place = i[ARGUMENTS + k]
+            place = i[FUNCTION.ARGUMENTS + k]
             registers[k] = y[place] if place >= 0 else p[k]
         result[number] = run_program(at(program, 2), program[0], at(p, program[1]), registers, size)
         program = at(program, 2 + 3 * program[0])

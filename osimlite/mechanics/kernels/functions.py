@@ -8,28 +8,40 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from osimlite.mechanics.kernels.layout import ITEM, MODEL, OPERATION, OPERATION_WORK, OUTCOME, WORK
+from osimlite.mechanics.kernels.layout import (
+    ITEM,
+    MODEL,
+    OPERATION,
+    OPERATION_WORK,
+    OUTCOME,
+    WORK,
+    Record,
+)
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 
-PIECES = 0
-"""Kind: polynomials between knots."""
-SINE = 1
-"""Kind: a sin(w t + phi) + offset."""
-STEP = 2
-"""Kind: a quintic step between two values."""
-PIECES_OF_OPENSIM = 3
-"""Kind: polynomials between knots, with OpenSim 4.6's second derivative."""
-MONOMIALS = 4
-"""Kind: sum of products of powers; the kinds from here on have several arguments."""
-MONOMIALS_OF_OPENSIM = 5
-"""Kind: sum of products of powers, with OpenSim 4.6's second derivatives.
 
-OpenSim 4.6 uses the gradient in every column in place of the second derivatives of a
-MultivariatePolynomialFunction.
+class FUNCTION_TYPE(metaclass=Record):
+    """Types of functions, as their tables name them."""
+
+    PIECES = 0
+    """Polynomials between knots."""
+    SINE = 1
+    """Sine a sin(w t + phi) + offset."""
+    STEP = 2
+    """A quintic step between two values."""
+    PIECES_OF_OPENSIM = 3
+    """Polynomials between knots, with OpenSim 4.6's second derivative."""
+    MONOMIALS = 4
+    """Sum of products of powers; the kinds from here on have several arguments."""
+    MONOMIALS_OF_OPENSIM = 5
+    """Sum of products of powers, with OpenSim 4.6's second derivatives.
+
+    OpenSim 4.6 uses the gradient in every column in place of the second derivatives of a
+    MultivariatePolynomialFunction.
 """
-ARC = 6
-"""Kind: end of a bent rod, see :mod:`osimlite.mechanics.kernels.constant_curvature`."""
+    ARC = 6
+    """End of a bent rod, see :mod:`osimlite.mechanics.kernels.constant_curvature`."""
 
 
 def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
@@ -44,12 +56,12 @@ def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
     """
     kind, factor = int(table[0]), table[1]
     value = slope = curvature = 0.0
-    if kind == SINE:
+    if kind == FUNCTION_TYPE.SINE:
         angle = table[3] * z + table[4]
         value = table[2] * sin(angle) + table[5]
         slope = table[2] * table[3] * cos(angle)
         curvature = -table[2] * table[3] * table[3] * sin(angle)
-    elif kind == STEP:
+    elif kind == FUNCTION_TYPE.STEP:
         # Quintic step: S(t) = 10 t^3 - 15 t^4 + 6 t^5 between both ends, constant outside.
         rate = 1.0 / (table[3] - table[2])
         t, rise = (z - table[2]) * rate, table[5] - table[4]
@@ -69,7 +81,7 @@ def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float
     Args:
         table: table of the function.
         z: argument.
-        kind: PIECES or PIECES_OF_OPENSIM.
+        kind: PIECES or PIECES_OF_OPENSIM of `FUNCTION_TYPE`.
 
     Returns:
         Value, first and second derivative.
@@ -91,7 +103,7 @@ def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float
         slope = slope * t + value
         value = value * t + piece[k]
     # OpenSim 4.6 returns the first derivative as the second one for some piecewise functions.
-    return value, slope, slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
+    return value, slope, slope if kind == FUNCTION_TYPE.PIECES_OF_OPENSIM else 2.0 * curvature
 
 
 def amount_by_one(
@@ -211,7 +223,7 @@ def evaluate_monomials(
                 )
                 curvature += second * rates[arguments[one]] * rates[arguments[two]]
     # OpenSim's error: the gradient stands in place of each row of the second derivatives.
-    if int(table[0]) == MONOMIALS_OF_OPENSIM:
+    if int(table[0]) == FUNCTION_TYPE.MONOMIALS_OF_OPENSIM:
         total = 0.0
         for index in range(size):
             total += rates[arguments[index]] if arguments[index] >= 0 else 0.0

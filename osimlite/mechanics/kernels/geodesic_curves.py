@@ -3,54 +3,18 @@
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.cable_paths import (
-    AT,
-    ELEMENT_INTS,
-    ELEMENTS,
-    GEODESIC,
-    GROUND_END,
-    GROUND_START,
-    IN_GROUND,
-    IS_OBSTACLE,
-    KEPT,
-    SOLVER,
-    STATE,
-    TOUCHES,
+    CABLE,
+    ELEMENT,
+    OBSTACLE,
+    OBSTACLE_STATE,
+    OBSTACLE_WORK,
 )
-from osimlite.mechanics.kernels.cable_paths import COUNT as CABLE_COUNT
-from osimlite.mechanics.kernels.cable_paths import SURFACE as CABLE_SURFACE
-from osimlite.mechanics.kernels.cable_surfaces import ALONG as ALONG_GEODESIC
-from osimlite.mechanics.kernels.cable_surfaces import (
-    ALONG_BENDS,
-    ARC,
-    END,
-    POINT,
-    START,
-    STEP,
-    shoot_geodesic,
-)
-from osimlite.mechanics.kernels.geodesic_paths import (
-    CHAIN,
-    PLACES,
-    POSE_NUMBERS,
-    POSES,
-    SEARCH,
-    WRAP_INTS,
-)
-from osimlite.mechanics.kernels.geodesic_starts import SURFACE
+from osimlite.mechanics.kernels.cable_surfaces import END_NUMBERS, GEODESIC, shoot_geodesic
+from osimlite.mechanics.kernels.geodesic_paths import GEODESIC_PATH, GEODESIC_WRAP, SURFACE_POSE
+from osimlite.mechanics.kernels.geodesic_starts import WRAP_NUMBERS
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.path_wraps import point_in_ground, point_in_surface
-from osimlite.mechanics.kernels.paths import (
-    ALONG,
-    COUNT,
-    NODE_INTS,
-    NODE_WORK,
-    NODES_AT,
-    ORDER,
-    PLACE,
-    POINTS,
-    WRAPS,
-)
-from osimlite.mechanics.kernels.paths import SURFACE as SURFACE_LENGTH
+from osimlite.mechanics.kernels.paths import NODE, NODE_WORK, PATH, PATH_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.wrap_curves import count_segments
 from osimlite.mechanics.laws.vectors import Vector, dot, rotate_back, store_vector, vector
@@ -77,27 +41,41 @@ def trace_geodesics(
         at(reals, model[item + ITEM.NUMBERS]),
         at(data, model[item + ITEM.RECORD]),
     )
-    points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
-    order, work = at(result, ORDER), at(result, ORDER + points + 2 * i[WRAPS])
-    slots = at(wraps, WRAP_INTS * i[WRAPS])
-    geodesic, room = at(result, slots[CHAIN] + GEODESIC), at(result, slots[SEARCH])
+    points, wraps = (
+        i[PATH.POINTS],
+        at(i, PATH.NODES_AT + NODE.SIZE * (i[PATH.POINTS] + 2 * i[PATH.WRAPS])),
+    )
+    order, work = (
+        at(result, PATH_WORK.ORDER),
+        at(result, PATH_WORK.ORDER + points + 2 * i[PATH.WRAPS]),
+    )
+    slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
+    geodesic, room = (
+        at(result, slots[GEODESIC_PATH.CHAIN] + OBSTACLE_WORK.CURVE),
+        at(result, slots[GEODESIC_PATH.SEARCH]),
+    )
     count = 0
-    for k in range(int(result[COUNT])):
+    for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
-        here = at(work, NODE_WORK * number)
-        store_vector(f, 3 * count, vector(here, PLACE))
+        here = at(work, NODE_WORK.SIZE * number)
+        store_vector(f, 3 * count, vector(here, NODE_WORK.PLACE))
         count += 1
         wrap = (number - points) // 2
         # Of the two nodes of a wrap, the first is that where the geodesic begins.
         if number >= points and number == points + 2 * wrap:
             surface, pose = (
-                at(p, wraps[WRAP_INTS * wrap + PLACES] + SURFACE),
-                at(result, slots[POSES] + POSE_NUMBERS * wrap),
+                at(
+                    p,
+                    wraps[GEODESIC_WRAP.SIZE * wrap + GEODESIC_WRAP.PLACES] + WRAP_NUMBERS.SURFACE,
+                ),
+                at(result, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * wrap),
             )
-            point = point_in_surface(pose, vector(here, PLACE))
+            point = point_in_surface(pose, vector(here, NODE_WORK.PLACE))
             # The geodesic starts in the direction of the line before it.
-            way = rotate_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
-            length = here[NODE_WORK + SURFACE_LENGTH]
+            way = rotate_back(
+                pose, vector(work, NODE_WORK.SIZE * int(order[k - 1]) + NODE_WORK.ALONG)
+            )
+            length = here[NODE_WORK.SIZE + NODE_WORK.SURFACE]
             count += trace_geodesic(
                 surface, pose, point, way, length, geodesic, room, at(f, 3 * count)
             )
@@ -124,26 +102,29 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         at(data, model[item + ITEM.RECORD]),
     )
     count = 0
-    for k in range(i[CABLE_COUNT]):
-        element = at(i, ELEMENTS + ELEMENT_INTS * k)
-        part = at(result, element[KEPT])
-        if element[IS_OBSTACLE] == 0:
+    for k in range(i[CABLE.COUNT]):
+        element = at(i, CABLE.ELEMENTS + ELEMENT.SIZE * k)
+        part = at(result, element[ELEMENT.KEPT])
+        if element[ELEMENT.IS_OBSTACLE] == 0:
             store_vector(f, 3 * count, vector(part, 0))
             count += 1
-        elif part[STATE] == TOUCHES:
-            geodesic = at(part, GEODESIC)
-            point, way = vector(geodesic, START + POINT), vector(geodesic, START + ALONG_GEODESIC)
-            surface, pose, work = (
-                at(p, element[AT] + CABLE_SURFACE),
-                at(part, IN_GROUND),
-                at(result, i[SOLVER]),
+        elif part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            geodesic = at(part, OBSTACLE_WORK.CURVE)
+            point, way = (
+                vector(geodesic, GEODESIC.START + END_NUMBERS.POINT),
+                vector(geodesic, GEODESIC.START + END_NUMBERS.ALONG),
             )
-            store_vector(f, 3 * count, vector(part, GROUND_START + POINT))
+            surface, pose, work = (
+                at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE),
+                at(part, OBSTACLE_WORK.IN_GROUND),
+                at(result, i[CABLE.SOLVER]),
+            )
+            store_vector(f, 3 * count, vector(part, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT))
             count += 1
             count += trace_geodesic(
-                surface, pose, point, way, geodesic[ARC], geodesic, work, at(f, 3 * count)
+                surface, pose, point, way, geodesic[GEODESIC.ARC], geodesic, work, at(f, 3 * count)
             )
-            store_vector(f, 3 * count, vector(part, GROUND_END + POINT))
+            store_vector(f, 3 * count, vector(part, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT))
             count += 1
     return count
 
@@ -175,12 +156,19 @@ def trace_geodesic(
     """
     # Without a first step the geodesic is integrated by extrapolation, which is exact at any
     # length.
-    geodesic[STEP] = 0.0
+    geodesic[GEODESIC.STEP] = 0.0
     if not (dot(way, way) > 0.0 and shoot_geodesic(surface, point, way, length, geodesic, work)):
         return 0
-    bends = max(abs(geodesic[START + ALONG_BENDS]), abs(geodesic[END + ALONG_BENDS]))
+    bends = max(
+        abs(geodesic[GEODESIC.START + END_NUMBERS.ALONG_BENDS]),
+        abs(geodesic[GEODESIC.END + END_NUMBERS.ALONG_BENDS]),
+    )
     count = count_segments(bends * length)
     for k in range(1, count):
         shoot_geodesic(surface, point, way, length * k / count, geodesic, work)
-        store_vector(f, 3 * (k - 1), point_in_ground(pose, vector(geodesic, END + POINT)))
+        store_vector(
+            f,
+            3 * (k - 1),
+            point_in_ground(pose, vector(geodesic, GEODESIC.END + END_NUMBERS.POINT)),
+        )
     return count - 1

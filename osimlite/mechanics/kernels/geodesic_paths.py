@@ -16,26 +16,16 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.cable_paths import (
-    GEODESIC,
-    GROUND_END,
-    GROUND_START,
-    IN_GROUND,
-    OBSTACLE_WORK,
-)
+from osimlite.mechanics.kernels.cable_paths import OBSTACLE_WORK
 from osimlite.mechanics.kernels.cable_surfaces import (
-    ARC,
-    KIND,
-    POINT,
-    SQUARE,
-    STEP,
-    SURFACE_NUMBERS,
-    TORUS,
+    END_NUMBERS,
+    GEODESIC,
+    SURFACE,
+    SURFACE_TYPE,
     shoot_geodesic,
     surface_value,
 )
 from osimlite.mechanics.kernels.geodesic_search import (
-    OWNER,
     SLOT,
     ends_to_ground,
     line_end,
@@ -44,35 +34,23 @@ from osimlite.mechanics.kernels.geodesic_search import (
     smooth_chain,
 )
 from osimlite.mechanics.kernels.geodesic_starts import (
-    ANY_SIDE,
-    AS_MEANT,
-    PULLED,
-    SIDE,
-    SURFACE,
+    BENDING,
+    WRAP_NUMBERS,
     count_ways,
     squared_depth,
     start_on_surface,
 )
-from osimlite.mechanics.kernels.layout import ITEM, OUTCOME
+from osimlite.mechanics.kernels.layout import ITEM, OUTCOME, Record
 from osimlite.mechanics.kernels.path_wraps import point_in_surface
 from osimlite.mechanics.kernels.paths import (
-    AT,
-    COUNT,
-    IS_KEPT,
-    LINK,
-    NODE_INTS,
+    NODE,
+    NODE_NUMBERS,
     NODE_WORK,
-    NODES_AT,
-    ORDER,
-    PLACE,
-    POINTS,
-    STATION,
-    TURN,
-    WRAPS,
+    PATH,
+    PATH_WORK,
     measure_points,
     place_points,
 )
-from osimlite.mechanics.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import place_frame
 from osimlite.mechanics.laws.vectors import (
@@ -86,49 +64,69 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-WRAP_INTS = 4
-"""Number of integers of a wrap; wraps follow the nodes."""
-PLACES = 0
-"""Index in a wrap of the offset of its numbers, see `geodesic_starts`."""
-FIRST = 1
-"""Index of the point at which its segment begins."""
-LAST = 2
-"""Index of the last point at which its segment may end."""
-RANGE = 3
-"""Index of the first point of the range of its PathWrap."""
-CHAIN = 0
-"""Index after the wraps of the offset in the record of the slots."""
-BEST = 1
-"""Index of the offset of the slots of the shortest path."""
-SEARCH = 2
-"""Index of the offset of the workspace of a search."""
-POSES = 3
-"""Index of the offset of the poses of the surfaces."""
-HOW = 12
-"""Index in a pose of how the surface may bend the segment, NOT or see `start_on_surface`."""
-ABOUT = 13
-"""Offset of the axis about which it turns the segment."""
-POSE_NUMBERS = 16
-"""Length of a pose: rotation by rows, position in ground, HOW and ABOUT."""
-NOT = 0.0
-"""Value of HOW of a surface that does not bend the segment."""
+
+class GEODESIC_WRAP(metaclass=Record):
+    """Integers of a wrap; wraps follow the nodes."""
+
+    PLACES = 0
+    """Offset of its numbers, see `geodesic_starts`."""
+    FIRST = 1
+    """Point at which its segment begins."""
+    LAST = 2
+    """Last point at which its segment may end."""
+    RANGE = 3
+    """First point of the range of its PathWrap."""
+    SIZE = 4
+    """Number of integers of a wrap; wraps follow the nodes."""
+
+
+class GEODESIC_PATH(metaclass=Record):
+    """Integers after the wraps."""
+
+    CHAIN = 0
+    """Offset in the record of the slots."""
+    BEST = 1
+    """Offset of the slots of the shortest path."""
+    SEARCH = 2
+    """Offset of the workspace of a search."""
+    POSES = 3
+    """Offset of the poses of the surfaces."""
+
+
+class SURFACE_POSE(metaclass=Record):
+    """Pose of a surface: rotation by rows and position in ground come first."""
+
+    HOW = 12
+    """How the surface may bend the segment, see `BENDING`."""
+    ABOUT = 13
+    """Axis about which it turns the segment."""
+    SIZE = 16
+    """Length of a pose: rotation by rows, position in ground, `HOW` and `ABOUT`."""
+
 
 TOUCH = 1e-10
 """Smallest angle by which a segment turns around a surface that is inserted (rad)."""
 WHOLE = 10.0
 """Added to the angle of surfaces with an active side, so that they come first (rad)."""
 INSIDE = 1e-14
-"""Value of the function of a surface above which a point counts as inside, relative to SQUARE."""
+"""Value of a surface's function above which a point counts as inside, relative to `SURFACE.SQUARE`."""
 WAYS = 16
 """Largest number of combinations of directions past open surfaces."""
 NEARLY = 0.97
 """A path is dropped if this part of its length exceeds that of the shortest one."""
-MEANT = 0
-"""Stage of a search in which each surface is passed on its active side."""
-STRING = 1
-"""Stage in which starts on ellipsoids come from a tightened string."""
-ALONE = 2
-"""Stage in which the segment is bent around one surface only."""
+
+
+class SEARCH_STAGE(metaclass=Record):
+    """Stages of a search."""
+
+    MEANT = 0
+    """Each surface is passed on its active side."""
+    STRING = 1
+    """Starts on ellipsoids come from a tightened string."""
+    ALONE = 2
+    """The segment is bent around one surface only."""
+
+
 TURNS = 16
 """Largest number of changes of the list of surfaces in a search."""
 
@@ -142,12 +140,12 @@ def layout_slots(most: int, wraps: int, work: int) -> tuple[list[int], int]:
         work: length of the record without slots.
 
     Returns:
-        The integers CHAIN, BEST, SEARCH and POSES, and the length of the record.
+        The integers CHAIN, BEST, SEARCH and POSES of `GEODESIC_PATH`, and the length of the record.
     """
-    best = work + SLOT * (most + 2)
-    search = best + SLOT * (most + 2)
+    best = work + SLOT.SIZE * (most + 2)
+    search = best + SLOT.SIZE * (most + 2)
     poses = search + search_size(most)
-    return [work, best, search, poses], poses + POSE_NUMBERS * wraps
+    return [work, best, search, poses], poses + SURFACE_POSE.SIZE * wraps
 
 
 def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -166,28 +164,39 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     """
     place_points(model, reals, data, y, item)
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
-    result, points, size = at(data, i[ITEM.RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
-    order, work = at(result, ORDER), at(result, ORDER + size)
-    slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
+    result, points, size = (
+        at(data, i[ITEM.RECORD]),
+        i[PATH.POINTS],
+        i[PATH.POINTS] + 2 * i[PATH.WRAPS],
+    )
+    order, work = at(result, PATH_WORK.ORDER), at(result, PATH_WORK.ORDER + size)
+    slots = at(i, PATH.NODES_AT + NODE.SIZE * size + GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
     place_surfaces(model, data, i, p)
-    for k in range(1, int(result[COUNT])):
+    for k in range(1, int(result[PATH_WORK.COUNT])):
         mark_near_wraps(i, p, result, slots, int(order[k - 1]), int(order[k]))
     # Backwards, so that the nodes inserted for one segment do not move the segments still to come.
-    for k in range(int(result[COUNT]) - 2, -1, -1):
+    for k in range(int(result[PATH_WORK.COUNT]) - 2, -1, -1):
         count = bend_segment(i, p, result, int(order[k]), int(order[k + 1]))
         if count > 0:
-            for other in range(int(result[COUNT]) - 1, k, -1):
+            for other in range(int(result[PATH_WORK.COUNT]) - 1, k, -1):
                 order[other + 2 * count] = order[other]
-            result[COUNT] += 2.0 * count
+            result[PATH_WORK.COUNT] += 2.0 * count
         for number in range(count):
-            slot = at(result, slots[BEST] + SLOT * (number + 1))
-            node = points + 2 * int(slot[OWNER])
-            one, two = at(work, NODE_WORK * node), at(work, NODE_WORK * (node + 1))
-            store_vector(one, PLACE, vector(slot, GROUND_START + POINT))
-            store_vector(two, PLACE, vector(slot, GROUND_END + POINT))
+            slot = at(result, slots[GEODESIC_PATH.BEST] + SLOT.SIZE * (number + 1))
+            node = points + 2 * int(slot[SLOT.OWNER])
+            one, two = at(work, NODE_WORK.SIZE * node), at(work, NODE_WORK.SIZE * (node + 1))
+            store_vector(
+                one, NODE_WORK.PLACE, vector(slot, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT)
+            )
+            store_vector(
+                two, NODE_WORK.PLACE, vector(slot, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
+            )
             # The second tangent point carries the length on the surface before it.
-            one[SURFACE_LENGTH], two[SURFACE_LENGTH] = 0.0, slot[GEODESIC + ARC]
-            one[IS_KEPT] = two[IS_KEPT] = 0.0
+            one[NODE_WORK.SURFACE], two[NODE_WORK.SURFACE] = (
+                0.0,
+                slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC],
+            )
+            one[NODE_WORK.IS_KEPT] = two[NODE_WORK.IS_KEPT] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
     measure_points(model, data, y, item)
     return OUTCOME.OK
@@ -202,16 +211,32 @@ def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
         i: integers of the path.
         p: numbers of the path.
     """
-    size = i[POINTS] + 2 * i[WRAPS]
-    poses = at(data, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
-    for number in range(i[WRAPS]):
+    size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
+    poses = at(
+        data,
+        i[ITEM.RECORD]
+        + i[
+            PATH.NODES_AT
+            + NODE.SIZE * size
+            + GEODESIC_WRAP.SIZE * i[PATH.WRAPS]
+            + GEODESIC_PATH.POSES
+        ],
+    )
+    for number in range(i[PATH.WRAPS]):
         node, pose = (
-            at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)),
-            at(poses, POSE_NUMBERS * number),
+            at(i, PATH.NODES_AT + NODE.SIZE * (i[PATH.POINTS] + 2 * number)),
+            at(poses, SURFACE_POSE.SIZE * number),
         )
-        n = at(p, node[AT])
-        place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
-        pose[HOW] = NOT
+        n = at(p, node[NODE.AT])
+        place_frame(
+            model,
+            data,
+            node[NODE.LINK],
+            at(n, NODE_NUMBERS.TURN),
+            vector(n, NODE_NUMBERS.STATION),
+            pose,
+        )
+        pose[SURFACE_POSE.HOW] = BENDING.NOT
 
 
 def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
@@ -227,28 +252,35 @@ def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
     Returns:
         The number of surfaces, which are in the slots of the shortest path.
     """
-    size, near = i[POINTS] + 2 * i[WRAPS], 0
-    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(record, ORDER + size)
-    slots = at(wraps, WRAP_INTS * i[WRAPS])
-    chain, best, poses = at(record, slots[CHAIN]), at(record, slots[BEST]), at(record, slots[POSES])
-    for number in range(i[WRAPS]):
-        if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
+    size, near = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0
+    wraps, work = at(i, PATH.NODES_AT + NODE.SIZE * size), at(record, PATH_WORK.ORDER + size)
+    slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
+    chain, best, poses = (
+        at(record, slots[GEODESIC_PATH.CHAIN]),
+        at(record, slots[GEODESIC_PATH.BEST]),
+        at(record, slots[GEODESIC_PATH.POSES]),
+    )
+    for number in range(i[PATH.WRAPS]):
+        if (
+            wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.FIRST] == one
+            and poses[SURFACE_POSE.SIZE * number + SURFACE_POSE.HOW] != BENDING.NOT
+        ):
             near += 1
-    store_vector(chain, 0, vector(work, NODE_WORK * one + PLACE))
+    store_vector(chain, 0, vector(work, NODE_WORK.SIZE * one + NODE_WORK.PLACE))
     # `way` counts combinations of directions past open surfaces, as digits of a mixed radix.
-    most, least, way, stage = 0, inf, 0, MEANT
+    most, least, way, stage = 0, inf, 0, SEARCH_STAGE.MEANT
     while way < WAYS and near > 0:
-        store_vector(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
+        store_vector(chain, SLOT.SIZE, vector(work, NODE_WORK.SIZE * two + NODE_WORK.PLACE))
         count, step = fill_slots(i, p, record, one, two, near, way, stage, least)
         length = chain_length(chain, count) if count >= 0 else inf
         if length < least:
             most, least = count, length
-            for k in range(SLOT * (count + 1)):
+            for k in range(SLOT.SIZE * (count + 1)):
                 best[k] = chain[k]
         way += step
         # On an ellipsoid there may be no geodesic near the start, but a shortest one exists; where
         # surfaces intersect, no smooth path may exist, and one surface alone must do.
-        if way == WAYS and least == inf and stage < ALONE:
+        if way == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
             way, stage = 0, stage + 1
     return most
 
@@ -263,7 +295,7 @@ def chain_length(chain: Floats, count: int) -> float:
     length = norm(minus(line_end(chain, 0, count), line_start(chain, 1)))
     for k in range(1, count + 1):
         line = minus(line_end(chain, k, count), line_start(chain, k + 1))
-        length += chain[SLOT * k + GEODESIC + ARC] + norm(line)
+        length += chain[SLOT.SIZE * k + OBSTACLE_WORK.CURVE + GEODESIC.ARC] + norm(line)
     return length
 
 
@@ -288,23 +320,23 @@ def fill_slots(
         two: second point.
         near: number of surfaces that may bend the segment.
         way: number of the combination of directions.
-        stage: MEANT, STRING or ALONE.
+        stage: MEANT, STRING or ALONE of `SEARCH_STAGE`.
         least: length of the shortest path so far (m).
 
     Returns:
         The number of surfaces, -1 if there is no such path that is shorter; and the increment to the
         number of the next combination with another direction past a surface that was touched.
     """
-    size, count, step = i[POINTS] + 2 * i[WRAPS], 0, WAYS
-    work, wraps = at(record, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
-    slots = at(wraps, WRAP_INTS * i[WRAPS])
+    size, count, step = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0, WAYS
+    work, wraps = at(record, PATH_WORK.ORDER + size), at(i, PATH.NODES_AT + NODE.SIZE * size)
+    slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
     chain, room, poses = (
-        at(record, slots[CHAIN]),
-        at(record, slots[SEARCH]),
-        at(record, slots[POSES]),
+        at(record, slots[GEODESIC_PATH.CHAIN]),
+        at(record, slots[GEODESIC_PATH.SEARCH]),
+        at(record, slots[GEODESIC_PATH.POSES]),
     )
-    for number in range(i[WRAPS]):
-        store_vector(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
+    for number in range(i[PATH.WRAPS]):
+        store_vector(poses, SURFACE_POSE.SIZE * number + SURFACE_POSE.ABOUT, (0.0, 0.0, 0.0))
     # A surface that is passed in another direction needs the others in place before the chain is
     # smoothed.
     waits = False
@@ -312,26 +344,30 @@ def fill_slots(
         before = count
         # A geodesic that has shrunk to nothing does not touch.
         for k in range(count, 0, -1):
-            if not chain[SLOT * k + GEODESIC + ARC] > 0.0:
+            if not chain[SLOT.SIZE * k + OBSTACLE_WORK.CURVE + GEODESIC.ARC] > 0.0:
                 remove_slot(chain, count, k)
                 count -= 1
         # A surface that was removed may be inserted again once the rest is smooth.
         if count == before:
             number, place, axis = find_largest_turn(i, p, wraps, poses, one, chain, count, room)
-            if (place == 0 and not waits) or (count > 0 and stage == ALONE):
+            if (place == 0 and not waits) or (count > 0 and stage == SEARCH_STAGE.ALONE):
                 return count, step
             waits = False
             if place > 0:
                 numbers, pose = (
-                    at(p, wraps[WRAP_INTS * number + PLACES]),
-                    at(poses, POSE_NUMBERS * number),
+                    at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.PLACES]),
+                    at(poses, SURFACE_POSE.SIZE * number),
                 )
-                is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
-                if is_open and norm(vector(pose, ABOUT)) == 0.0:
+                is_open = (
+                    numbers[WRAP_NUMBERS.SIDE] == 0.0
+                    and numbers[WRAP_NUMBERS.SURFACE + SURFACE.KIND] != SURFACE_TYPE.TORUS
+                    and step > 1
+                )
+                if is_open and norm(vector(pose, SURFACE_POSE.ABOUT)) == 0.0:
                     # The direction past an open surface is chosen when it is first touched, and
                     # kept from then on.
                     a, b = node_in_surface(pose, work, one), node_in_surface(pose, work, two)
-                    ways = min(count_ways(at(numbers, SURFACE), a, b, near == 1), step)
+                    ways = min(count_ways(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near == 1), step)
                     if ways > 1:
                         step //= ways
                         which = way // step % ways
@@ -339,10 +375,12 @@ def fill_slots(
                         # even ones.
                         if which > 1:
                             axis = cross(axis, unit(minus(b, a)))
-                        store_vector(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
+                        store_vector(
+                            pose, SURFACE_POSE.ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis)
+                        )
                         # In other directions than the first, wait for further surfaces: alone, the
                         # segment might slide back.
-                        waits = which > 0 and stage < ALONE
+                        waits = which > 0 and stage < SEARCH_STAGE.ALONE
                 insert_slot(numbers, pose, chain, count, place, number)
                 if not lay_chain(numbers, pose, chain, count + 1, place, stage, room):
                     remove_slot(chain, count + 1, place)
@@ -369,38 +407,46 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
         one: first point.
         two: second point.
     """
-    size = i[POINTS] + 2 * i[WRAPS]
-    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(record, ORDER + size)
-    for number in range(i[WRAPS]):
+    size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
+    wraps, work = at(i, PATH.NODES_AT + NODE.SIZE * size), at(record, PATH_WORK.ORDER + size)
+    for number in range(i[PATH.WRAPS]):
         wrap_ints, pose = (
-            at(wraps, WRAP_INTS * number),
-            at(record, slots[POSES] + POSE_NUMBERS * number),
+            at(wraps, GEODESIC_WRAP.SIZE * number),
+            at(record, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * number),
         )
-        if wrap_ints[FIRST] == one:
-            numbers = at(p, wrap_ints[PLACES])
-            surface = at(numbers, SURFACE)
+        if wrap_ints[GEODESIC_WRAP.FIRST] == one:
+            numbers = at(p, wrap_ints[GEODESIC_WRAP.PLACES])
+            surface = at(numbers, WRAP_NUMBERS.SURFACE)
             # An end inside the surface makes OpenSim ignore it.
             inside, a, b = (
-                INSIDE * surface[SQUARE],
+                INSIDE * surface[SURFACE.SQUARE],
                 node_in_surface(pose, work, one),
                 node_in_surface(pose, work, two),
             )
             is_near = (
-                two <= wrap_ints[LAST]
+                two <= wrap_ints[GEODESIC_WRAP.LAST]
                 and surface_value(surface, a) <= inside
                 and surface_value(surface, b) <= inside
             )
-            pose[HOW] = AS_MEANT if is_near else NOT
+            pose[SURFACE_POSE.HOW] = BENDING.AS_MEANT if is_near else BENDING.NOT
             # Of several segments around one cylinder or torus, only the deepest must obey its side.
             if (
                 is_near
-                and wrap_ints[LAST] - wrap_ints[RANGE] > 1
-                and (numbers[SIDE] != 0.0 or surface[KIND] == TORUS)
+                and wrap_ints[GEODESIC_WRAP.LAST] - wrap_ints[GEODESIC_WRAP.RANGE] > 1
+                and (
+                    numbers[WRAP_NUMBERS.SIDE] != 0.0 or surface[SURFACE.KIND] == SURFACE_TYPE.TORUS
+                )
             ):
                 deepest = squared_depth(surface, a, b)
-                for k in range(1, int(record[COUNT])):
-                    before, after = int(record[ORDER + k - 1]), int(record[ORDER + k])
-                    others = wrap_ints[RANGE] <= before != one and after <= wrap_ints[LAST]
+                for k in range(1, int(record[PATH_WORK.COUNT])):
+                    before, after = (
+                        int(record[PATH_WORK.ORDER + k - 1]),
+                        int(record[PATH_WORK.ORDER + k]),
+                    )
+                    others = (
+                        wrap_ints[GEODESIC_WRAP.RANGE] <= before != one
+                        and after <= wrap_ints[GEODESIC_WRAP.LAST]
+                    )
                     if (
                         others
                         and squared_depth(
@@ -410,7 +456,7 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
                         )
                         < deepest
                     ):
-                        pose[HOW] = ANY_SIDE
+                        pose[SURFACE_POSE.HOW] = BENDING.ANY_SIDE
 
 
 def node_in_surface(pose: Floats, work: Floats, node: int) -> Vector:
@@ -421,7 +467,7 @@ def node_in_surface(pose: Floats, work: Floats, node: int) -> Vector:
         work: results of the nodes.
         node: number of the node.
     """
-    return point_in_surface(pose, vector(work, NODE_WORK * node + PLACE))
+    return point_in_surface(pose, vector(work, NODE_WORK.SIZE * node + NODE_WORK.PLACE))
 
 
 def find_slot(chain: Floats, count: int, number: int) -> int:
@@ -433,7 +479,7 @@ def find_slot(chain: Floats, count: int, number: int) -> int:
         number: number of the wrap.
     """
     for k in range(1, count + 1):
-        if chain[SLOT * k + OWNER] == number:
+        if chain[SLOT.SIZE * k + SLOT.OWNER] == number:
             return k
     return 0
 
@@ -446,8 +492,8 @@ def remove_slot(chain: Floats, count: int, place: int) -> None:
         count: number of slots in use.
         place: slot to remove.
     """
-    for k in range(SLOT * place, SLOT * (count + 1)):
-        chain[k] = chain[k + SLOT]
+    for k in range(SLOT.SIZE * place, SLOT.SIZE * (count + 1)):
+        chain[k] = chain[k + SLOT.SIZE]
 
 
 def find_largest_turn(
@@ -478,12 +524,25 @@ def find_largest_turn(
         The wrap, the slot after the line (0 if no wrap turns a line), and the axis of the turn.
     """
     result, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
-    for number in range(i[WRAPS]):
-        wrap_ints, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
-        if wrap_ints[FIRST] == one and pose[HOW] != NOT and find_slot(chain, count, number) == 0:
-            numbers, about = at(p, wrap_ints[PLACES]), vector(pose, ABOUT)
-            surface, before = at(numbers, SURFACE), WHOLE if numbers[SIDE] != 0.0 else 0.0
-            inside = INSIDE * surface[SQUARE]
+    for number in range(i[PATH.WRAPS]):
+        wrap_ints, pose = (
+            at(wraps, GEODESIC_WRAP.SIZE * number),
+            at(poses, SURFACE_POSE.SIZE * number),
+        )
+        if (
+            wrap_ints[GEODESIC_WRAP.FIRST] == one
+            and pose[SURFACE_POSE.HOW] != BENDING.NOT
+            and find_slot(chain, count, number) == 0
+        ):
+            numbers, about = (
+                at(p, wrap_ints[GEODESIC_WRAP.PLACES]),
+                vector(pose, SURFACE_POSE.ABOUT),
+            )
+            surface, before = (
+                at(numbers, WRAP_NUMBERS.SURFACE),
+                WHOLE if numbers[WRAP_NUMBERS.SIDE] != 0.0 else 0.0,
+            )
+            inside = INSIDE * surface[SURFACE.SQUARE]
             for k in range(count + 1):
                 a, b = (
                     point_in_surface(pose, line_start(chain, k + 1)),
@@ -491,13 +550,13 @@ def find_largest_turn(
                 )
                 if surface_value(surface, a) <= inside and surface_value(surface, b) <= inside:
                     turn, point, way, _ = start_on_surface(
-                        numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), work
+                        numbers, a, b, pose[SURFACE_POSE.HOW], (0.0, 0.0, 0.0), work
                     )
                     # The shorter way decides which line meets the surface, even if there is no
                     # other way.
                     if turn > TOUCH and norm(about) > 0.0:
                         other, there, onwards, _ = start_on_surface(
-                            numbers, a, b, pose[HOW], about, work
+                            numbers, a, b, pose[SURFACE_POSE.HOW], about, work
                         )
                         if other > TOUCH:
                             turn, point, way = other, there, onwards
@@ -519,15 +578,15 @@ def insert_slot(
         place: slot of the surface; those from there on move by one.
         number: number of the wrap.
     """
-    for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
-        chain[k] = chain[k - SLOT]
-    slot = at(chain, SLOT * place)
-    # STEP 0 selects the exact integration of geodesics.
-    slot[OWNER], slot[GEODESIC + STEP] = number, 0.0
-    for k in range(HOW):
-        slot[IN_GROUND + k] = pose[k]
-    for k in range(SURFACE_NUMBERS):
-        slot[OBSTACLE_WORK + k] = p[SURFACE + k]
+    for k in range(SLOT.SIZE * (count + 3) - 1, SLOT.SIZE * (place + 1) - 1, -1):
+        chain[k] = chain[k - SLOT.SIZE]
+    slot = at(chain, SLOT.SIZE * place)
+    # GEODESIC.STEP 0 selects the exact integration of geodesics.
+    slot[SLOT.OWNER], slot[OBSTACLE_WORK.CURVE + GEODESIC.STEP] = number, 0.0
+    for k in range(SURFACE_POSE.HOW):
+        slot[OBSTACLE_WORK.IN_GROUND + k] = pose[k]
+    for k in range(SURFACE.SIZE):
+        slot[OBSTACLE_WORK.SIZE + k] = p[WRAP_NUMBERS.SURFACE + k]
 
 
 def lay_chain(
@@ -541,7 +600,7 @@ def lay_chain(
         chain: slots; the geodesic of slot `k` is filled.
         count: number of slots in use.
         k: slot of the surface.
-        stage: MEANT, STRING or ALONE.
+        stage: MEANT, STRING or ALONE of `SEARCH_STAGE`.
         work: workspace of a search.
 
     Returns:
@@ -551,17 +610,24 @@ def lay_chain(
         point_in_surface(pose, line_start(chain, k)),
         point_in_surface(pose, line_end(chain, k, count)),
     )
-    about, slot = vector(pose, ABOUT), at(chain, SLOT * k)
+    about, slot = vector(pose, SURFACE_POSE.ABOUT), at(chain, SLOT.SIZE * k)
     turn, point, way, arc = start_on_surface(
-        p, first, second, PULLED if stage == STRING else pose[HOW], about, work
+        p,
+        first,
+        second,
+        BENDING.PULLED if stage == SEARCH_STAGE.STRING else pose[SURFACE_POSE.HOW],
+        about,
+        work,
     )
     if not (
         turn > TOUCH
-        and shoot_geodesic(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), work)
+        and shoot_geodesic(
+            at(slot, OBSTACLE_WORK.SIZE), point, way, arc, at(slot, OBSTACLE_WORK.CURVE), work
+        )
     ):
         return False
     # The axis follows the geodesic, so that later calls keep to this side of the surface.
     if norm(about) > 0.0:
-        store_vector(pose, ABOUT, cross(point, way))
+        store_vector(pose, SURFACE_POSE.ABOUT, cross(point, way))
     ends_to_ground(slot)
     return True

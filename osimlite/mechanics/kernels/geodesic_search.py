@@ -18,28 +18,14 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.mechanics.kernels.cable_paths import (
-    GEODESIC,
-    GROUND_END,
-    GROUND_START,
-    IN_GROUND,
     OBSTACLE_WORK,
     UNKNOWNS,
     differentiate_end,
     end_to_ground,
     shoot_again,
 )
-from osimlite.mechanics.kernels.cable_surfaces import (
-    ACROSS,
-    ACROSS_BENDS,
-    ALONG_BENDS,
-    ARC,
-    END,
-    GEODESIC_ROOM,
-    NORMAL,
-    POINT,
-    START,
-    SURFACE_NUMBERS,
-)
+from osimlite.mechanics.kernels.cable_surfaces import END_NUMBERS, GEODESIC, GEODESIC_ROOM, SURFACE
+from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.linear_algebra import (
     factor_size,
     factorise_equations,
@@ -48,13 +34,18 @@ from osimlite.mechanics.kernels.linear_algebra import (
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.vectors import Vector, cross, dot, minus, norm, times, vector
 
-OWNER = OBSTACLE_WORK + SURFACE_NUMBERS
-"""Index in a slot of the number of its wrap; before it are an obstacle's record and a surface."""
-SLOT = OWNER + 1
-"""Length of a slot.
 
-The first slot holds the start of the segment, and the one after those in use holds its end.
+class SLOT(metaclass=Record):
+    """Slot of a search."""
+
+    OWNER = OBSTACLE_WORK.SIZE + SURFACE.SIZE
+    """Number of the wrap; an obstacle's record and the numbers of a surface come before it."""
+    SIZE = OWNER + 1
+    """Length of a slot.
+
+    The first slot holds the start of the segment, and the one after those in use holds its end.
 """
+
 
 SMOOTH = 1e-12
 """Largest kink (rad) at which a search ends."""
@@ -84,8 +75,16 @@ def search_size(count: int) -> int:
 
 def ends_to_ground(slot: Floats) -> None:
     """Transform both ends of a geodesic to ground."""
-    end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + START), at(slot, GROUND_START))
-    end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + END), at(slot, GROUND_END))
+    end_to_ground(
+        at(slot, OBSTACLE_WORK.IN_GROUND),
+        at(slot, OBSTACLE_WORK.CURVE + GEODESIC.START),
+        at(slot, OBSTACLE_WORK.GROUND_START),
+    )
+    end_to_ground(
+        at(slot, OBSTACLE_WORK.IN_GROUND),
+        at(slot, OBSTACLE_WORK.CURVE + GEODESIC.END),
+        at(slot, OBSTACLE_WORK.GROUND_END),
+    )
 
 
 def line_start(chain: Floats, k: int) -> Vector:
@@ -95,7 +94,9 @@ def line_start(chain: Floats, k: int) -> Vector:
         chain: slots.
         k: number of the slot.
     """
-    return vector(chain, SLOT * (k - 1) + (GROUND_END + POINT if k > 1 else 0))
+    return vector(
+        chain, SLOT.SIZE * (k - 1) + (OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT if k > 1 else 0)
+    )
 
 
 def line_end(chain: Floats, k: int, count: int) -> Vector:
@@ -106,7 +107,10 @@ def line_end(chain: Floats, k: int, count: int) -> Vector:
         k: number of the slot.
         count: number of slots in use.
     """
-    return vector(chain, SLOT * (k + 1) + (GROUND_START + POINT if k < count else 0))
+    return vector(
+        chain,
+        SLOT.SIZE * (k + 1) + (OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT if k < count else 0),
+    )
 
 
 def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
@@ -144,16 +148,16 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
         step = 1.0
         for k in range(count):
             step = min(
-                step, accepted_part(at(chain, SLOT * (k + 1)), at(corrections, UNKNOWNS * k))
+                step, accepted_part(at(chain, SLOT.SIZE * (k + 1)), at(corrections, UNKNOWNS * k))
             )
         # A negative or undefined part cannot be taken; 0 reports a geodesic that vanishes.
         if not step > 0.0:
             return step == 0.0
         for k in range(count):
-            slot = at(chain, SLOT * (k + 1))
+            slot = at(chain, SLOT.SIZE * (k + 1))
             if not shoot_again(
-                at(slot, OBSTACLE_WORK),
-                at(slot, GEODESIC),
+                at(slot, OBSTACLE_WORK.SIZE),
+                at(slot, OBSTACLE_WORK.CURVE),
                 at(corrections, UNKNOWNS * k),
                 step,
                 work,
@@ -172,9 +176,9 @@ def accepted_part(slot: Floats, corrections: Floats) -> float:
         slot: slot; its length may be set to zero.
         corrections: corrections of its four variations; that of the length may be bounded.
     """
-    start, arc = at(slot, GROUND_START), slot[GEODESIC + ARC]
+    start, arc = at(slot, OBSTACLE_WORK.GROUND_START), slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
     # Rotation of the ends by displacements, estimated by the curvature at the start.
-    bends = max(abs(start[ALONG_BENDS]), abs(start[ACROSS_BENDS]))
+    bends = max(abs(start[END_NUMBERS.ALONG_BENDS]), abs(start[END_NUMBERS.ACROSS_BENDS]))
     turn = max(
         abs(corrections[2]),
         bends * max(abs(corrections[0]), abs(corrections[1]), abs(corrections[3])),
@@ -182,8 +186,8 @@ def accepted_part(slot: Floats, corrections: Floats) -> float:
     part = MOST_TURN / turn if turn > MOST_TURN else 1.0
     # Keep a part of the length, unless the geodesic is so short already that it may vanish.
     if not arc + part * corrections[3] > LEAST_PART * arc:
-        if arc + corrections[3] <= 0.0 and arc * abs(start[ALONG_BENDS]) < SHORT:
-            slot[GEODESIC + ARC] = part = 0.0
+        if arc + corrections[3] <= 0.0 and arc * abs(start[END_NUMBERS.ALONG_BENDS]) < SHORT:
+            slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC] = part = 0.0
         else:
             corrections[3] = (LEAST_PART - 1.0) * arc
     return part
@@ -225,12 +229,14 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
     for k in range(size * size):
         a[k] = 0.0
     for k in range(1, count + 1):
-        slot = at(chain, SLOT * k)
+        slot = at(chain, SLOT.SIZE * k)
         for side in range(2):
             end, sign, other = (
-                (GROUND_START, 1.0, k - 1) if side == 0 else (GROUND_END, -1.0, k + 1)
+                (OBSTACLE_WORK.GROUND_START, 1.0, k - 1)
+                if side == 0
+                else (OBSTACLE_WORK.GROUND_END, -1.0, k + 1)
             )
-            here = vector(slot, end + POINT)
+            here = vector(slot, end + END_NUMBERS.POINT)
             line = (
                 minus(here, line_start(chain, k))
                 if side == 0
@@ -239,7 +245,9 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
             # A kink is the component across over the length; very short lines are not divided by.
             distance = max(norm(line), NEAR)
             for across in range(2):
-                axis = vector(slot, end + (ACROSS if across == 1 else NORMAL))
+                axis = vector(
+                    slot, end + (END_NUMBERS.ACROSS if across == 1 else END_NUMBERS.NORMAL)
+                )
                 row = UNKNOWNS * (k - 1) + 2 * side + across
                 values[row] = -dot(line, axis)
                 most = max(most, abs(values[row]) / distance)
@@ -256,10 +264,10 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 # opposite effect.
                 if 0 < other <= count:
                     far, of = (
-                        GROUND_END if side == 0 else GROUND_START,
+                        OBSTACLE_WORK.GROUND_END if side == 0 else OBSTACLE_WORK.GROUND_START,
                         at(a, size * row + UNKNOWNS * (other - 1)),
                     )
                     differentiate_end(
-                        at(chain, SLOT * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of
+                        at(chain, SLOT.SIZE * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of
                     )
     return most

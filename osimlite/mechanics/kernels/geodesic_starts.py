@@ -22,21 +22,11 @@ from __future__ import annotations
 
 from math import atan2, cos, inf, pi, sin, sqrt
 
-from osimlite.mechanics.kernels.cable_surfaces import (
-    CYLINDER,
-    ELLIPSOID,
-    KIND,
-    RADIUS,
-    SPHERE,
-    SQUARE,
-    TORUS,
-    TUBE,
-    WEIGHTS,
-    surface_value,
-)
+from osimlite.mechanics.kernels.cable_surfaces import SURFACE, SURFACE_TYPE, surface_value
+from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.wrap_cylinder import closest_to_axis
-from osimlite.mechanics.kernels.wrapping import NONE, decide_wrapping, is_on_side
+from osimlite.mechanics.kernels.wrapping import WRAPPING, decide_wrapping, is_on_side
 from osimlite.mechanics.laws.vectors import (
     Vector,
     add_scaled,
@@ -54,14 +44,19 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-AXIS = 0
-"""Index in the numbers of a wrap of the axis of its active side."""
-SIDE = 1
-"""Index of the sign of its active side, 0.0 for the complete surface."""
-HALF_LENGTH = 2
-"""Index of half the length of a cylinder (m)."""
-SURFACE = 3
-"""Offset of the numbers of the surface, see `cable_surfaces`."""
+
+class WRAP_NUMBERS(metaclass=Record):
+    """Numbers of a wrap."""
+
+    AXIS = 0
+    """Axis of its active side."""
+    SIDE = 1
+    """Sign of its active side, 0.0 for the complete surface."""
+    HALF_LENGTH = 2
+    """Half the length of a cylinder (m)."""
+    SURFACE = 3
+    """Numbers of the surface, see `cable_surfaces`."""
+
 
 Start = tuple[float, Vector, Vector, float]
 """Start of a geodesic.
@@ -70,12 +65,19 @@ It consists of the angle by which the path turns on the surface, 0 or less if it
 point where it meets the surface; its direction there; and its length on the surface (m).
 """
 
-AS_MEANT = 1.0
-"""A surface bends a segment on its active side."""
-ANY_SIDE = 2.0
-"""A surface bends a segment on any side where the segment passes through it."""
-PULLED = 3.0
-"""An ellipsoid bends a segment where a tightened string comes to lie."""
+
+class BENDING(metaclass=Record):
+    """How a surface bends a segment."""
+
+    NOT = 0.0
+    """A surface does not bend the segment."""
+    AS_MEANT = 1.0
+    """A surface bends a segment on its active side."""
+    ANY_SIDE = 2.0
+    """A surface bends a segment on any side where the segment passes through it."""
+    PULLED = 3.0
+    """An ellipsoid bends a segment where a tightened string comes to lie."""
+
 
 LEAST = 1e-100
 """Smallest denominator, so that nothing is divided by zero."""
@@ -108,19 +110,30 @@ def start_on_surface(
         p: numbers of the wrap.
         first: start of the segment.
         second: end of the segment.
-        how: AS_MEANT, ANY_SIDE or PULLED.
+        how: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
         about: axis about which the segment turns around a surface without a side, by the right-hand
             rule; zeros for either direction.
         work: workspace of a string.
     """
-    axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
-    if surface[KIND] == TORUS:
-        return start_on_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
-    if surface[KIND] == CYLINDER:
-        is_held = how != ANY_SIDE and axis < 2
+    axis, side, surface = (
+        int(p[WRAP_NUMBERS.AXIS]),
+        p[WRAP_NUMBERS.SIDE],
+        at(p, WRAP_NUMBERS.SURFACE),
+    )
+    if surface[SURFACE.KIND] == SURFACE_TYPE.TORUS:
+        return start_on_torus(
+            surface[SURFACE.RADIUS], surface[SURFACE.TUBE], first, second, axis, side, how
+        )
+    if surface[SURFACE.KIND] == SURFACE_TYPE.CYLINDER:
+        is_held = how != BENDING.ANY_SIDE and axis < 2
         side_out = replace_component((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
         return start_on_cylinder(
-            surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2)
+            surface[SURFACE.RADIUS],
+            p[WRAP_NUMBERS.HALF_LENGTH],
+            first,
+            second,
+            side_out,
+            component(about, 2),
         )
     return start_on_ellipsoid(surface, first, second, axis, side, how, about, work)
 
@@ -139,10 +152,15 @@ def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
         is_alone: whether no other surface may bend the segment.
     """
     if not is_alone:
-        return 4 if p[KIND] == SPHERE and squared_depth(p, first, second) < NEAR_MIDDLE else 2
-    if p[KIND] != ELLIPSOID:
+        return (
+            4
+            if p[SURFACE.KIND] == SURFACE_TYPE.SPHERE
+            and squared_depth(p, first, second) < NEAR_MIDDLE
+            else 2
+        )
+    if p[SURFACE.KIND] != SURFACE_TYPE.ELLIPSOID:
         return 1
-    way, weights = minus(second, first), vector(p, WEIGHTS)
+    way, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
     part = -dot(multiply_elementwise(weights, first), way) / max(
         dot(multiply_elementwise(weights, way), way), LEAST
     )
@@ -164,15 +182,17 @@ def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
         first: start of the segment.
         second: end of the segment.
     """
-    if p[KIND] == TORUS:
-        return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
-    way, weights = minus(second, first), vector(p, WEIGHTS)
+    if p[SURFACE.KIND] == SURFACE_TYPE.TORUS:
+        return distance_from_ring(
+            nearest_to_ring(p[SURFACE.RADIUS], first, second), p[SURFACE.RADIUS]
+        )
+    way, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
     square = dot(multiply_elementwise(weights, way), way)
     # In scaled coordinates the surface is a unit sphere, and the nearest point is a projection.
     part = min(max(-dot(multiply_elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
     middle = add_scaled(first, part, way)
     return dot(multiply_elementwise(weights, middle), middle) / (
-        p[SQUARE] if p[KIND] != CYLINDER else 1.0
+        p[SURFACE.SQUARE] if p[SURFACE.KIND] != SURFACE_TYPE.CYLINDER else 1.0
     )
 
 
@@ -202,11 +222,11 @@ def start_on_cylinder(
         # decide.
         about == 0.0
         and (
-            NONE
+            WRAPPING.NONE
             if is_open and not crosses
             else decide_wrapping(*active, dot(side_out, closest) >= 0.0, crosses)
         )
-        == NONE
+        == WRAPPING.NONE
     ):
         return 0.0, first, second, 0.0
     # Angles are measured from the middle of the active side, or from the first end.
@@ -291,12 +311,12 @@ def start_on_ellipsoid(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        how: AS_MEANT, ANY_SIDE or PULLED.
+        how: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
         about: axis about which the segment turns, zeros for either direction.
         work: workspace of a string; filled with beads.
     """
-    weights = vector(p, WEIGHTS)
-    wx, wy, wz = times(1.0 / p[SQUARE], weights)
+    weights = vector(p, SURFACE.WEIGHTS)
+    wx, wy, wz = times(1.0 / p[SURFACE.SQUARE], weights)
     scale = sx, sy, sz = sqrt(wx), sqrt(wy), sqrt(wz)
     radii = 1.0 / sx, 1.0 / sy, 1.0 / sz
     one, two = multiply_elementwise(scale, first), multiply_elementwise(scale, second)
@@ -309,7 +329,7 @@ def start_on_ellipsoid(
     out = middle
     # On a sphere the nearest point of the line points out of it; on an ellipsoid the least deep
     # direction must be searched.
-    if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
+    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID or norm(cross(middle, way)) < LEAST:
         # Of two opposite directions both start at the narrow side.
         out = way_out(
             radii,
@@ -323,7 +343,7 @@ def start_on_ellipsoid(
         )
         # Perpendicular to the least deep direction: another surface may make that the shortest.
         other = cross(multiply_elementwise(radii, way), about)
-        if p[KIND] == SPHERE and dot(unit(other), unit(out)) < ASIDE:
+        if p[SURFACE.KIND] == SURFACE_TYPE.SPHERE and dot(unit(other), unit(out)) < ASIDE:
             out = other
     if side != 0.0 and not is_on_side(out, axis, side):
         # Towards the mirror image, which itself is near no geodesic.
@@ -336,7 +356,7 @@ def start_on_ellipsoid(
     is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
         side == 0.0 or dot(out, middle) > 0.0
     )
-    if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
+    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or how == BENDING.PULLED):
         result = start_on_string(p, turn, first, second, work)
     return result
 
@@ -474,7 +494,7 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
                 )
                 if surface_value(p, bead) > 0.0:
                     for _ in range(2):
-                        out = multiply_elementwise(vector(p, WEIGHTS), bead)
+                        out = multiply_elementwise(vector(p, SURFACE.WEIGHTS), bead)
                         bead = add_scaled(bead, 0.5 * surface_value(p, bead) / dot(out, out), out)
                     # In the last sweep note the first and last bead that touch.
                     if stride == 1 and pull == PULLS:
@@ -524,7 +544,7 @@ def start_on_torus(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        how: AS_MEANT or ANY_SIDE.
+        how: AS_MEANT or ANY_SIDE of `BENDING`.
     """
     x, y, _ = near = nearest_to_ring(ring, first, second)
     if side != 0.0 and not is_on_side(near, axis, side):
@@ -542,7 +562,7 @@ def start_on_torus(
         inf,
         one,
         two,
-        (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0),
+        (0.0 if how == BENDING.ANY_SIDE else 1.0, 0.0, 0.0),
         0.0,
     )
     return (

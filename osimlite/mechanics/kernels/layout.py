@@ -387,10 +387,15 @@ class JOINT_KIND(metaclass=Record):
 
 
 # Records of floats in `reals` and `data`.
-GRAVITY_AT = 0
-"""Offset in reals of gravity in ground (3,), m/s²."""
-INERTIA_AT = 3
-"""Offset in reals of the inertias of the links, see `INERTIA`."""
+
+
+class REALS(metaclass=Record):
+    """Start of reals."""
+
+    GRAVITY = 0
+    """Gravity in ground (3,), m/s²."""
+    INERTIA = 3
+    """Inertias of the links, see `INERTIA`."""
 
 
 class INERTIA(metaclass=Record):

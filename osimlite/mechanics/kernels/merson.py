@@ -11,10 +11,7 @@ from math import inf
 
 from osimlite.mechanics.kernels.error_control import (
     ERRORS,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    MEMORY,
-    REACHED,
+    METHOD_WORK,
     judge_step,
     project_and_measure,
     step_end,
@@ -22,7 +19,7 @@ from osimlite.mechanics.kernels.error_control import (
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 
-HEAD = MEMORY + 1
+HEAD = METHOD_WORK.MEMORY + 1
 """Length of the head of the method's record, see `error_control`."""
 STATES = 3
 """Number of states of workspace after it."""
@@ -51,8 +48,8 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
         at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]),
         at(h, HEAD),
     )
-    t0, t1 = h[REACHED], step_end(h)
-    h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
+    t0, t1 = h[METHOD_WORK.REACHED], step_end(h)
+    h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
     if compute_stages(model, reals, data, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
         error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 0)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from osimlite.mechanics.kernels.layout import (
     FIXED,
-    GRAVITY_AT,
     ITEM,
     LINK,
     LINK_WORK,
@@ -18,6 +17,7 @@ from osimlite.mechanics.kernels.layout import (
     OPERATION,
     OPERATION_WORK,
     OUTCOME,
+    REALS,
     TRANSFORM,
     WORK,
 )
@@ -182,7 +182,7 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
             ZERO,
             ZERO,
             ZERO,
-            times(-1.0, vector(reals, GRAVITY_AT)),
+            times(-1.0, vector(reals, REALS.GRAVITY)),
         )
         if i[LINK.PARENT] >= 0:
             parent = link_work(model, data, i[LINK.PARENT])

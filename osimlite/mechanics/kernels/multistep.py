@@ -23,45 +23,52 @@ from osimlite.mechanics.kernels.condensation import (
     solve_condensed,
 )
 from osimlite.mechanics.kernels.error_control import (
-    ACCEPTED,
     ERRORS,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    LAST_TIME,
-    MEMORY,
-    NEXT_STEP,
-    REACHED,
+    METHOD_WORK,
     error_norm,
     project_and_measure,
 )
-from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, is_finite
 
-ORDER = MEMORY
-"""Index in the method's record of its order, 0 before the first step."""
-STEP = MEMORY + 1
-"""Index of the step (s)."""
-EQUAL = MEMORY + 2
-"""Index of the number of equal steps since the last change."""
-CONDENSED = MEMORY + 3
-"""Index of the coefficient c of the factorised linear equations, 0 if there are none."""
-AGE = MEMORY + 4
-"""Index of the number of steps for which the derivatives have been used, 0 if there are none."""
-REFUSED = MEMORY + 5
-"""Index of the number of consecutive rejected steps."""
-MATRICES = MEMORY + 6
-"""Offset of three matrices (8, 8) that change the step, and of a column (8,)."""
+
+class MULTISTEP_WORK(metaclass=Record):
+    """Memory of the methods in their record, see `METHOD_WORK`."""
+
+    ORDER = METHOD_WORK.MEMORY
+    """Order, 0 before the first step."""
+    STEP = METHOD_WORK.MEMORY + 1
+    """Step (s)."""
+    EQUAL = METHOD_WORK.MEMORY + 2
+    """Number of equal steps since the last change."""
+    CONDENSED = METHOD_WORK.MEMORY + 3
+    """Coefficient c of the factorised linear equations, 0 if there are none."""
+    AGE = METHOD_WORK.MEMORY + 4
+    """Number of steps for which the derivatives have been used, 0 if there are none."""
+    REFUSED = METHOD_WORK.MEMORY + 5
+    """Number of consecutive rejected steps."""
+    MATRICES = METHOD_WORK.MEMORY + 6
+    """Three matrices (8, 8) that change the step, and a column (8,)."""
+
+
 WIDTH = 8
 """Number of coefficients per method, and size of the matrices."""
-HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
+HEAD = MULTISTEP_WORK.MATRICES + 3 * WIDTH * WIDTH + WIDTH
 """Length of the head of the method's record, see `error_control`."""
 
 IS_IMPLICIT = True
 """Whether the method needs derivatives of the forces."""
-BDF = 0
-"""Number of the numerical differentiation formulas."""
-ADAMS = 1
-"""Number of the Adams-Moulton formulas."""
+
+
+class FORMULAS(metaclass=Record):
+    """Families of formulas."""
+
+    BDF = 0
+    """Numerical differentiation formulas."""
+    ADAMS = 1
+    """Adams-Moulton formulas."""
+
+
 MOST_ORDER = 5, 7
 """Highest order index of each method."""
 ROWS = max(MOST_ORDER) + 3
@@ -129,7 +136,7 @@ def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place:
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
-    return try_multistep(model, reals, data, y0, y1, place, BDF)
+    return try_multistep(model, reals, data, y0, y1, place, FORMULAS.BDF)
 
 
 def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
@@ -146,7 +153,7 @@ def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, plac
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
-    return try_multistep(model, reals, data, y0, y1, place, ADAMS)
+    return try_multistep(model, reals, data, y0, y1, place, FORMULAS.ADAMS)
 
 
 def try_multistep(
@@ -163,7 +170,7 @@ def try_multistep(
         y0: state at the start, then its derivative.
         y1: filled with the state at the end, then its derivative.
         place: offset of the method's record in data.
-        method: BDF or ADAMS.
+        method: BDF or ADAMS of `FORMULAS`.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
@@ -176,34 +183,40 @@ def try_multistep(
         at(rows, (ROWS + 1) * size),
         at(data, model[MODEL.WORK_STATE] + ERRORS * size),
     )
-    h[EVALUATED], h[HAS_DERIVATIVE] = 0.0, 1.0
-    if h[ORDER] == 0.0:
+    h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 0.0, 1.0
+    if h[MULTISTEP_WORK.ORDER] == 0.0:
         start_history(model, h, y0, rows)
-    t0, accuracy, order = h[REACHED], h[ACCEPTED], int(h[ORDER])
-    t1 = t0 + h[STEP]
+    t0, accuracy, order = (
+        h[METHOD_WORK.REACHED],
+        h[METHOD_WORK.ACCEPTED],
+        int(h[MULTISTEP_WORK.ORDER]),
+    )
+    t1 = t0 + h[MULTISTEP_WORK.STEP]
     # A step that almost reaches the limit is stretched or cut to it.
-    if h[LAST_TIME] <= t0 + 1.001 * h[STEP]:
-        t1 = h[LAST_TIME]
-        rescale_differences(size, method, h, rows, (t1 - t0) / h[STEP])
+    if h[METHOD_WORK.LAST_TIME] <= t0 + 1.001 * h[MULTISTEP_WORK.STEP]:
+        t1 = h[METHOD_WORK.LAST_TIME]
+        rescale_differences(size, method, h, rows, (t1 - t0) / h[MULTISTEP_WORK.STEP])
     constants = WIDTH * method + order
-    c = h[STEP] / ALPHA[constants]
+    c = h[MULTISTEP_WORK.STEP] / ALPHA[constants]
     iterations, is_new = 0, False
     while True:
         predict_state(size, method, order, rows, y1, psi)
         # Derivatives are kept over several steps: the iteration converges as long as they are
         # roughly right.
-        if h[AGE] <= 0.0 or h[AGE] > RENEWED:
+        if h[MULTISTEP_WORK.AGE] <= 0.0 or h[MULTISTEP_WORK.AGE] > RENEWED:
             data[WORK.TIME] = t1
             is_new = linearise_state(model, reals, data, y1, at(y1, size), work, 0.0) == OUTCOME.OK
-            h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
+            h[MULTISTEP_WORK.AGE], h[MULTISTEP_WORK.CONDENSED] = 1.0 if is_new else 0.0, 0.0
         # The factorization depends on the coefficient c, which changes with step and order.
-        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense_system(model, c, work)):
-            h[CONDENSED] = c
+        if h[MULTISTEP_WORK.AGE] > 0.0 and (
+            h[MULTISTEP_WORK.CONDENSED] == c or condense_system(model, c, work)
+        ):
+            h[MULTISTEP_WORK.CONDENSED] = c
             iterations = iterate_newton(model, reals, data, t1, c, y0, y1, d, psi, errors, work, h)
         # Without convergence, repeat once with new derivatives.
-        if iterations > 0 or is_new or h[AGE] <= 0.0:
+        if iterations > 0 or is_new or h[MULTISTEP_WORK.AGE] <= 0.0:
             break
-        h[AGE] = 0.0
+        h[MULTISTEP_WORK.AGE] = 0.0
     error = inf
     if iterations > 0:
         # The error is a multiple of the newest difference.
@@ -213,14 +226,14 @@ def try_multistep(
     if not error <= accuracy:
         shorten_step(size, method, h, rows, error / accuracy)
         return OUTCOME.OK
-    h[AGE] += 1.0
-    h[REFUSED] = 0.0
-    h[REACHED] = t1
+    h[MULTISTEP_WORK.AGE] += 1.0
+    h[MULTISTEP_WORK.REFUSED] = 0.0
+    h[METHOD_WORK.REACHED] = t1
     # The derivative follows from the formula, without another evaluation.
     for k in range(size):
         y1[size + k] = (psi[k] + d[k]) / c
         newest = DIFFERENCE[constants] * d[k]
-        if method == BDF:
+        if method == FORMULAS.BDF:
             # Use differences of the projected states; their derivatives are not projected.
             newest = y1[k]
             for i in range(order + 1):
@@ -231,10 +244,10 @@ def try_multistep(
         for i in range(order, 0, -1):
             rows[size * i + k] += rows[size * (i + 1) + k]
         rows[k] = y1[k]
-    h[EQUAL] += 1.0
+    h[MULTISTEP_WORK.EQUAL] += 1.0
     # A change of order or step needs order + 1 equal steps before it, for a reliable error
     # estimate.
-    if h[EQUAL] > order:
+    if h[MULTISTEP_WORK.EQUAL] > order:
         choose_order(
             model,
             method,
@@ -245,7 +258,7 @@ def try_multistep(
             error,
             SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations),
         )
-    h[NEXT_STEP] = h[STEP]
+    h[METHOD_WORK.NEXT_STEP] = h[MULTISTEP_WORK.STEP]
     return OUTCOME.OK
 
 
@@ -261,11 +274,18 @@ def start_history(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
     size = model[MODEL.STATE_SIZE]
     speed = error_norm(model, y0, at(y0, size), h, 1)
     # A step whose change of the state is a tenth of the square root of the accuracy.
-    h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
-    h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
+    h[MULTISTEP_WORK.STEP] = min(
+        h[METHOD_WORK.NEXT_STEP], 0.1 * sqrt(h[METHOD_WORK.ACCEPTED]) / max(speed, 1.0)
+    )
+    (
+        h[MULTISTEP_WORK.ORDER],
+        h[MULTISTEP_WORK.EQUAL],
+        h[MULTISTEP_WORK.AGE],
+        h[MULTISTEP_WORK.REFUSED],
+    ) = 1.0, 0.0, 0.0, 0.0
     for k in range(size):
         rows[k] = y0[k]
-        rows[size + k] = h[STEP] * y0[size + k]
+        rows[size + k] = h[MULTISTEP_WORK.STEP] * y0[size + k]
         for i in range(2, ROWS):
             rows[size * i + k] = 0.0
 
@@ -275,7 +295,7 @@ def predict_state(size: int, method: int, order: int, rows: Floats, y: Floats, p
 
     Args:
         size: length of a state.
-        method: BDF or ADAMS.
+        method: BDF or ADAMS of `FORMULAS`.
         order: order index of the formula.
         rows: differences.
         y: filled with the prediction.
@@ -332,7 +352,7 @@ def iterate_newton(
     for k in range(size):
         d[k] = 0.0
     for iteration in range(ITERATIONS):
-        h[EVALUATED] += 1.0
+        h[METHOD_WORK.EVALUATED] += 1.0
         data[WORK.TIME] = t
         if call(
             model[MODEL.LAWS], model, reals, data, y1, f1, STAGE.ACCELERATION
@@ -347,7 +367,7 @@ def iterate_newton(
             y1[k] += change[k]
             d[k] += change[k]
         # A tiny residual before the correction makes a second iteration unnecessary.
-        if residual <= SOLVED * h[ACCEPTED]:
+        if residual <= SOLVED * h[METHOD_WORK.ACCEPTED]:
             return iteration + 1
         # With outdated, too large derivatives all steps are short: check the residuals too.
         if iteration > 0:
@@ -355,7 +375,7 @@ def iterate_newton(
                 return 0
             rate = max(residual / previous_residual, length / previous_length)
             # Error of the iteration if it continues to converge at this rate.
-            if rate / (1.0 - rate) * length <= CONVERGED * h[ACCEPTED]:
+            if rate / (1.0 - rate) * length <= CONVERGED * h[METHOD_WORK.ACCEPTED]:
                 return iteration + 1
         previous_residual, previous_length = residual, length
     return 0
@@ -366,20 +386,20 @@ def shorten_step(size: int, method: int, h: Floats, rows: Floats, excess: float)
 
     Args:
         size: length of a state.
-        method: BDF or ADAMS.
+        method: BDF or ADAMS of `FORMULAS`.
         h: record of the method.
         rows: differences.
         excess: error over accuracy, infinite if there was no solution.
     """
-    h[REFUSED] += 1.0
-    h[EQUAL] = 0.0
+    h[MULTISTEP_WORK.REFUSED] += 1.0
+    h[MULTISTEP_WORK.EQUAL] = 0.0
     # After several rejections the history describes another motion, as before a contact: restart.
-    if h[REFUSED] > PATIENCE:
-        h[NEXT_STEP], h[ORDER] = SHRINK * h[STEP], 0.0
+    if h[MULTISTEP_WORK.REFUSED] > PATIENCE:
+        h[METHOD_WORK.NEXT_STEP], h[MULTISTEP_WORK.ORDER] = SHRINK * h[MULTISTEP_WORK.STEP], 0.0
         return
-    factor = SAFETY * excess ** (-1.0 / (h[ORDER] + 1.0)) if excess < inf else 0.25
+    factor = SAFETY * excess ** (-1.0 / (h[MULTISTEP_WORK.ORDER] + 1.0)) if excess < inf else 0.25
     rescale_differences(size, method, h, rows, min(max(factor, SHRINK), SAFETY))
-    h[NEXT_STEP] = h[STEP]
+    h[METHOD_WORK.NEXT_STEP] = h[MULTISTEP_WORK.STEP]
 
 
 def choose_order(
@@ -396,7 +416,7 @@ def choose_order(
 
     Args:
         model: integers of the model.
-        method: BDF or ADAMS.
+        method: BDF or ADAMS of `FORMULAS`.
         h: record of the method.
         y0: state at the start of the last step.
         rows: differences.
@@ -404,7 +424,11 @@ def choose_order(
         error: norm of the error of the last step.
         safety: ratio of the step to the one that would just meet the accuracy.
     """
-    size, order, accuracy = model[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
+    size, order, accuracy = (
+        model[MODEL.STATE_SIZE],
+        int(h[MULTISTEP_WORK.ORDER]),
+        h[METHOD_WORK.ACCEPTED],
+    )
     best, factor = order, step_factor(error / accuracy, order)
     # Compare the steps that each neighbouring order allows.
     for other in (order - 1, order + 1):
@@ -417,7 +441,7 @@ def choose_order(
             best, factor = other, result
     factor = min(safety * factor, GROW)
     if factor >= WORTH or factor < 1.0:
-        h[ORDER], h[EQUAL] = float(best), 0.0
+        h[MULTISTEP_WORK.ORDER], h[MULTISTEP_WORK.EQUAL] = float(best), 0.0
         rescale_differences(size, method, h, rows, max(factor, SHRINK))
 
 
@@ -438,18 +462,18 @@ def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor:
 
     Args:
         size: length of a state.
-        method: BDF or ADAMS.
+        method: BDF or ADAMS of `FORMULAS`.
         h: record of the method; the step is changed.
         rows: differences; changed.
         factor: ratio of the new step to the old one.
     """
     # Adams' differences are those of h f, and follow the state.
-    order, differing = int(h[ORDER]) - method, at(rows, size * method)
-    scale = factor if method == ADAMS else 1.0
+    order, differing = int(h[MULTISTEP_WORK.ORDER]) - method, at(rows, size * method)
+    scale = factor if method == FORMULAS.ADAMS else 1.0
     new, unit, both = (
-        at(h, MATRICES),
-        at(h, MATRICES + WIDTH * WIDTH),
-        at(h, MATRICES + 2 * WIDTH * WIDTH),
+        at(h, MULTISTEP_WORK.MATRICES),
+        at(h, MULTISTEP_WORK.MATRICES + WIDTH * WIDTH),
+        at(h, MULTISTEP_WORK.MATRICES + 2 * WIDTH * WIDTH),
     )
     column = at(both, WIDTH * WIDTH)
     fill_difference_matrix(order, factor, new)
@@ -466,8 +490,8 @@ def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor:
             column[i] = differing[size * i + k]
         for i in range(order + 1):
             differing[size * i + k] = dot_range(0, order + 1, at(both, WIDTH * i), column)
-    h[STEP] *= factor
-    h[EQUAL] = 0.0
+    h[MULTISTEP_WORK.STEP] *= factor
+    h[MULTISTEP_WORK.EQUAL] = 0.0
 
 
 def fill_difference_matrix(order: int, factor: float, matrix: Floats) -> None:

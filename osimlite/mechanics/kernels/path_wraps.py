@@ -14,46 +14,21 @@ from __future__ import annotations
 
 from math import inf, nan
 
-from osimlite.mechanics.kernels.layout import ITEM, OUTCOME
+from osimlite.mechanics.kernels.layout import ITEM, OUTCOME, Record
 from osimlite.mechanics.kernels.paths import (
-    AT,
-    COUNT,
-    IS_KEPT,
-    KIND,
-    LENGTH,
-    LINK,
-    NODE_INTS,
+    NODE,
+    NODE_NUMBERS,
+    NODE_TYPE,
     NODE_WORK,
-    NODES_AT,
-    OF,
-    ORDER,
-    PLACE,
-    POINTS,
-    SPEED,
-    STATION,
-    SURFACE,
-    TANGENT,
-    TURN,
-    WRAPS,
+    PATH,
+    PATH_WORK,
     line_end,
     measure_points,
     place_points,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import place_frame
-from osimlite.mechanics.kernels.wrapping import (
-    ENDS,
-    FIRST_END,
-    FIRST_TANGENT,
-    INSIDE,
-    MANDATORY,
-    NONE,
-    ROOM,
-    SECOND_END,
-    SECOND_TANGENT,
-    SURFACE_LENGTH,
-    WRAPPED,
-)
+from osimlite.mechanics.kernels.wrapping import WRAP_WORK, WRAPPING
 from osimlite.mechanics.laws.vectors import (
     Vector,
     minus,
@@ -65,32 +40,35 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-WRAP_INTS = 3
-"""Number of integers of a wrap; wraps follow the nodes."""
-BACK = 0
-"""Index in a wrap of the distance back to the item of its surface, 0 if it is not active."""
-FIRST = 1
-"""Index of the first point of its range."""
-LAST = 2
-"""Index of the last point of its range."""
+
+class PATH_WRAP(metaclass=Record):
+    """Integers of a wrap; wraps follow the nodes."""
+
+    BACK = 0
+    """Distance back to the item of its surface, 0 if it is not active."""
+    FIRST = 1
+    """First point of its range."""
+    LAST = 2
+    """Last point of its range."""
+    SIZE = 3
+    """Number of integers of a wrap; wraps follow the nodes."""
+
 
 ROUNDS = 8
 """Largest number of rounds."""
 STILL = 0.0005
 """Change of the length (m) below which no further round follows."""
 
-NOWHERE = -2
-"""Result of a wrap whose range contains no active point; OpenSim then leaves the path as it is."""
 
-BEYOND = -3
-"""Result of a wrap whose range ends beyond the path; OpenSim then fails."""
+class SURFACE_WORK(metaclass=Record):
+    """Record of a surface behind that of its law, see `WRAP_WORK`."""
 
-POSE = ENDS
-"""Offset in the record of a surface of its pose in ground: rotation by rows, then origin."""
-BEST = ENDS + 12
-"""Offset of the results of its law for the segment that is bent, from FIRST_TANGENT on."""
-SURFACE_WORK = BEST + ROOM - FIRST_TANGENT
-"""Length of the record of a surface."""
+    POSE = WRAP_WORK.END
+    """Pose in ground: rotation by rows, then origin."""
+    BEST = WRAP_WORK.END + 12
+    """Results of its law for the segment that is bent, from WRAP_WORK.FIRST_TANGENT on."""
+    SIZE = BEST + WRAP_WORK.ROOM - WRAP_WORK.FIRST_TANGENT
+    """Length of the record of a surface."""
 
 
 def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -109,20 +87,20 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     """
     place_points(model, reals, data, y, item)
     place_surfaces(model, reals, data, item)
-    wraps, length, exchanged = model[item + WRAPS], inf, False
+    wraps, length, exchanged = model[item + PATH.WRAPS], inf, False
     # A single surface does not depend on others, so that one round is enough.
     for turn in range(ROUNDS if wraps > 1 else 1):
-        first = second = NONE
+        first = second = WRAPPING.NONE
         for k in range(wraps):
             result = wrap_surface(
                 model, reals, data, y, f, item, 1 - k if exchanged and k < 2 else k
             )
-            if result == NOWHERE:
+            if result == WRAPPING.NOWHERE:
                 measure_points(model, data, y, item)
                 return OUTCOME.OK
-            if result == BEYOND:
+            if result == WRAPPING.BEYOND:
                 record = at(data, model[item + ITEM.RECORD])
-                record[LENGTH] = record[SPEED] = nan
+                record[PATH_WORK.LENGTH] = record[PATH_WORK.SPEED] = nan
                 return OUTCOME.UNSOLVED
             if k == 0:
                 first = result
@@ -133,7 +111,7 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
             break
         # OpenSim exchanges the first two wraps if the first does not wrap and the second fails in
         # the first round.
-        if turn == 0 and wraps > 1 and first == NONE and second == INSIDE:
+        if turn == 0 and wraps > 1 and first == WRAPPING.NONE and second == WRAPPING.INSIDE:
             exchanged = True
             remove_tangents(model, data, item, 0)
     return OUTCOME.OK
@@ -150,20 +128,29 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
     """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     nodes, work = (
-        i[POINTS] + 2 * i[WRAPS],
-        at(data, i[ITEM.RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS]),
+        i[PATH.POINTS] + 2 * i[PATH.WRAPS],
+        at(data, i[ITEM.RECORD] + PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
     )
-    for k in range(i[WRAPS]):
-        number = i[POINTS] + 2 * k
-        at(work, NODE_WORK * number)[IS_KEPT] = at(work, NODE_WORK * (number + 1))[IS_KEPT] = 0.0
-        back = i[NODES_AT + NODE_INTS * nodes + WRAP_INTS * k + BACK]
+    for k in range(i[PATH.WRAPS]):
+        number = i[PATH.POINTS] + 2 * k
+        at(work, NODE_WORK.SIZE * number)[NODE_WORK.IS_KEPT] = at(
+            work, NODE_WORK.SIZE * (number + 1)
+        )[NODE_WORK.IS_KEPT] = 0.0
+        back = i[PATH.NODES_AT + NODE.SIZE * nodes + PATH_WRAP.SIZE * k + PATH_WRAP.BACK]
         if back > 0:
             node, pose = (
-                at(i, NODES_AT + NODE_INTS * number),
-                at(data, model[item - back + ITEM.RECORD] + POSE),
+                at(i, PATH.NODES_AT + NODE.SIZE * number),
+                at(data, model[item - back + ITEM.RECORD] + SURFACE_WORK.POSE),
             )
-            n = at(p, node[AT])
-            place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
+            n = at(p, node[NODE.AT])
+            place_frame(
+                model,
+                data,
+                node[NODE.LINK],
+                at(n, NODE_NUMBERS.TURN),
+                vector(n, NODE_NUMBERS.STATION),
+                pose,
+            )
 
 
 def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
@@ -176,14 +163,18 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
         number: number of the wrap.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
+    order, count, first = (
+        at(result, PATH_WORK.ORDER),
+        int(result[PATH_WORK.COUNT]),
+        i[PATH.POINTS] + 2 * number,
+    )
     # Tangent points have the numbers behind those of the points.
     kept = 0
     for k in range(count):
         if not first <= order[k] <= first + 1:
             order[kept] = order[k]
             kept += 1
-    result[COUNT] = kept
+    result[PATH_WORK.COUNT] = kept
 
 
 def wrap_surface(
@@ -201,66 +192,94 @@ def wrap_surface(
         number: number of the wrap.
 
     Returns:
-        Result of the last segment that was tried, NOWHERE or BEYOND.
+        Result of the last segment that was tried, NOWHERE or BEYOND of `WRAPPING`.
     """
     remove_tangents(model, data, item, number)
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    points, count = i[POINTS], int(result[COUNT])
-    size = points + 2 * i[WRAPS]
-    nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + size)
-    wrap_ints, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
-    if wrap_ints[BACK] == 0:
-        return NONE
+    points, count = i[PATH.POINTS], int(result[PATH_WORK.COUNT])
+    size = points + 2 * i[PATH.WRAPS]
+    nodes, order, work = (
+        at(i, PATH.NODES_AT),
+        at(result, PATH_WORK.ORDER),
+        at(result, PATH_WORK.ORDER + size),
+    )
+    wrap_ints, tangent = at(nodes, NODE.SIZE * size + PATH_WRAP.SIZE * number), points + 2 * number
+    if wrap_ints[PATH_WRAP.BACK] == 0:
+        return WRAPPING.NONE
     # The range of the PathWrap names a point that the path does not have.
-    if wrap_ints[FIRST] <= wrap_ints[LAST] and wrap_ints[LAST] >= points:
-        return BEYOND
-    surface = item - wrap_ints[BACK]
+    if (
+        wrap_ints[PATH_WRAP.FIRST] <= wrap_ints[PATH_WRAP.LAST]
+        and wrap_ints[PATH_WRAP.LAST] >= points
+    ):
+        return WRAPPING.BEYOND
+    surface = item - wrap_ints[PATH_WRAP.BACK]
     e = at(data, model[surface + ITEM.RECORD])
     begin = end = -1
     for k in range(count):
-        if wrap_ints[FIRST] <= order[k] <= wrap_ints[LAST] and order[k] < points:
+        if (
+            wrap_ints[PATH_WRAP.FIRST] <= order[k] <= wrap_ints[PATH_WRAP.LAST]
+            and order[k] < points
+        ):
             begin, end = k if begin < 0 else begin, k
     if begin < 0:
-        return NOWHERE
-    code, best, least = NONE, -1, inf
-    one, two = at(work, NODE_WORK * tangent), at(work, NODE_WORK * (tangent + 1))
+        return WRAPPING.NOWHERE
+    code, best, least = WRAPPING.NONE, -1, inf
+    one, two = at(work, NODE_WORK.SIZE * tangent), at(work, NODE_WORK.SIZE * (tangent + 1))
     for k in range(begin, end):
-        m, n = at(nodes, NODE_INTS * int(order[k])), at(nodes, NODE_INTS * int(order[k + 1]))
-        a, b = at(work, NODE_WORK * int(order[k])), at(work, NODE_WORK * int(order[k + 1]))
+        m, n = at(nodes, NODE.SIZE * int(order[k])), at(nodes, NODE.SIZE * int(order[k + 1]))
+        a, b = (
+            at(work, NODE_WORK.SIZE * int(order[k])),
+            at(work, NODE_WORK.SIZE * int(order[k + 1])),
+        )
         # The segment between both tangent points of another surface lies on that surface.
-        if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
+        if (
+            m[NODE.KIND] == NODE_TYPE.TANGENT
+            and n[NODE.KIND] == NODE_TYPE.TANGENT
+            and m[NODE.OF] == n[NODE.OF]
+        ):
             continue
-        store_vector(e, FIRST_END, point_in_surface(at(e, POSE), vector(a, PLACE)))
-        store_vector(e, SECOND_END, point_in_surface(at(e, POSE), vector(b, PLACE)))
+        store_vector(
+            e,
+            WRAP_WORK.FIRST_END,
+            point_in_surface(at(e, SURFACE_WORK.POSE), vector(a, NODE_WORK.PLACE)),
+        )
+        store_vector(
+            e,
+            WRAP_WORK.SECOND_END,
+            point_in_surface(at(e, SURFACE_WORK.POSE), vector(b, NODE_WORK.PLACE)),
+        )
         code = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
-        if code < WRAPPED:
+        if code < WRAPPING.WRAPPED:
             continue
-        r1 = point_in_ground(at(e, POSE), vector(e, FIRST_TANGENT))
-        r2 = point_in_ground(at(e, POSE), vector(e, SECOND_TANGENT))
+        r1 = point_in_ground(at(e, SURFACE_WORK.POSE), vector(e, WRAP_WORK.FIRST_TANGENT))
+        r2 = point_in_ground(at(e, SURFACE_WORK.POSE), vector(e, WRAP_WORK.SECOND_TANGENT))
         # A segment that must wrap wins over all others; of those that may, the one that adds least
         # length.
         increase = -inf
-        if code == WRAPPED:
+        if code == WRAPPING.WRAPPED:
             p1, p2 = line_end(m, a), line_end(n, b)
             increase = (
-                norm(minus(p1, r1)) + e[SURFACE_LENGTH] + norm(minus(p2, r2)) - norm(minus(p1, p2))
+                norm(minus(p1, r1))
+                + e[WRAP_WORK.SURFACE_LENGTH]
+                + norm(minus(p2, r2))
+                - norm(minus(p1, p2))
             )
         if increase < least:
             best, least = k, increase
-            store_vector(one, PLACE, r1)
-            store_vector(two, PLACE, r2)
-            one[SURFACE], two[SURFACE] = 0.0, e[SURFACE_LENGTH]
+            store_vector(one, NODE_WORK.PLACE, r1)
+            store_vector(two, NODE_WORK.PLACE, r2)
+            one[NODE_WORK.SURFACE], two[NODE_WORK.SURFACE] = 0.0, e[WRAP_WORK.SURFACE_LENGTH]
             # Keep the results of the chosen segment, which the next trial overwrites.
-            for j in range(ROOM - FIRST_TANGENT):
-                e[BEST + j] = e[FIRST_TANGENT + j]
-        if code == MANDATORY:
+            for j in range(WRAP_WORK.ROOM - WRAP_WORK.FIRST_TANGENT):
+                e[SURFACE_WORK.BEST + j] = e[WRAP_WORK.FIRST_TANGENT + j]
+        if code == WRAPPING.MANDATORY:
             break
     # The tangent points are NaN where OpenSim finds none.
-    if best >= 0 and one[PLACE] == one[PLACE]:
+    if best >= 0 and one[NODE_WORK.PLACE] == one[NODE_WORK.PLACE]:
         for k in range(count - 1, best, -1):
             order[k + 2] = order[k]
         order[best + 1], order[best + 2] = tangent, tangent + 1
-        result[COUNT] = count + 2
+        result[PATH_WORK.COUNT] = count + 2
     return code
 
 

@@ -1,16 +1,16 @@
 """Common record of all paths, and the laws of paths through points.
 
 A path is an item that other items call: its law computes length and speed, and the law of the item
-PULL records before it applies the tension that is written to the record. Paths through points keep
-the points in the record, in the order in which the path passes them, so that nothing is computed
-twice.
+`PATH.PULL` records before it applies the tension that is written to the record. Paths through points
+keep the points in the record, in the order in which the path passes them, so that nothing is
+computed twice.
 """
 
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.dynamics import add_generalized_forces, clear_wrenches
 from osimlite.mechanics.kernels.functions import evaluate_function
-from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME, STAGE
+from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME, STAGE, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import apply_force, direction, station, velocity
 from osimlite.mechanics.laws.vectors import (
@@ -26,79 +26,102 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-PULL = ITEM.OWN
-"""Index in the integers of a path of the distance back to the item that applies its tension."""
 
-LENGTH = 0
-"""Index in the record of any path of its length (m)."""
-SPEED = 1
-"""Index in the record of its lengthening speed (m/s)."""
-TENSION = 2
-"""Index in the record of its tension (N)."""
+class PATH(metaclass=Record):
+    """Integers of a path through points."""
 
-POINTS = ITEM.OWN + 1
-"""Index in the integers of the number of points."""
-WRAPS = ITEM.OWN + 2
-"""Index of the number of wraps."""
-NODES_AT = ITEM.OWN + 3
-"""Offset of the nodes: the points, then two tangent points for each wrap."""
+    PULL = ITEM.OWN
+    """Distance back to the item that applies its tension."""
+    POINTS = ITEM.OWN + 1
+    """Number of points."""
+    WRAPS = ITEM.OWN + 2
+    """Number of wraps."""
+    NODES_AT = ITEM.OWN + 3
+    """Nodes: the points, then two tangent points for each wrap."""
 
-NODE_INTS = 8
-"""Number of integers of a node."""
-LINK = 0
-"""Index in a node of its link."""
-BODY = 1
-"""Index of its body; no force acts between two nodes of one body."""
-KIND = 2
-"""Index of its kind, such as FIXED."""
-OF = 3
-"""Index of its degree of freedom, -1 if that is locked; for a tangent point of its surface."""
-AT = 4
-"""Index of the offset of its numbers."""
-TABLES = 5
-"""Offset of the offsets of the tables of its three functions."""
 
-FIXED = 0
-"""Kind of a node that is fixed in its link."""
-CONDITIONAL = 1
-"""Kind of a node that is active within a range of a coordinate."""
-MOVING = 2
-"""Kind of a node whose position is a function of a coordinate."""
-CLAMPED = 3
-"""Kind of a moving node that stands still outside its range, as its position does."""
-TANGENT = 4
-"""Kind of a tangent point on a wrap surface."""
+class PATH_WORK(metaclass=Record):
+    """Record of a path."""
 
-STATION = 0
-"""Offset in the numbers of a node of its point in the link (m)."""
-VALUE = 3
-"""Index of the value of a locked coordinate."""
-LOW = 4
-"""Index of the smallest value of the coordinate."""
-HIGH = 5
-"""Index of the largest value of the coordinate."""
-TURN = 6
-"""Offset of the rotation in the link of the functions' frame, by rows; its origin is the point."""
+    LENGTH = 0
+    """Length (m)."""
+    SPEED = 1
+    """Lengthening speed (m/s)."""
+    TENSION = 2
+    """Tension (N)."""
+    COUNT = 3
+    """Number of active nodes."""
+    ORDER = 4
+    """Numbers of the active nodes in order, then the results of all nodes."""
 
-COUNT = 3
-"""Index in the record of a path of the number of active nodes."""
-ORDER = 4
-"""Offset of the numbers of the active nodes in order, then of the results of all nodes."""
 
-NODE_WORK = 12
-"""Length of the results of a node."""
-PLACE = 0
-"""Offset in the results of a node of its position in ground (m)."""
-KEPT = 3
-"""Offset of the position of a tangent point for straight lines, once it is used, see `path_wraps`."""
-ALONG = 6
-"""Offset of the unit vector to the next node."""
-GRADIENT = 9
-"""Offset of the derivative of a moving point's position by the coordinate, in ground."""
-SURFACE = 9
-"""Index of the length on the surface before a tangent point (m)."""
-IS_KEPT = 10
-"""Index of 1.0 if a tangent point has a KEPT position, else 0.0."""
+class NODE(metaclass=Record):
+    """Integers of a node."""
+
+    LINK = 0
+    """Link."""
+    BODY = 1
+    """Body; no force acts between two nodes of one body."""
+    KIND = 2
+    """Kind, such as NODE_TYPE.FIXED."""
+    OF = 3
+    """Degree of freedom, -1 if that is locked; for a tangent point its surface."""
+    AT = 4
+    """Offset of its numbers."""
+    TABLES = 5
+    """Offsets of the tables of its three functions."""
+    SIZE = 8
+    """Number of integers of a node."""
+
+
+class NODE_TYPE(metaclass=Record):
+    """Types of nodes."""
+
+    FIXED = 0
+    """Node that is fixed in its link."""
+    CONDITIONAL = 1
+    """Node that is active within a range of a coordinate."""
+    MOVING = 2
+    """Node whose position is a function of a coordinate."""
+    CLAMPED = 3
+    """Moving node that stands still outside its range, as its position does."""
+    TANGENT = 4
+    """Tangent point on a wrap surface."""
+
+
+class NODE_NUMBERS(metaclass=Record):
+    """Numbers of a node."""
+
+    STATION = 0
+    """Point in the link (m)."""
+    VALUE = 3
+    """Value of a locked coordinate."""
+    LOW = 4
+    """Smallest value of the coordinate."""
+    HIGH = 5
+    """Largest value of the coordinate."""
+    TURN = 6
+    """Rotation in the link of the functions' frame, by rows; its origin is the point."""
+
+
+class NODE_WORK(metaclass=Record):
+    """Results of a node, in ground."""
+
+    PLACE = 0
+    """Position in ground (m)."""
+    KEPT = 3
+    """Position of a tangent point for straight lines, once it is used, see `path_wraps`."""
+    ALONG = 6
+    """Unit vector to the next node."""
+    GRADIENT = 9
+    """Derivative of a moving point's position by the coordinate, in ground."""
+    SURFACE = 9
+    """Length on the surface before a tangent point (m)."""
+    IS_KEPT = 10
+    """1.0 if a tangent point has a KEPT position, else 0.0."""
+    SIZE = 12
+    """Length of the results of a node."""
+
 
 COINCIDENT = 2.0**-52
 """Distance of two points (m) below which OpenSim has no direction for their relative speed.
@@ -141,7 +164,7 @@ def last_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
         Length (m) and speed (m/s).
     """
     result = at(data, model[path + ITEM.RECORD])
-    return result[LENGTH], result[SPEED]
+    return result[PATH_WORK.LENGTH], result[PATH_WORK.SPEED]
 
 
 def pull_path(
@@ -158,9 +181,9 @@ def pull_path(
         path: offset of the path in the model.
         tension: tension, positive where the path pulls (N).
     """
-    data[model[path + ITEM.RECORD] + TENSION] = tension
+    data[model[path + ITEM.RECORD] + PATH_WORK.TENSION] = tension
     # Different kinds of paths pull in different ways; the record says by which kernel.
-    call(model[path - model[path + PULL] + ITEM.LAW], model, reals, data, y, f, path)
+    call(model[path - model[path + PATH.PULL] + ITEM.LAW], model, reals, data, y, f, path)
 
 
 def straight_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -194,39 +217,47 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
     """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
-    order, work = at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
+    order, work = (
+        at(result, PATH_WORK.ORDER),
+        at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
+    )
     count = 0
-    for number in range(i[POINTS]):
-        node, here = at(i, NODES_AT + NODE_INTS * number), at(work, NODE_WORK * number)
-        n = at(p, node[AT])
-        point = vector(n, STATION)
-        if node[KIND] != FIXED:
-            value = y[node[OF]] if node[OF] >= 0 else n[VALUE]
+    for number in range(i[PATH.POINTS]):
+        node, here = at(i, PATH.NODES_AT + NODE.SIZE * number), at(work, NODE_WORK.SIZE * number)
+        n = at(p, node[NODE.AT])
+        point = vector(n, NODE_NUMBERS.STATION)
+        if node[NODE.KIND] != NODE_TYPE.FIXED:
+            value = y[node[NODE.OF]] if node[NODE.OF] >= 0 else n[NODE_NUMBERS.VALUE]
             # A conditional point belongs to the path only while its coordinate is in its range.
-            if node[KIND] == CONDITIONAL:
-                if not n[LOW] <= value <= n[HIGH]:
+            if node[NODE.KIND] == NODE_TYPE.CONDITIONAL:
+                if not n[NODE_NUMBERS.LOW] <= value <= n[NODE_NUMBERS.HIGH]:
                     continue
             else:
                 # As in OpenSim, the position uses the clamped coordinate, and its derivative the
-                # unclamped one; for a CLAMPED node the derivative is zero outside the range.
-                clamped, t = min(max(value, n[LOW]), n[HIGH]), at(n, TURN)
-                qx, dx, _ = evaluate_function(at(p, node[TABLES]), clamped)
-                qy, dy, _ = evaluate_function(at(p, node[TABLES + 1]), clamped)
-                qz, dz, _ = evaluate_function(at(p, node[TABLES + 2]), clamped)
-                if clamped != value and node[KIND] == CLAMPED:
+                # unclamped one; for a clamped node the derivative is zero outside the range.
+                clamped, t = (
+                    min(max(value, n[NODE_NUMBERS.LOW]), n[NODE_NUMBERS.HIGH]),
+                    at(n, NODE_NUMBERS.TURN),
+                )
+                qx, dx, _ = evaluate_function(at(p, node[NODE.TABLES]), clamped)
+                qy, dy, _ = evaluate_function(at(p, node[NODE.TABLES + 1]), clamped)
+                qz, dz, _ = evaluate_function(at(p, node[NODE.TABLES + 2]), clamped)
+                if clamped != value and node[NODE.KIND] == NODE_TYPE.CLAMPED:
                     dx = dy = dz = 0.0
                 elif clamped != value:
-                    _, dx, _ = evaluate_function(at(p, node[TABLES]), value)
-                    _, dy, _ = evaluate_function(at(p, node[TABLES + 1]), value)
-                    _, dz, _ = evaluate_function(at(p, node[TABLES + 2]), value)
+                    _, dx, _ = evaluate_function(at(p, node[NODE.TABLES]), value)
+                    _, dy, _ = evaluate_function(at(p, node[NODE.TABLES + 1]), value)
+                    _, dz, _ = evaluate_function(at(p, node[NODE.TABLES + 2]), value)
                 point = plus(point, rotate(t, (qx, qy, qz)))
                 store_vector(
-                    here, GRADIENT, direction(model, data, node[LINK], rotate(t, (dx, dy, dz)))
+                    here,
+                    NODE_WORK.GRADIENT,
+                    direction(model, data, node[NODE.LINK], rotate(t, (dx, dy, dz))),
                 )
-        store_vector(here, PLACE, station(model, data, node[LINK], point))
+        store_vector(here, NODE_WORK.PLACE, station(model, data, node[NODE.LINK], point))
         order[count] = number
         count += 1
-    result[COUNT] = count
+    result[PATH_WORK.COUNT] = count
 
 
 def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
@@ -243,29 +274,39 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = (
-        at(i, NODES_AT),
-        at(result, ORDER),
-        at(result, ORDER + i[POINTS] + 2 * i[WRAPS]),
+        at(i, PATH.NODES_AT),
+        at(result, PATH_WORK.ORDER),
+        at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
     )
     length = speed = 0.0
-    for k in range(1, int(result[COUNT])):
+    for k in range(1, int(result[PATH_WORK.COUNT])):
         one, two = int(order[k - 1]), int(order[k])
-        m, n = at(nodes, NODE_INTS * one), at(nodes, NODE_INTS * two)
-        a, b = at(work, NODE_WORK * one), at(work, NODE_WORK * two)
+        m, n = at(nodes, NODE.SIZE * one), at(nodes, NODE.SIZE * two)
+        a, b = at(work, NODE_WORK.SIZE * one), at(work, NODE_WORK.SIZE * two)
         way = minus(line_end(n, b), line_end(m, a))
         distance = norm(way)
         # Between both tangent points of one surface the path is not straight.
-        if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
-            length += b[SURFACE]
+        if (
+            m[NODE.KIND] == NODE_TYPE.TANGENT
+            and n[NODE.KIND] == NODE_TYPE.TANGENT
+            and m[NODE.OF] == n[NODE.OF]
+        ):
+            length += b[NODE_WORK.SURFACE]
         else:
             length += distance
         # Points of one link keep their distance, unless they move in it.
-        if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
+        if (
+            m[NODE.LINK] != n[NODE.LINK]
+            or m[NODE.KIND] >= NODE_TYPE.MOVING
+            or n[NODE.KIND] >= NODE_TYPE.MOVING
+        ):
             moves = minus(node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a))
             speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
         # Forces along a segment without direction vanish, where OpenSim has NaN.
-        store_vector(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
-    result[LENGTH], result[SPEED] = length, speed
+        store_vector(
+            a, NODE_WORK.ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way)
+        )
+    result[PATH_WORK.LENGTH], result[PATH_WORK.SPEED] = length, speed
     return length
 
 
@@ -278,12 +319,12 @@ def line_end(node: Ints, here: Floats) -> Vector:
         node: integers of the node.
         here: results of the node; a tangent point is cached.
     """
-    if node[KIND] != TANGENT:
-        return vector(here, PLACE)
-    if here[IS_KEPT] == 0.0:
-        store_vector(here, KEPT, vector(here, PLACE))
-        here[IS_KEPT] = 1.0
-    return vector(here, KEPT)
+    if node[NODE.KIND] != NODE_TYPE.TANGENT:
+        return vector(here, NODE_WORK.PLACE)
+    if here[NODE_WORK.IS_KEPT] == 0.0:
+        store_vector(here, NODE_WORK.KEPT, vector(here, NODE_WORK.PLACE))
+        here[NODE_WORK.IS_KEPT] = 1.0
+    return vector(here, NODE_WORK.KEPT)
 
 
 def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
@@ -298,9 +339,9 @@ def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats
         node: integers of the node.
         here: results of the node.
     """
-    v = velocity(model, data, node[LINK], vector(here, PLACE))
-    if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-        return add_scaled(v, y[model[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
+    v = velocity(model, data, node[NODE.LINK], vector(here, NODE_WORK.PLACE))
+    if NODE_TYPE.MOVING <= node[NODE.KIND] <= NODE_TYPE.CLAMPED and node[NODE.OF] >= 0:
+        return add_scaled(v, y[model[MODEL.DOFS] + node[NODE.OF]], vector(here, NODE_WORK.GRADIENT))
     return v
 
 
@@ -322,24 +363,24 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = (
-        at(i, NODES_AT),
-        at(result, ORDER),
-        at(result, ORDER + i[POINTS] + 2 * i[WRAPS]),
+        at(i, PATH.NODES_AT),
+        at(result, PATH_WORK.ORDER),
+        at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
     )
-    tension, last = result[TENSION], int(result[COUNT]) - 1
+    tension, last = result[PATH_WORK.TENSION], int(result[PATH_WORK.COUNT]) - 1
     pull = 0.0, 0.0, 0.0
     for k in range(last + 1):
         number = int(order[k])
-        node, here = at(nodes, NODE_INTS * number), at(work, NODE_WORK * number)
+        node, here = at(nodes, NODE.SIZE * number), at(work, NODE_WORK.SIZE * number)
         # The force at a node is the pull towards the next one less the pull of the one before.
         back, pull = pull, (0.0, 0.0, 0.0)
-        if k < last and nodes[NODE_INTS * int(order[k + 1]) + BODY] != node[BODY]:
-            pull = times(tension, vector(here, ALONG))
+        if k < last and nodes[NODE.SIZE * int(order[k + 1]) + NODE.BODY] != node[NODE.BODY]:
+            pull = times(tension, vector(here, NODE_WORK.ALONG))
         force = minus(pull, back)
-        apply_force(model, data, node[LINK], vector(here, PLACE), force)
+        apply_force(model, data, node[NODE.LINK], vector(here, NODE_WORK.PLACE), force)
         # A moving point does work along its coordinate, even within its link.
-        if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-            f[model[MODEL.DOFS] + node[OF]] += dot(force, vector(here, GRADIENT))
+        if NODE_TYPE.MOVING <= node[NODE.KIND] <= NODE_TYPE.CLAMPED and node[NODE.OF] >= 0:
+            f[model[MODEL.DOFS] + node[NODE.OF]] += dot(force, vector(here, NODE_WORK.GRADIENT))
     return OUTCOME.OK
 
 

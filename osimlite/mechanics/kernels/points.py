@@ -6,13 +6,13 @@ A negative number of a link stands for ground.
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.layout import (
-    GRAVITY_AT,
     LINK,
     LINK_WORK,
     MODEL,
     MOTION,
     OPERATION,
     OPERATION_WORK,
+    REALS,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.laws.vectors import (
@@ -186,7 +186,11 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
     if link < 0:
         return ZERO
     here = link_work(model, data, link)
-    v, a, g = at(here, LINK_WORK.VELOCITY), at(here, LINK_WORK.ACCELERATION), at(reals, GRAVITY_AT)
+    v, a, g = (
+        at(here, LINK_WORK.VELOCITY),
+        at(here, LINK_WORK.ACCELERATION),
+        at(reals, REALS.GRAVITY),
+    )
     px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
     wx, wy, wz = v[0], v[1], v[2]
     # v holds the angular velocity, then that of the material point of the link at its origin.

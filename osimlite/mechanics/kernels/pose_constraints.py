@@ -18,30 +18,7 @@ from osimlite.mechanics.kernels.pose_cost import (
     evaluate_coupler,
     evaluate_pose,
 )
-from osimlite.mechanics.kernels.pose_record import (
-    AT_END,
-    COUPLER_AT,
-    COUPLERS,
-    CURVES,
-    DEPENDENT_OF,
-    ERRORS,
-    FREE_AT,
-    GOALS,
-    HELD,
-    HELD_AT,
-    MARKERS,
-    MEASURED,
-    RANGES_AT,
-    RESOLVED_AT,
-    ROOM,
-    ROWS,
-    SENSORS,
-    SLOPE,
-    STEP,
-    TRIAL,
-    VARIABLE,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import COUPLER, FIT, FREEDOM, Fit
 from osimlite.mechanics.kernels.pose_step import free_equations, list_free
 from osimlite.mechanics.kernels.projection import REDUNDANT
 
@@ -62,14 +39,14 @@ def fulfil_constraints(m: Fit, y: Floats) -> bool:
         Success.
     """
     p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
-    ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
+    ranges, resolved = at(c, p[FIT.RANGES_AT]), at(p, p[FIT.RESOLVED_AT])
     for k in range(size):
         # Ranges first, then values that are prescribed, and those that depend on others last.
-        if resolved[k] == VARIABLE or resolved[k] >= AT_END:
+        if resolved[k] == FREEDOM.VARIABLE or resolved[k] >= FREEDOM.AT_END:
             y[k] = min(max(y[k], ranges[2 * k]), ranges[2 * k + 1])
-    values = at(v, p[MEASURED] + 3 * p[MARKERS] + 9 * p[SENSORS] + p[GOALS])
-    for k in range(p[HELD]):
-        y[p[p[HELD_AT] + k]] = values[k]
+    values = at(v, p[FIT.MEASURED] + 3 * p[FIT.MARKERS] + 9 * p[FIT.SENSORS] + p[FIT.GOALS])
+    for k in range(p[FIT.HELD]):
+        y[p[p[FIT.HELD_AT] + k]] = values[k]
     set_dependents(m, y)
     return count_equations(m) == 0 or restore_equations(m, y)
 
@@ -82,9 +59,11 @@ def set_dependents(m: Fit, y: Floats) -> None:
         y: state; its coordinates are changed.
     """
     p, size = m.p, m.model[MODEL.DOFS]
-    for number in range(p[COUPLERS]):
-        i = at(p, p[p[COUPLER_AT] + number])
-        y[i[DEPENDENT_OF]], _ = evaluate_coupler(m, i, y, at(m.v, p[ROOM]), at(m.v, p[ROOM] + size))
+    for number in range(p[FIT.COUPLERS]):
+        i = at(p, p[p[FIT.COUPLER_AT] + number])
+        y[i[COUPLER.DEPENDENT]], _ = evaluate_coupler(
+            m, i, y, at(m.v, p[FIT.ROOM]), at(m.v, p[FIT.ROOM] + size)
+        )
 
 
 def restore_equations(m: Fit, y: Floats) -> bool:
@@ -98,8 +77,8 @@ def restore_equations(m: Fit, y: Floats) -> bool:
         Success.
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count, errors, step = count_equations(m), at(v, p[ERRORS]), at(v, p[STEP])
-    ranges, before = at(m.c, p[RANGES_AT]), inf
+    count, errors, step = count_equations(m), at(v, p[FIT.ERRORS]), at(v, p[FIT.STEP])
+    ranges, before = at(m.c, p[FIT.RANGES_AT]), inf
     for _ in range(50):
         evaluate_pose(m, y)
         apply_couplers(m, y)
@@ -122,7 +101,7 @@ def restore_equations(m: Fit, y: Floats) -> bool:
         # Steps of at most half a radian or metre keep the linearization valid.
         part = 1.0 if furthest <= 0.5 else 0.5 / furthest
         for k in range(free):
-            freedom = p[p[FREE_AT] + k]
+            freedom = p[p[FIT.FREE_AT] + k]
             to = y[freedom] + part * step[k]
             y[freedom] = min(max(to, ranges[2 * freedom]), ranges[2 * freedom + 1])
         set_dependents(m, y)
@@ -136,7 +115,7 @@ def clear_curvature(m: Fit) -> None:
     size = m.model[MODEL.DOFS]
     if count_equations(m) > 0:
         for k in range(size * size):
-            m.v[m.p[CURVES] + k] = 0.0
+            m.v[m.p[FIT.CURVES] + k] = 0.0
 
 
 def compute_curvature(m: Fit, y: Floats) -> None:
@@ -149,18 +128,18 @@ def compute_curvature(m: Fit, y: Floats) -> None:
         y: state of the pose.
     """
     p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], count_equations(m)
-    rows, slope, curves = at(v, p[ROWS]), at(v, p[SLOPE]), at(v, p[CURVES])
-    pulls, trial = at(curves, size * size), at(v, p[TRIAL])
-    free, normal = list_free(m), at(v, p[ROOM] + 2 * size)
+    rows, slope, curves = at(v, p[FIT.ROWS]), at(v, p[FIT.SLOPE]), at(v, p[FIT.CURVES])
+    pulls, trial = at(curves, size * size), at(v, p[FIT.TRIAL])
+    free, normal = list_free(m), at(v, p[FIT.ROOM] + 2 * size)
     for i in range(count):
         pulls[i] = 0.0
         for k in range(free):
-            pulls[i] -= rows[size * i + p[p[FREE_AT] + k]] * slope[p[p[FREE_AT] + k]]
+            pulls[i] -= rows[size * i + p[p[FIT.FREE_AT] + k]] * slope[p[p[FIT.FREE_AT] + k]]
         for j in range(count):
             # A small diagonal keeps the normal equations regular where equations are redundant.
             total = 1e-12 if i == j else 0.0
             for k in range(free):
-                freedom = p[p[FREE_AT] + k]
+                freedom = p[p[FIT.FREE_AT] + k]
                 total += rows[size * i + freedom] * rows[size * j + freedom]
             normal[count * i + j] = total
     clear_curvature(m)
@@ -169,7 +148,7 @@ def compute_curvature(m: Fit, y: Floats) -> None:
     # Multipliers by least squares: the gradient of the Lagrangian is as small as possible.
     solve_cholesky(count, normal, pulls)
     for k in range(free):
-        freedom = p[p[FREE_AT] + k]
+        freedom = p[p[FIT.FREE_AT] + k]
         # Central differences of the rows, symmetrized by adding half on either side.
         for side in range(2):
             factor = (0.5 - side) / ASIDE

@@ -15,37 +15,16 @@ from __future__ import annotations
 
 from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.dynamics import spatial_momentum
-from osimlite.mechanics.kernels.functions import MONOMIALS, evaluate_function, evaluate_monomials
+from osimlite.mechanics.kernels.functions import (
+    FUNCTION_TYPE,
+    evaluate_function,
+    evaluate_monomials,
+)
 from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, LINK, LINK_WORK, MODEL, STAGE
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_ints, link_work, station
 from osimlite.mechanics.kernels.pose_curvature import add_joint_curvature, displaced_moment
-from osimlite.mechanics.kernels.pose_record import (
-    ARGUMENTS_OF,
-    BALL_AT,
-    BALLS,
-    BEND,
-    COUNT_OF,
-    COUPLER_AT,
-    COUPLERS,
-    DEPENDENT_OF,
-    ERRORS,
-    GOAL_AT,
-    GOALS,
-    MARKER_AT,
-    MARKER_NUMBERS,
-    MARKERS,
-    MEASURED,
-    NUMBERS_OF,
-    ROOM,
-    ROWS,
-    SENSORS,
-    SLOPE,
-    STIFFNESS,
-    TURNED,
-    WEIGHTS,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import COUPLER, FIT, MARKER_NUMBERS, Fit
 from osimlite.mechanics.kernels.pose_sensors import add_sensors
 from osimlite.mechanics.kernels.projection import collect_position_errors, write_position_jacobian
 from osimlite.mechanics.laws.rotations import sine_cosine
@@ -75,9 +54,9 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     evaluate_pose(m, y)
     # Columns of balls belong to their speeds; derivatives are by coordinates.
-    for k in range(p[BALLS]):
-        convert_ball_columns(m, y, at(model, p[p[BALL_AT] + k]))
-    slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
+    for k in range(p[FIT.BALLS]):
+        convert_ball_columns(m, y, at(model, p[p[FIT.BALL_AT] + k]))
+    slope, stiffness, bend = at(v, p[FIT.SLOPE]), at(v, p[FIT.STIFFNESS]), at(v, p[FIT.BEND])
     for k in range(size):
         slope[k] = 0.0
     for k in range(size * size):
@@ -85,7 +64,7 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     for link in range(model[MODEL.LINKS]):
         here, turned = (
             at(link_work(model, data, link), LINK_WORK.INERTIA),
-            at(v, p[TURNED] + 9 * link),
+            at(v, p[FIT.TURNED] + 9 * link),
         )
         # Inertia and wrench of each link collect masses and forces of springs.
         for k in range(16):
@@ -94,12 +73,15 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
             turned[k] = 0.0
     value = add_markers(m) + add_sensors(m)
     gather_derivatives(m, y)
-    goals = 3 * p[MARKERS] + 9 * p[SENSORS]
-    for k in range(p[GOALS]):
-        freedom, weight = p[p[GOAL_AT] + k], v[p[WEIGHTS] + p[MARKERS] + p[SENSORS] + k]
+    goals = 3 * p[FIT.MARKERS] + 9 * p[FIT.SENSORS]
+    for k in range(p[FIT.GOALS]):
+        freedom, weight = (
+            p[p[FIT.GOAL_AT] + k],
+            v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + p[FIT.SENSORS] + k],
+        )
         if weight > 0.0:
             # A goal is a spring on its coordinate.
-            off = y[freedom] - v[p[MEASURED] + goals + k]
+            off = y[freedom] - v[p[FIT.MEASURED] + goals + k]
             value += 0.5 * weight * off * off
             slope[freedom] += weight * off
             stiffness[size * freedom + freedom] += weight
@@ -121,8 +103,8 @@ def evaluate_pose(m: Fit, y: Floats) -> None:
     call(model[MODEL.LAWS], model, m.reals, m.data, y, m.f, STAGE.VELOCITY)
     if model[MODEL.CONSTRAINED] > 0:
         evaluate_constraints(model, m.reals, m.data, y, m.f)
-        collect_position_errors(model, m.data, at(v, p[ERRORS]))
-        write_position_jacobian(model, m.data, y, at(v, p[ROWS]))
+        collect_position_errors(model, m.data, at(v, p[FIT.ERRORS]))
+        write_position_jacobian(model, m.data, y, at(v, p[FIT.ROWS]))
 
 
 def convert_ball_columns(m: Fit, y: Floats, angles: Ints) -> None:
@@ -157,13 +139,13 @@ def add_markers(m: Fit) -> float:
         Cost of the markers.
     """
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
-    for k in range(p[MARKERS]):
-        weight, link = v[p[WEIGHTS] + k], p[p[MARKER_AT] + k]
+    for k in range(p[FIT.MARKERS]):
+        weight, link = v[p[FIT.WEIGHTS] + k], p[p[FIT.MARKER_AT] + k]
         if not weight > 0.0:
             continue
         point = station(model, data, link, vector(m.c, MARKER_NUMBERS * k))
         # Gradient of the cost by the position of the marker: the pull of the spring, reversed.
-        off = minus(point, vector(v, p[MEASURED] + 3 * k))
+        off = minus(point, vector(v, p[FIT.MEASURED] + 3 * k))
         value += 0.5 * weight * dot(off, off)
         if link < 0:
             continue
@@ -171,7 +153,7 @@ def add_markers(m: Fit) -> float:
         i, load, turned = (
             at(here, LINK_WORK.INERTIA),
             at(here, LINK_WORK.WRENCH),
-            at(v, p[TURNED] + 9 * link),
+            at(v, p[FIT.TURNED] + 9 * link),
         )
         pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
         a, b, c = arm
@@ -206,13 +188,13 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
     """
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
-    slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
+    slope, stiffness, bend = at(v, p[FIT.SLOPE]), at(v, p[FIT.STIFFNESS]), at(v, p[FIT.BEND])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, here = link_ints(model, link), link_work(model, data, link)
         i, load, turned = (
             at(here, LINK_WORK.INERTIA),
             at(here, LINK_WORK.WRENCH),
-            at(v, p[TURNED] + 9 * link),
+            at(v, p[FIT.TURNED] + 9 * link),
         )
         # A subtree without measurements contributes nothing.
         if i[0] > 0.0 or i[4] > 0.0:
@@ -242,7 +224,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
             # Inertia (10) and wrench (6) are adjacent, and both are summed.
             for k in range(16):
                 above[k] += i[k]
-            above = at(v, p[TURNED] + 9 * j[LINK.PARENT])
+            above = at(v, p[FIT.TURNED] + 9 * j[LINK.PARENT])
             for k in range(9):
                 above[k] += turned[k]
 
@@ -256,21 +238,21 @@ def apply_couplers(m: Fit, y: Floats) -> None:
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     slope, stiffness, bend, rows = (
-        at(v, p[SLOPE]),
-        at(v, p[STIFFNESS]),
-        at(v, p[BEND]),
-        at(v, p[ROWS]),
+        at(v, p[FIT.SLOPE]),
+        at(v, p[FIT.STIFFNESS]),
+        at(v, p[FIT.BEND]),
+        at(v, p[FIT.ROWS]),
     )
-    gradient, rates = at(v, p[ROOM]), at(v, p[ROOM] + size)
+    gradient, rates = at(v, p[FIT.ROOM]), at(v, p[FIT.ROOM] + size)
     for k in range(size):
         rates[k] = 1.0
     # Backwards, so that a dependent coordinate may itself be an argument of another coupler.
-    for number in range(p[COUPLERS] - 1, -1, -1):
-        i = at(p, p[p[COUPLER_AT] + number])
-        dependent = i[DEPENDENT_OF]
+    for number in range(p[FIT.COUPLERS] - 1, -1, -1):
+        i = at(p, p[p[FIT.COUPLER_AT] + number])
+        dependent = i[COUPLER.DEPENDENT]
         _, bent = evaluate_coupler(m, i, y, gradient, rates)
-        for k in range(i[COUNT_OF]):
-            freedom = i[ARGUMENTS_OF + k]
+        for k in range(i[COUPLER.COUNT]):
+            freedom = i[COUPLER.ARGUMENTS + k]
             if freedom < 0:
                 continue
             gain = gradient[k]
@@ -281,7 +263,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
             for j in range(size):
                 stiffness[size * freedom + j] += gain * stiffness[size * dependent + j]
                 bend[size * freedom + j] += gain * bend[size * dependent + j]
-            if i[COUNT_OF] == 1:
+            if i[COUPLER.COUNT] == 1:
                 bend[size * freedom + freedom] += bent * slope[dependent]
             slope[freedom] += gain * slope[dependent]
             for j in range(count_equations(m)):
@@ -312,15 +294,15 @@ def evaluate_coupler(
     Returns:
         The value, and the second derivative if it depends on one coordinate.
     """
-    size, constants = i[COUNT_OF], at(m.c, i[NUMBERS_OF])
-    if int(constants[size]) >= MONOMIALS:
+    size, constants = i[COUPLER.COUNT], at(m.c, i[COUPLER.NUMBERS])
+    if int(constants[size]) >= FUNCTION_TYPE.MONOMIALS:
         value, _, bent = evaluate_monomials(
-            size, at(i, ARGUMENTS_OF), constants, y, rates, gradient
+            size, at(i, COUPLER.ARGUMENTS), constants, y, rates, gradient
         )
         return value, bent
     argument = 0.0
     if size > 0:
-        argument = y[i[ARGUMENTS_OF]] if i[ARGUMENTS_OF] >= 0 else constants[0]
+        argument = y[i[COUPLER.ARGUMENTS]] if i[COUPLER.ARGUMENTS] >= 0 else constants[0]
     value, slope, bent = evaluate_function(at(constants, size), argument)
     gradient[0] = slope
     return value, bent

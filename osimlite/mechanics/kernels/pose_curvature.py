@@ -11,12 +11,7 @@ from osimlite.mechanics.kernels.ball_joint import third_axis
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import link_work, operation_ints, operation_work
-from osimlite.mechanics.kernels.pose_record import (
-    AXES_AT,
-    BEND,
-    SLIDES,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import FIT, SLIDES, Fit
 from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     ZERO,
@@ -65,7 +60,7 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floa
         turned: sum of forces times arms on the subtree.
     """
     p = m.p
-    places = at(p, p[AXES_AT])
+    places = at(p, p[FIT.AXES_AT])
     for one in range(places[link], places[link + 1]):
         turn, shift = axis_column(m, y, link, one)
         carried = displaced_moment(load, turned, turn, shift)
@@ -88,7 +83,7 @@ def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
         number: number of the axis.
         pull: generalized force of the springs along the axis.
     """
-    model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[BEND])
+    model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[FIT.BEND])
     axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
@@ -117,7 +112,7 @@ def axis_ints(m: Fit, number: int) -> Ints:
         m: the fit.
         number: number of the axis.
     """
-    return at(m.p, m.p[AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
+    return at(m.p, m.p[FIT.AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
 
 
 def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vector]:
@@ -168,7 +163,7 @@ def add_axis_product(m: Fit, y: Floats, one: int, two: int, amount: float) -> No
         two: number of the second axis.
         amount: the multiple.
     """
-    size, bend = m.model[MODEL.DOFS], at(m.v, m.p[BEND])
+    size, bend = m.model[MODEL.DOFS], at(m.v, m.p[FIT.BEND])
     for k in range(count_arguments(m, one)):
         first, gain = axis_argument(m, y, one, k)
         if first < 0:

@@ -23,27 +23,7 @@ from osimlite.mechanics.kernels.pose_constraints import (
     fulfil_constraints,
 )
 from osimlite.mechanics.kernels.pose_cost import count_equations, evaluate_cost, evaluate_pose
-from osimlite.mechanics.kernels.pose_record import (
-    GOALS,
-    HELD,
-    HISTORY,
-    IDLE,
-    MARKER_AT,
-    MARKER_NUMBERS,
-    MARKERS,
-    MEASURED,
-    PATTERN,
-    RESOLVED_AT,
-    SENSOR_NUMBERS,
-    SENSORS,
-    SLOPE,
-    STEP,
-    STIFFNESS,
-    TRIAL,
-    VARIABLE,
-    WEIGHTS,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM, MARKER_NUMBERS, SENSOR_NUMBERS, Fit
 from osimlite.mechanics.kernels.pose_sensors import sensor_rotation
 from osimlite.mechanics.kernels.pose_starts import (
     INWARDS,
@@ -122,21 +102,21 @@ def fit_frames(
         `OUTCOME.OK`; whether a fit converged is the status in `results`.
     """
     m = Fit(model, reals, data, f, p, c, v)
-    size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]
+    size, markers, sensors = model[MODEL.DOFS], p[FIT.MARKERS], p[FIT.SENSORS]
     width, input_size = (
         size + 3 * (markers + sensors) + 3,
-        3 * markers + 9 * sensors + p[GOALS] + p[HELD],
+        3 * markers + 9 * sensors + p[FIT.GOALS] + p[FIT.HELD],
     )
     for number in range(count):
         result = at(results, width * number)
-        copy_numbers(input_size, at(frames, input_size * number), at(v, p[MEASURED]))
+        copy_numbers(input_size, at(frames, input_size * number), at(v, p[FIT.MEASURED]))
         value, steps, status = fit_frame(m, y)
         copy_numbers(size, y, result)
         for k in range(markers):
             position = station(
                 model,
                 data,
-                p[p[MARKER_AT] + k],
+                p[p[FIT.MARKER_AT] + k],
                 (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2]),
             )
             store_vector(result, size + 3 * k, position)
@@ -158,8 +138,8 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         Cost, number of steps, and status.
     """
     v, p, size = m.v, m.p, m.model[MODEL.DOFS]
-    history = at(v, p[HISTORY])
-    previous_count, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
+    history = at(v, p[FIT.HISTORY])
+    previous_count, last, trial = int(history[0]), at(history, 1), at(v, p[FIT.TRIAL])
     seen = compute_weights(m)
     if previous_count > 0:
         copy_numbers(size, last, y)
@@ -170,12 +150,14 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         evaluate_pose(m, y)
         return 0.0, 0, UNSEEN
     note_pattern(m, y)
-    value, is_vague = inf, v[p[PATTERN] + p[MARKERS] + p[SENSORS] + p[GOALS]] > 0.0
+    value, is_vague = inf, v[p[FIT.PATTERN] + p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]] > 0.0
     # Two previous poses allow linear extrapolation of the motion, unless poses fit alike.
     if previous_count > 1 and not is_vague:
         before = at(last, size)
         for k in range(size):
-            trial[k] = y[k] if p[p[RESOLVED_AT] + k] == IDLE else 2.0 * last[k] - before[k]
+            trial[k] = (
+                y[k] if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.IDLE else 2.0 * last[k] - before[k]
+            )
         if fulfil_constraints(m, trial):
             value = evaluate_cost(m, trial)
     # If the extrapolated pose costs much more than the previous one, compare it with that.
@@ -247,27 +229,27 @@ def note_pattern(m: Fit, y: Floats) -> None:
         y: state of a pose.
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count = p[MARKERS] + p[SENSORS] + p[GOALS]
-    weights, pattern, is_new = at(v, p[WEIGHTS]), at(v, p[PATTERN]), False
+    count = p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]
+    weights, pattern, is_new = at(v, p[FIT.WEIGHTS]), at(v, p[FIT.PATTERN]), False
     for k in range(count):
         is_new = is_new or weights[k] != pattern[k]
         pattern[k] = weights[k]
-    if not is_new and at(v, p[HISTORY])[0] > 0.0:
+    if not is_new and at(v, p[FIT.HISTORY])[0] > 0.0:
         return
-    resolved = at(p, p[RESOLVED_AT])
+    resolved = at(p, p[FIT.RESOLVED_AT])
     for k in range(size):
-        if resolved[k] == IDLE:
-            resolved[k] = VARIABLE
+        if resolved[k] == FREEDOM.IDLE:
+            resolved[k] = FREEDOM.VARIABLE
     evaluate_cost(m, y)
     for k in range(size):
         if (
-            resolved[k] == VARIABLE
-            and v[p[STIFFNESS] + size * k + k] == 0.0
-            and v[p[SLOPE] + k] == 0.0
+            resolved[k] == FREEDOM.VARIABLE
+            and v[p[FIT.STIFFNESS] + size * k + k] == 0.0
+            and v[p[FIT.SLOPE] + k] == 0.0
         ):
-            resolved[k] = IDLE
+            resolved[k] = FREEDOM.IDLE
     for k in range(size):
-        v[p[STEP] + k] = 0.0
+        v[p[FIT.STEP] + k] = 0.0
     # A Gauss-Newton matrix that is singular leaves some direction undetermined.
     pattern[count] = 1.0 if solve_free(m, list_free(m), LIGHTEST, 0.0, ALIKE) < 0 else 0.0
 
@@ -290,7 +272,7 @@ def descend_again(
         Cost, number of steps, and status of the better pose.
     """
     size = m.model[MODEL.DOFS]
-    best, trial = at(start, size), at(m.v, m.p[TRIAL])
+    best, trial = at(start, size), at(m.v, m.p[FIT.TRIAL])
     copy_numbers(size, y, best)
     copy_numbers(size, start, trial)
     free_ends(m)
@@ -338,8 +320,8 @@ def compute_weights(m: Fit) -> bool:
         Whether anything is measured.
     """
     p, c, v = m.p, m.c, m.v
-    measured, weights = at(v, p[MEASURED]), at(v, p[WEIGHTS])
-    markers, sensors = p[MARKERS], p[SENSORS]
+    measured, weights = at(v, p[FIT.MEASURED]), at(v, p[FIT.WEIGHTS])
+    markers, sensors = p[FIT.MARKERS], p[FIT.SENSORS]
     numbers, rotations = at(c, MARKER_NUMBERS * markers), at(measured, 3 * markers)
     for k in range(markers):
         # Missing measurements are NaN.
@@ -352,7 +334,7 @@ def compute_weights(m: Fit) -> bool:
     seen = normalize_weights(markers, weights)
     seen = normalize_weights(sensors, at(weights, markers)) or seen
     numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
-    for k in range(p[GOALS]):
+    for k in range(p[FIT.GOALS]):
         weights[markers + sensors + k] = numbers[k] if is_finite(1, at(goals, k)) else 0.0
         seen = seen or weights[markers + sensors + k] > 0.0
     return seen
@@ -393,7 +375,7 @@ def descend_to_minimum(
         Cost, number of steps, and status.
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    step = at(v, p[STEP])
+    step = at(v, p[FIT.STEP])
     before, bends, status = inf, damping == LIGHTEST, STUCK
     copy_numbers(size, start, y)
     steps = 0

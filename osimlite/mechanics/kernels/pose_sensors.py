@@ -15,17 +15,7 @@ from math import acos, pi, sqrt
 from osimlite.mechanics.kernels.layout import LINK_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import direction, link_work
-from osimlite.mechanics.kernels.pose_record import (
-    MARKER_NUMBERS,
-    MARKERS,
-    MEASURED,
-    SENSOR_AT,
-    SENSOR_NUMBERS,
-    SENSORS,
-    TURNED,
-    WEIGHTS,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import FIT, MARKER_NUMBERS, SENSOR_NUMBERS, Fit
 from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     ZERO,
@@ -59,8 +49,8 @@ def add_sensors(m: Fit) -> float:
         Cost of the sensors.
     """
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
-    for k in range(p[SENSORS]):
-        weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
+    for k in range(p[FIT.SENSORS]):
+        weight, link = v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + k], p[p[FIT.SENSOR_AT] + k]
         if not weight > 0.0:
             continue
         off = sensor_rotation(m, k)
@@ -72,7 +62,7 @@ def add_sensors(m: Fit) -> float:
         i, load, turned = (
             at(here, LINK_WORK.INERTIA),
             at(here, LINK_WORK.WRENCH),
-            at(v, p[TURNED] + 9 * link),
+            at(v, p[FIT.TURNED] + 9 * link),
         )
         # Symmetric part of the derivative of the spring's torque: weight (1 + c [phi]^2).
         x, y, z = times(weight * squared_factor(sqrt(square)), off)
@@ -116,9 +106,9 @@ def sensor_rotation(m: Fit, sensor: int) -> Vector:
     Returns:
         Rotation vector in ground (rad).
     """
-    rows = at(m.c, MARKER_NUMBERS * m.p[MARKERS] + SENSOR_NUMBERS * sensor)
-    target = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
-    return rotation_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, target)
+    rows = at(m.c, MARKER_NUMBERS * m.p[FIT.MARKERS] + SENSOR_NUMBERS * sensor)
+    target = at(m.v, m.p[FIT.MEASURED] + 3 * m.p[FIT.MARKERS] + 9 * sensor)
+    return rotation_between(m.model, m.data, m.p[m.p[FIT.SENSOR_AT] + sensor], rows, target)
 
 
 def rotation_between(model: Ints, data: Floats, link: int, rows: Floats, target: Floats) -> Vector:

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from math import floor, inf, pi
 
-from osimlite.mechanics.kernels.layout import GRAVITY_AT, LINK, MODEL
+from osimlite.mechanics.kernels.layout import LINK, MODEL, REALS
 from osimlite.mechanics.kernels.pointers import Floats, at, copy_numbers
 from osimlite.mechanics.kernels.points import link_ints
 from osimlite.mechanics.kernels.pose_constraints import fulfil_constraints
 from osimlite.mechanics.kernels.pose_cost import evaluate_cost, evaluate_pose
-from osimlite.mechanics.kernels.pose_record import (
-    AT_END,
-    RANGES_AT,
-    RESOLVED_AT,
-    TRIAL,
-    VARIABLE,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM, Fit
 from osimlite.mechanics.laws.vectors import dot, vector
 
 INWARDS = 0.3
@@ -39,7 +32,7 @@ def start_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> N
         start: filled (n,).
         inwards: distance from the ends, at most half of the range (rad or m).
     """
-    ranges = at(m.c, m.p[RANGES_AT])
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
         if low < high:
@@ -63,20 +56,20 @@ def start_turned(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: 
     Returns:
         Whether the degree of freedom is such a coordinate.
     """
-    model, p, ranges = m.model, m.p, at(m.c, m.p[RANGES_AT])
+    model, p, ranges = m.model, m.p, at(m.c, m.p[FIT.RANGES_AT])
     start_inwards(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
     if not (
         joint_to_ground(m, freedom) >= 0
         and is_inside
-        and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)
+        and p[p[FIT.RESOLVED_AT] + freedom] in (FREEDOM.VARIABLE, FREEDOM.AT_END)
     ):
         return False
     # The axis of the turn depends on the pose, unless it is the first of its joint.
     evaluate_pose(m, from_pose)
     down, turn = (
-        vector(m.reals, GRAVITY_AT),
+        vector(m.reals, REALS.GRAVITY),
         vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom),
     )
     # The axis is within 45 degrees of the vertical.
@@ -109,9 +102,9 @@ def is_angle(m: Fit, freedom: int) -> bool:
     # a translation.
     turn, mark = (
         vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom),
-        m.p[m.p[RESOLVED_AT] + freedom],
+        m.p[m.p[FIT.RESOLVED_AT] + freedom],
     )
-    return dot(turn, turn) > 0.0 and mark in (VARIABLE, AT_END)
+    return dot(turn, turn) > 0.0 and mark in (FREEDOM.VARIABLE, FREEDOM.AT_END)
 
 
 def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
@@ -122,7 +115,7 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
         y: state.
         freedom: degree of freedom.
     """
-    ranges = at(m.c, m.p[RANGES_AT])
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
     # A coordinate whose range is a single value is at both ends, and has no other start.
     return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
@@ -145,7 +138,7 @@ def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     Returns:
         Whether the degree of freedom is such an angle.
     """
-    ranges = at(m.c, m.p[RANGES_AT])
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
     if not is_at_end(m, y, freedom) or not (
         high - low > pi + SAME or joint_to_ground(m, freedom) >= 0
@@ -179,7 +172,7 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
         return False
     copy_numbers(m.model[MODEL.DOFS], y, start)
     evaluate_pose(m, y)
-    j, ranges = link_ints(m.model, link), at(m.c, m.p[RANGES_AT])
+    j, ranges = link_ints(m.model, link), at(m.c, m.p[FIT.RANGES_AT])
     for k in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
         if k != freedom and is_angle(m, k):
             others += 1
@@ -201,11 +194,11 @@ def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
     Returns:
         Whether there are any.
     """
-    ranges, result = at(m.c, m.p[RANGES_AT]), False
+    ranges, result = at(m.c, m.p[FIT.RANGES_AT]), False
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
         # The descent marks coordinates that it stopped at an end of their range.
-        if m.p[m.p[RESOLVED_AT] + k] == AT_END and low < high:
+        if m.p[m.p[FIT.RESOLVED_AT] + k] == FREEDOM.AT_END and low < high:
             inwards = min(INWARDS, 0.5 * (high - low))
             start[k], result = low + inwards if y[k] <= low else high - inwards, True
     return result
@@ -226,8 +219,8 @@ def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: fl
     """
     size, ranges, trial, result = (
         m.model[MODEL.DOFS],
-        at(m.c, m.p[RANGES_AT]),
-        at(m.v, m.p[TRIAL]),
+        at(m.c, m.p[FIT.RANGES_AT]),
+        at(m.v, m.p[FIT.TRIAL]),
         False,
     )
     copy_numbers(size, y, start)

@@ -16,22 +16,7 @@ from osimlite.mechanics.kernels.linear_algebra import (
 )
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.pose_cost import count_equations
-from osimlite.mechanics.kernels.pose_record import (
-    AT_END,
-    BEND,
-    CURVES,
-    ERRORS,
-    FREE_AT,
-    RANGES_AT,
-    RESOLVED_AT,
-    ROOM,
-    ROWS,
-    SLOPE,
-    STEP,
-    STIFFNESS,
-    VARIABLE,
-    Fit,
-)
+from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM, Fit
 from osimlite.mechanics.kernels.projection import REDUNDANT
 
 SMALLEST = 1e-14
@@ -51,8 +36,8 @@ def list_free(m: Fit) -> int:
     """
     p, count = m.p, 0
     for k in range(m.model[MODEL.DOFS]):
-        if p[p[RESOLVED_AT] + k] == VARIABLE:
-            p[p[FREE_AT] + count] = k
+        if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.VARIABLE:
+            p[p[FIT.FREE_AT] + count] = k
             count += 1
     return count
 
@@ -69,16 +54,21 @@ def free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Fl
         Workspace of their factor, which begins with the left sides; right sides; workspace after them.
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count, rows, errors, step = count_equations(m), at(v, p[ROWS]), at(v, p[ERRORS]), at(v, p[STEP])
-    factor = at(v, p[ROOM] + 2 * size)
+    count, rows, errors, step = (
+        count_equations(m),
+        at(v, p[FIT.ROWS]),
+        at(v, p[FIT.ERRORS]),
+        at(v, p[FIT.STEP]),
+    )
+    factor = at(v, p[FIT.ROOM] + 2 * size)
     right = at(factor, count * size + count * count + 3 * count + 1)
     for k in range(count):
         right[k] = -errors[k]
         for j in range(free):
-            factor[free * k + j] = rows[size * k + p[p[FREE_AT] + j]]
+            factor[free * k + j] = rows[size * k + p[p[FIT.FREE_AT] + j]]
         if has_step > 0:
             for j in range(size):
-                if p[p[RESOLVED_AT] + j] == AT_END:
+                if p[p[FIT.RESOLVED_AT] + j] == FREEDOM.AT_END:
                     right[k] -= rows[size * k + j] * step[j]
     return factor, right, at(right, count)
 
@@ -93,22 +83,25 @@ def find_ends(m: Fit, y: Floats) -> None:
         y: state of the pose.
     """
     p, v = m.p, m.v
-    ranges, slope = at(m.c, p[RANGES_AT]), at(v, p[SLOPE])
+    ranges, slope = at(m.c, p[FIT.RANGES_AT]), at(v, p[FIT.SLOPE])
     for k in range(m.model[MODEL.DOFS]):
-        if p[p[RESOLVED_AT] + k] == VARIABLE or p[p[RESOLVED_AT] + k] == AT_END:
+        if (
+            p[p[FIT.RESOLVED_AT] + k] == FREEDOM.VARIABLE
+            or p[p[FIT.RESOLVED_AT] + k] == FREEDOM.AT_END
+        ):
             low, high = ranges[2 * k], ranges[2 * k + 1]
             out = (
                 (y[k] <= low and slope[k] > 0.0) or (y[k] >= high and slope[k] < 0.0) or low == high
             )
-            p[p[RESOLVED_AT] + k] = AT_END if out else VARIABLE
+            p[p[FIT.RESOLVED_AT] + k] = FREEDOM.AT_END if out else FREEDOM.VARIABLE
 
 
 def free_ends(m: Fit) -> None:
     """Mark all coordinates at an end of their range as free."""
     p = m.p
     for k in range(m.model[MODEL.DOFS]):
-        if p[p[RESOLVED_AT] + k] == AT_END:
-            p[p[RESOLVED_AT] + k] = VARIABLE
+        if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.AT_END:
+            p[p[FIT.RESOLVED_AT] + k] = FREEDOM.VARIABLE
 
 
 def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
@@ -124,7 +117,7 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
         Whether the model is convex.
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    step, ranges = at(v, p[STEP]), at(m.c, p[RANGES_AT])
+    step, ranges = at(v, p[FIT.STEP]), at(m.c, p[FIT.RANGES_AT])
     for k in range(size):
         step[k] = 0.0
     # Active-set method: coordinates that would leave their ranges stop at the ends, and the others
@@ -137,14 +130,18 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
         result = at(v, solution)
         again = False
         for k in range(free):
-            freedom = p[p[FREE_AT] + k]
+            freedom = p[p[FIT.FREE_AT] + k]
             to = y[freedom] + result[k]
             end = ranges[2 * freedom] if to < ranges[2 * freedom] else ranges[2 * freedom + 1]
             if to < ranges[2 * freedom] or to > ranges[2 * freedom + 1]:
-                step[freedom], p[p[RESOLVED_AT] + freedom], again = end - y[freedom], AT_END, True
+                step[freedom], p[p[FIT.RESOLVED_AT] + freedom], again = (
+                    end - y[freedom],
+                    FREEDOM.AT_END,
+                    True,
+                )
         if not again:
             for k in range(free):
-                step[p[p[FREE_AT] + k]] = result[k]
+                step[p[p[FIT.FREE_AT] + k]] = result[k]
             return True
 
 
@@ -163,25 +160,25 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     stiffness, bend, slope, step = (
-        at(v, p[STIFFNESS]),
-        at(v, p[BEND]),
-        at(v, p[SLOPE]),
-        at(v, p[STEP]),
+        at(v, p[FIT.STIFFNESS]),
+        at(v, p[FIT.BEND]),
+        at(v, p[FIT.SLOPE]),
+        at(v, p[FIT.STEP]),
     )
     count = count_equations(m)
-    offset = p[ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
+    offset = p[FIT.ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
     solution, matrix = at(v, offset), at(v, offset + size)
     for k in range(free):
-        freedom = p[p[FREE_AT] + k]
+        freedom = p[p[FIT.FREE_AT] + k]
         # Steps that are known already move to the right side.
         row, more, total = at(stiffness, size * freedom), at(bend, size * freedom), -slope[freedom]
-        constraint_row = at(v, p[CURVES] + (size * freedom if count > 0 else 0))
+        constraint_row = at(v, p[FIT.CURVES] + (size * freedom if count > 0 else 0))
         for j in range(size):
-            if p[p[RESOLVED_AT] + j] == AT_END:
+            if p[p[FIT.RESOLVED_AT] + j] == FREEDOM.AT_END:
                 total -= (row[j] + bent * more[j]) * step[j]
         solution[k] = total
         for j in range(free):
-            other = p[p[FREE_AT] + j]
+            other = p[p[FIT.FREE_AT] + j]
             matrix[free * k + j] = row[other] + bent * more[other]
             if count > 0:
                 matrix[free * k + j] += bent * constraint_row[other]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
-from osimlite.mechanics.kernels.error_control import ACCEPTED, project_by_law
-from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, STAGE, WORK
+from osimlite.mechanics.kernels.error_control import METHOD_WORK, project_by_law
+from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, STAGE, WORK, Record
 from osimlite.mechanics.kernels.pointers import (
     Floats,
     Ints,
@@ -18,41 +18,55 @@ from osimlite.mechanics.kernels.pointers import (
 from osimlite.mechanics.kernels.points import station
 from osimlite.mechanics.laws.vectors import dot, vector
 
-DONE = 0
-"""Ending of a run that reached its last time."""
-FAILED = 1
-"""Ending of a run at a state beyond which there is no step."""
-FULL = 2
-"""Ending of a run whose log is full."""
-STOPPED = 3
-"""Ending of a run at an event that stops it."""
-TOO_MANY = 4
-"""Ending of a run that tried as many steps as were allowed."""
+
+class ENDING(metaclass=Record):
+    """How a run ended."""
+
+    DONE = 0
+    """Run that reached its last time."""
+    FAILED = 1
+    """Run that reached a state beyond which there is no step."""
+    FULL = 2
+    """Run whose log is full."""
+    STOPPED = 3
+    """Run that an event stopped."""
+    TOO_MANY = 4
+    """Run that tried as many steps as were allowed."""
+
 
 TIME_OF_EVENT = 1e-9
 """Accuracy of the time of an event on the interpolated motion (s)."""
 
-TAKEN = 0
-"""Index in the counts of the number of accepted steps."""
-ATTEMPTED = 1
-"""Index of the number of tried steps."""
-EVALUATIONS = 2
-"""Index of the number of evaluations."""
-REPORTED = 3
-"""Index of the number of reports."""
-LOGGED = 4
-"""Index of the number of steps in the log."""
-EVENTS = 5
-"""Index of the number of events; those beyond the workspace are only counted."""
-COUNTED = 6
-"""Number of counts."""
 
-COORDINATE = 0
-"""Type of watch: the value of a coordinate."""
-HEIGHT = 1
-"""Type of watch: the position of a point along a direction."""
-TOUCH = 2
-"""Type of watch: a contact."""
+class COUNTS(metaclass=Record):
+    """Counts of a run."""
+
+    TAKEN = 0
+    """Number of accepted steps."""
+    ATTEMPTED = 1
+    """Number of tried steps."""
+    EVALUATIONS = 2
+    """Number of evaluations."""
+    REPORTED = 3
+    """Number of reports."""
+    LOGGED = 4
+    """Number of steps in the log."""
+    EVENTS = 5
+    """Number of events; those beyond the workspace are only counted."""
+    SIZE = 6
+    """Number of counts."""
+
+
+class WATCH(metaclass=Record):
+    """Types of watches."""
+
+    COORDINATE = 0
+    """The value of a coordinate."""
+    HEIGHT = 1
+    """The position of a point along a direction."""
+    TOUCH = 2
+    """A contact."""
+
 
 STATES = 6
 """Number of states of workspace that a run needs at WORK_STATE.
@@ -60,24 +74,28 @@ STATES = 6
 Two numbers for each contact and watch follow.
 """
 
-MOST_TRIES = 0
-"""Index in the sizes of the largest number of tried steps."""
-TIMES = 1
-"""Index of the number of reports."""
-MOST_EVENTS = 2
-"""Index of the number of rows for events."""
-EVENT = 3
-"""Index of the length of a row of an event: 3, or more if it holds the state."""
-WATCHES = 4
-"""Index of the number of watches."""
-MOST_LOGGED = 5
-"""Index of the number of rows of the log, 0 for no log."""
-START_HOLDS = 6
-"""Index of 1 if the constraints hold at the start, else 0."""
-METHOD = 7
-"""Index of the address of the integration method."""
-METHOD_AT = 8
-"""Index of the offset in `data` of the method's record."""
+
+class RUN_SIZES(metaclass=Record):
+    """Sizes and settings of a run."""
+
+    MOST_TRIES = 0
+    """Largest number of tried steps."""
+    TIMES = 1
+    """Number of reports."""
+    MOST_EVENTS = 2
+    """Number of rows for events."""
+    EVENT = 3
+    """Length of a row of an event: 3, or more if it holds the state."""
+    WATCHES = 4
+    """Number of watches."""
+    MOST_LOGGED = 5
+    """Number of rows of the log, 0 for no log."""
+    START_HOLDS = 6
+    """1 if the constraints hold at the start, else 0."""
+    METHOD = 7
+    """Address of the integration method."""
+    METHOD_AT = 8
+    """Offset in `data` of the method's record."""
 
 
 class Motion(NamedTuple):
@@ -91,10 +109,12 @@ class Motion(NamedTuple):
 
     model: Ints  # the mechanism
     reals: Floats  # its numbers
-    data: Floats  # results and workspace; the record of the integration method at METHOD_AT
-    sizes: Ints  # see MOST_TRIES
+    data: (
+        Floats  # results and workspace; the record of the integration method at RUN_SIZES.METHOD_AT
+    )
+    sizes: Ints  # see `RUN_SIZES`
     clock: Floats  # time and next step to try, s; changed
-    counts: Ints  # see TAKEN; changed
+    counts: Ints  # see `COUNTS`; changed
     times: Floats  # of the reports, s (r,)
     reports: Floats  # states at these times (r, y)
     log: Floats  # of each step the time, y, f (k, 1 + 2y)
@@ -152,7 +172,15 @@ def interpolate_state(
     # projected.
     if m.model[MODEL.CONSTRAINED] > 0:
         project_by_law(
-            m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf
+            m.model,
+            m.reals,
+            m.data,
+            t,
+            y,
+            y,
+            0,
+            m.data[m.sizes[RUN_SIZES.METHOD_AT] + METHOD_WORK.ACCEPTED] / 10.0,
+            inf,
         )
 
 
@@ -182,7 +210,7 @@ def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
         y: state.
         f: its rates.
     """
-    size, row = m.model[MODEL.STATE_SIZE], m.counts[LOGGED]
+    size, row = m.model[MODEL.STATE_SIZE], m.counts[COUNTS.LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
     copy_numbers(size, y, at(log, 1))
@@ -193,7 +221,7 @@ def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
             at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
             at(m.forces, 3 * (m.model[MODEL.CONTACTS] * row + pair)),
         )
-    m.counts[LOGGED] += 1
+    m.counts[COUNTS.LOGGED] += 1
 
 
 def compute_levels(m: Motion, y: Floats, levels: Floats) -> None:
@@ -210,11 +238,11 @@ def compute_levels(m: Motion, y: Floats, levels: Floats) -> None:
         # A contact transmits a force or does not: between -1 and 1 the level always changes its
         # sign.
         levels[pair] = 1.0 if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0 else -1.0
-    for number in range(m.sizes[WATCHES]):
+    for number in range(m.sizes[RUN_SIZES.WATCHES]):
         watch, a = at(m.watches, 3 * number), at(m.levels, 7 * number)
-        if watch[0] == COORDINATE:
+        if watch[0] == WATCH.COORDINATE:
             levels[pairs + number] = y[watch[1]] - a[6]
-        elif watch[0] == TOUCH:
+        elif watch[0] == WATCH.TOUCH:
             levels[pairs + number] = levels[watch[1]]
         else:
             levels[pairs + number] = (
@@ -251,7 +279,12 @@ def note_events(
     """
     counts, events = m.counts, m.events
     size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
-    stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
+    stop, first, total, event = (
+        inf,
+        counts[COUNTS.EVENTS],
+        pairs + m.sizes[RUN_SIZES.WATCHES],
+        m.sizes[RUN_SIZES.EVENT],
+    )
     # WORK_STATE has room for STATES states, and `integrate_run` uses the first four.
     ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(after, total)
@@ -268,7 +301,7 @@ def note_events(
                 break
             interpolate_state(m, t0, y0, f0, t1, y1, f1, middle, ya)
             # Contacts need forces, all other watches only poses.
-            touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
+            touch = number < pairs or m.watches[3 * (number - pairs)] == WATCH.TOUCH
             evaluate_state(m, middle, ya, fa, STAGE.FORCE if touch else STAGE.POSITION)
             compute_levels(m, ya, result)
             if (result[number] > 0.0) == rises:
@@ -281,14 +314,14 @@ def note_events(
             t = high
             stop = min(stop, t)
         row = insert_event(m, first, t, number, rises)
-        if row < m.sizes[MOST_EVENTS] and event > 3:
+        if row < m.sizes[RUN_SIZES.MOST_EVENTS] and event > 3:
             interpolate_state(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
     # Drop events after the end of the run.
     # Events are sorted by time, so those after the end are the last ones.
-    while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
-        if events[event * (counts[EVENTS] - 1)] <= stop:
+    while counts[COUNTS.EVENTS] > first and counts[COUNTS.EVENTS] <= m.sizes[RUN_SIZES.MOST_EVENTS]:
+        if events[event * (counts[COUNTS.EVENTS] - 1)] <= stop:
             break
-        counts[EVENTS] -= 1
+        counts[COUNTS.EVENTS] -= 1
     return stop
 
 
@@ -308,9 +341,9 @@ def insert_event(m: Motion, first: int, t: float, number: int, rises: bool) -> i
     Returns:
         Index of the row, which does not exist if the records are full; the event is counted then.
     """
-    row, events, length = int(m.counts[EVENTS]), m.events, m.sizes[EVENT]
-    m.counts[EVENTS] += 1
-    if row >= m.sizes[MOST_EVENTS]:
+    row, events, length = int(m.counts[COUNTS.EVENTS]), m.events, m.sizes[RUN_SIZES.EVENT]
+    m.counts[COUNTS.EVENTS] += 1
+    if row >= m.sizes[RUN_SIZES.MOST_EVENTS]:
         return row
     # Insertion sort: few events happen within one step.
     while row > first and events[length * (row - 1)] > t:

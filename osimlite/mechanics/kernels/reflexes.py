@@ -19,24 +19,35 @@ from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.sensors import SOURCE, foot_lead, read_source
 
-EARLY_STANCE = 0
-"""State of a leg that carries load with the foot ahead."""
-LATE_STANCE = 1
-"""State of a leg that carries load with the foot behind."""
-LIFTOFF = 2
-"""State of a leg that is being unloaded."""
-SWING = 3
-"""State of a leg without load."""
-LANDING = 4
-"""State of a leg in swing whose foot is far ahead."""
-UNKNOWN = -1
-"""State of a leg before the first control step."""
-FREE = 0
-"""Kind of a term that may have any sign."""
-OF_SENSOR = 1
-"""Kind of a term with max(sensor - offset, 0)."""
-OF_RESULT = 2
-"""Kind of a term with max(gain * (sensor - offset), 0)."""
+
+class LEG_STATE(metaclass=Record):
+    """States of a leg."""
+
+    EARLY_STANCE = 0
+    """Leg that carries load with the foot ahead."""
+    LATE_STANCE = 1
+    """Leg that carries load with the foot behind."""
+    LIFTOFF = 2
+    """Leg that is being unloaded."""
+    SWING = 3
+    """Leg without load."""
+    LANDING = 4
+    """Leg in swing whose foot is far ahead."""
+    UNKNOWN = -1
+    """Leg before the first control step."""
+
+
+class TERM_TYPE(metaclass=Record):
+    """Types of terms."""
+
+    FREE = 0
+    """Term that may have any sign."""
+    OF_SENSOR = 1
+    """Term with max(sensor - offset, 0)."""
+    OF_RESULT = 2
+    """Term with max(gain * (sensor - offset), 0)."""
+
+
 OF_GATE = 2
 """Number of integers of a gate."""
 OF_EACH = 3
@@ -44,10 +55,16 @@ OF_EACH = 3
 NEAR = 1e-9
 """A delay this near to whole control steps counts as whole, as it was divided by the step."""
 
-OF_CONTROLS = 0
-"""Stream of the random numbers for controls."""
-OF_SENSORS = 1
-"""Stream of the random numbers for sensors."""
+
+class NOISE(metaclass=Record):
+    """Streams of random numbers."""
+
+    CONTROLS = 0
+    """Random numbers for controls."""
+    SENSORS = 1
+    """Random numbers for sensors."""
+
+
 WORD = 0xFFFFFFFF
 """Mask of 32 bits."""
 
@@ -87,7 +104,7 @@ class TERM(metaclass=Record):
     Attributes:
         TARGET: control that the term is added to.
         SENSOR: number of its sensor, -1 for none.
-        KIND: FREE, OF_SENSOR or OF_RESULT; without a sensor the power of time.
+        KIND: FREE, OF_SENSOR or OF_RESULT of `TERM_TYPE`; without a sensor the power of time.
         LEG, STATES: leg whose states decide, and these states as bits.
         GATE: number of the gate that may suppress the term, or -1.
     """
@@ -135,7 +152,7 @@ def record_sensors(
         for k in range(sensors):
             width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(newest[k])
             if width > 0.0:
-                newest[k] += width * draw_normal(int(p[LIMITS.SEED]), OF_SENSORS, frames, k)
+                newest[k] += width * draw_normal(int(p[LIMITS.SEED]), NOISE.SENSORS, frames, k)
 
 
 def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> None:
@@ -152,7 +169,7 @@ def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> No
         for k in range(count):
             width = p[LIMITS.CONTROL_NOISE] + p[LIMITS.CONTROL_PART] * controls[k]
             if width > 0.0:
-                controls[k] += width * draw_normal(int(p[LIMITS.SEED]), OF_CONTROLS, step, k)
+                controls[k] += width * draw_normal(int(p[LIMITS.SEED]), NOISE.CONTROLS, step, k)
 
 
 def delayed_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
@@ -236,22 +253,30 @@ def next_leg_state(
     # Liftoff begins as soon as the other leg stands with its foot ahead.
     follows = other_stands and here < other
     # The first control step decides by the load alone.
-    if state == UNKNOWN and not stands:
-        return LANDING if lands else SWING
-    if is_direct and swings and EARLY_STANCE <= state <= LATE_STANCE:
-        return SWING
-    if state <= EARLY_STANCE:
-        return LIFTOFF if follows else LATE_STANCE if late else EARLY_STANCE
-    if state == LATE_STANCE:
-        return LIFTOFF if follows or here < limits[LIMITS.LEAVES] else LATE_STANCE
-    if state == LIFTOFF:
-        return SWING if swings else LIFTOFF
-    if state == SWING:
+    if state == LEG_STATE.UNKNOWN and not stands:
+        return LEG_STATE.LANDING if lands else LEG_STATE.SWING
+    if is_direct and swings and LEG_STATE.EARLY_STANCE <= state <= LEG_STATE.LATE_STANCE:
+        return LEG_STATE.SWING
+    if state <= LEG_STATE.EARLY_STANCE:
+        return (
+            LEG_STATE.LIFTOFF
+            if follows
+            else LEG_STATE.LATE_STANCE
+            if late
+            else LEG_STATE.EARLY_STANCE
+        )
+    if state == LEG_STATE.LATE_STANCE:
+        return (
+            LEG_STATE.LIFTOFF if follows or here < limits[LIMITS.LEAVES] else LEG_STATE.LATE_STANCE
+        )
+    if state == LEG_STATE.LIFTOFF:
+        return LEG_STATE.SWING if swings else LEG_STATE.LIFTOFF
+    if state == LEG_STATE.SWING:
         if stands:
             # A foot that touches behind the other one has stumbled, and stays in swing.
-            return EARLY_STANCE if here > other else SWING
-        return LANDING if lands else SWING
-    return EARLY_STANCE if stands else LANDING
+            return LEG_STATE.EARLY_STANCE if here > other else LEG_STATE.SWING
+        return LEG_STATE.LANDING if lands else LEG_STATE.SWING
+    return LEG_STATE.EARLY_STANCE if stands else LEG_STATE.LANDING
 
 
 def add_reflexes(
@@ -283,10 +308,10 @@ def add_reflexes(
             ):
                 continue
             value = delayed_sensor(i, frames, history, term[TERM.SENSOR], own[0]) - own[2]
-            if term[TERM.KIND] == OF_SENSOR:
+            if term[TERM.KIND] == TERM_TYPE.OF_SENSOR:
                 value = max(value, 0.0)
             value *= own[1]
-            if term[TERM.KIND] == OF_RESULT:
+            if term[TERM.KIND] == TERM_TYPE.OF_RESULT:
                 value = max(value, 0.0)
         else:
             since = frames - 1.0 - own[0]
@@ -320,7 +345,7 @@ def draw_normal(seed: int, what: int, step: int, number: int) -> float:
 
     Args:
         seed: seed of 64 bits.
-        what: stream, OF_CONTROLS or OF_SENSORS.
+        what: stream, CONTROLS or SENSORS of `NOISE`.
         step: number of the control step.
         number: number of the control or sensor.
     """

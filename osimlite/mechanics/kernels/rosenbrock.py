@@ -17,24 +17,19 @@ from osimlite.mechanics.kernels.condensation import (
     linearise_state,
     solve_condensed,
 )
-from osimlite.mechanics.kernels.error_control import (
-    ACCEPTED,
-    ERRORS,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    IS_EVALUATED,
-    LAST_TIME,
-    MEMORY,
-    NEXT_STEP,
-    REACHED,
-    project_and_measure,
-)
-from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.error_control import ERRORS, METHOD_WORK, project_and_measure
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
 
-IS_NEW = MEMORY
-"""Index in the method's record of 1.0 if the derivatives are those at the start of the step."""
-HEAD = MEMORY + 1
+
+class ROSENBROCK_WORK(metaclass=Record):
+    """Memory of the method in its record, see `METHOD_WORK`."""
+
+    IS_NEW = METHOD_WORK.MEMORY
+    """1.0 if the derivatives are those at the start of the step."""
+
+
+HEAD = METHOD_WORK.MEMORY + 1
 """Length of the head of the method's record, see `error_control`."""
 IS_IMPLICIT = True
 """Whether the method needs derivatives of the forces."""
@@ -124,26 +119,27 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
     h = at(data, place)
     stages, work = at(h, HEAD), at(h, HEAD + STATES * size)
     errors, f1 = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
-    t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
-    h[EVALUATED], h[HAS_DERIVATIVE] = 2.0, 0.0
+    t0, accuracy, step = h[METHOD_WORK.REACHED], h[METHOD_WORK.ACCEPTED], h[METHOD_WORK.NEXT_STEP]
+    h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 2.0, 0.0
     # A step that almost reaches the limit is stretched or cut to it.
-    t1 = h[LAST_TIME] if h[LAST_TIME] <= t0 + 1.001 * step else t0 + step
+    t1 = h[METHOD_WORK.LAST_TIME] if h[METHOD_WORK.LAST_TIME] <= t0 + 1.001 * step else t0 + step
     # A step that was cut much shorter is no basis for the size of the next one.
     cut = t1 - t0 < 0.95 * step
     step = t1 - t0
     c, error = DIAGONAL * step, inf
     # After a rejection the derivatives at the start are still valid.
-    if h[IS_NEW] == 0.0:
+    if h[ROSENBROCK_WORK.IS_NEW] == 0.0:
         data[WORK.TIME] = t0
         copy_numbers(size, y0, y1)
-        h[IS_NEW] = (
+        h[ROSENBROCK_WORK.IS_NEW] = (
             1.0
-            if linearise_state(model, reals, data, y1, f1, work, h[IS_EVALUATED]) == OUTCOME.OK
+            if linearise_state(model, reals, data, y1, f1, work, h[METHOD_WORK.IS_EVALUATED])
+            == OUTCOME.OK
             else 0.0
         )
-    h[IS_EVALUATED] = 0.0
+    h[METHOD_WORK.IS_EVALUATED] = 0.0
     if (
-        h[IS_NEW] > 0.0
+        h[ROSENBROCK_WORK.IS_NEW] > 0.0
         and condense_system(model, c, work)
         and compute_stages(model, reals, data, t0, step, c, y0, y1, stages, work)
     ):
@@ -157,11 +153,13 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of time, the actual step is longer than the requested one.
-        h[NEXT_STEP] = min(max(factor, SHRINK) * step, SAFETY * h[NEXT_STEP])
+        h[METHOD_WORK.NEXT_STEP] = min(
+            max(factor, SHRINK) * step, SAFETY * h[METHOD_WORK.NEXT_STEP]
+        )
         return OUTCOME.OK
-    h[REACHED], h[IS_NEW] = t1, 0.0
+    h[METHOD_WORK.REACHED], h[ROSENBROCK_WORK.IS_NEW] = t1, 0.0
     if factor < 1.0 or (factor >= WORTH and not cut):
-        h[NEXT_STEP] = min(factor, GROW) * step
+        h[METHOD_WORK.NEXT_STEP] = min(factor, GROW) * step
     return OUTCOME.OK
 
 

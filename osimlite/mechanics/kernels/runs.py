@@ -7,43 +7,14 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.error_control import (
-    ACCEPTED,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    IS_EVALUATED,
-    LAST_TIME,
-    MEMORY,
-    NEXT_STEP,
-    REACHED,
-    SHORTEST,
-    project_by_law,
-    shortest_step,
-)
+from osimlite.mechanics.kernels.error_control import METHOD_WORK, project_by_law, shortest_step
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
 from osimlite.mechanics.kernels.record import (
-    ATTEMPTED,
-    COUNTED,
-    DONE,
-    EVALUATIONS,
-    EVENT,
-    FAILED,
-    FULL,
-    LOGGED,
-    METHOD,
-    METHOD_AT,
-    MOST_EVENTS,
-    MOST_LOGGED,
-    MOST_TRIES,
-    REPORTED,
-    START_HOLDS,
+    COUNTS,
+    ENDING,
+    RUN_SIZES,
     STATES,
-    STOPPED,
-    TAKEN,
-    TIMES,
-    TOO_MANY,
-    WATCHES,
     Motion,
     compute_levels,
     evaluate_state,
@@ -82,9 +53,9 @@ def run_several(
         reals: numbers of the runs, in rows of `each`.
         data: workspace of an evaluation and of the method, shared.
         each: length of a row of numbers, 0 if all runs share one.
-        sizes: sizes and settings, see `MOST_TRIES`.
+        sizes: sizes and settings, see `RUN_SIZES`.
         clocks: per run time and next step to try (s).
-        counts: per run the counts, see `TAKEN`.
+        counts: per run the counts, see `COUNTS`.
         states: per run the state; changed.
         times: times of the reports (s).
         reports: per run the states at these times.
@@ -94,7 +65,7 @@ def run_several(
         peaks: per run the largest forces of contacts.
         watches: watches, see `Motion`.
         levels: numbers of the watches.
-        endings: filled with the ending of each run, see `DONE`.
+        endings: filled with the ending of each run, see `ENDING`.
         first: number of the first run.
         last: end of the runs.
 
@@ -151,9 +122,9 @@ def select_run(
         reals: numbers of the runs, in rows of `each`.
         data: workspace of an evaluation and of the method, shared.
         each: length of a row of numbers, 0 if all runs share one.
-        sizes: sizes and settings, see `MOST_TRIES`.
+        sizes: sizes and settings, see `RUN_SIZES`.
         clocks: per run time and next step to try (s).
-        counts: per run the counts, see `TAKEN`.
+        counts: per run the counts, see `COUNTS`.
         states: per run the state.
         times: times of the reports (s).
         reports: per run the states at these times.
@@ -172,12 +143,12 @@ def select_run(
         data,
         sizes,
         at(clocks, 2 * k),
-        at(counts, COUNTED * k),
+        at(counts, COUNTS.SIZE * k),
         times,
-        at(reports, k * sizes[TIMES] * size),
+        at(reports, k * sizes[RUN_SIZES.TIMES] * size),
         log,
         forces,
-        at(events, sizes[EVENT] * k * sizes[MOST_EVENTS]),
+        at(events, sizes[RUN_SIZES.EVENT] * k * sizes[RUN_SIZES.MOST_EVENTS]),
         at(peaks, 2 * k * pairs),
         watches,
         levels,
@@ -193,89 +164,103 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
         is_going: whether the derivative at the end of the previous run is that at the start.
 
     Returns:
-        The ending, see `DONE`.
+        The ending, see `ENDING`.
     """
     model, counts, clock, sizes = m.model, m.counts, m.clock, m.sizes
     size = model[MODEL.STATE_SIZE]
-    work, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[METHOD_AT])
+    work, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[RUN_SIZES.METHOD_AT])
     y0, f0, y1, f1 = work, at(work, size), at(work, 2 * size), at(work, 3 * size)
     before = at(work, STATES * size)
-    after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
+    after = at(before, model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES])
     # The caller says whether the initial state fulfils the constraints; else project it.
-    is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
+    is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[RUN_SIZES.START_HOLDS] > 0
     if not is_kept and not project_by_law(
-        model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf
+        model, m.reals, m.data, clock[0], y, f0, 0, h[METHOD_WORK.ACCEPTED] / 10.0, inf
     ):
-        return FAILED
+        return ENDING.FAILED
     copy_numbers(size, y, y0)
     status = OUTCOME.OK if is_going else evaluate_state(m, clock[0], y0, f0, STAGE.ACCELERATION)
     # A run that continues keeps the memory of its method.
-    if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
-        counts[EVALUATIONS], h[MEMORY] = 0 if is_going else 1, 0.0
+    if counts[COUNTS.TAKEN] == 0 and counts[COUNTS.EVALUATIONS] == 0:
+        counts[COUNTS.EVALUATIONS], h[METHOD_WORK.MEMORY] = 0 if is_going else 1, 0.0
     if status != OUTCOME.OK or not is_finite(size, f0):
-        return FAILED
-    h[IS_EVALUATED] = 0.0 if is_going else 1.0
+        return ENDING.FAILED
+    h[METHOD_WORK.IS_EVALUATED] = 0.0 if is_going else 1.0
     compute_levels(m, y0, before)
     note_peaks(m, clock[0])
     # Reports at or before the start get the initial state.
-    while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= clock[0]:
-        copy_numbers(size, y0, at(m.reports, size * counts[REPORTED]))
-        counts[REPORTED] += 1
-    while clock[0] < h[LAST_TIME]:
+    while (
+        counts[COUNTS.REPORTED] < sizes[RUN_SIZES.TIMES]
+        and m.times[counts[COUNTS.REPORTED]] <= clock[0]
+    ):
+        copy_numbers(size, y0, at(m.reports, size * counts[COUNTS.REPORTED]))
+        counts[COUNTS.REPORTED] += 1
+    while clock[0] < h[METHOD_WORK.LAST_TIME]:
         # A full log interrupts the run; the caller empties it and continues.
-        if sizes[MOST_LOGGED] > 0 and sizes[MOST_LOGGED] == counts[LOGGED]:
-            return FULL
+        if (
+            sizes[RUN_SIZES.MOST_LOGGED] > 0
+            and sizes[RUN_SIZES.MOST_LOGGED] == counts[COUNTS.LOGGED]
+        ):
+            return ENDING.FULL
         t0 = clock[0]
         t1 = take_step(m, t0, y0, y1)
         if t1 <= t0:
-            return FAILED if t1 < t0 else TOO_MANY
+            return ENDING.FAILED if t1 < t0 else ENDING.TOO_MANY
         # A step whose end has no derivative is repeated with a shorter one.
         if not is_evaluated(m, t1, y1, f1):
             # Simbody ends here; smaller steps come nearer to the point where the motion ends.
-            if t1 - t0 <= shortest_step(t0, counts[ATTEMPTED]):
-                return FAILED
-            clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[ATTEMPTED]))
-            h[MEMORY] = 0.0
+            if t1 - t0 <= shortest_step(t0, counts[COUNTS.ATTEMPTED]):
+                return ENDING.FAILED
+            clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[COUNTS.ATTEMPTED]))
+            h[METHOD_WORK.MEMORY] = 0.0
             continue
-        counts[TAKEN] += 1
+        counts[COUNTS.TAKEN] += 1
         clock[0] = t1
         note_peaks(m, t1)
-        if sizes[MOST_LOGGED] > 0:
+        if sizes[RUN_SIZES.MOST_LOGGED] > 0:
             note_step(m, t1, y1, f1)
         end, stopped = t1, False
         # Contacts and constraints change the results after the method's last evaluation.
-        h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
+        h[METHOD_WORK.IS_EVALUATED] = (
+            1.0 if h[METHOD_WORK.HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
+        )
         # Locate events within the step; one of them may end the run.
-        if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
-            h[IS_EVALUATED] = 0.0
+        if sizes[RUN_SIZES.MOST_EVENTS] > 0 or sizes[RUN_SIZES.WATCHES] > 0:
+            h[METHOD_WORK.IS_EVALUATED] = 0.0
             compute_levels(m, y1, after)
             end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1
             end = min(end, t1)
             # Levels at the end are those at the start of the next step.
-            copy_numbers(model[MODEL.CONTACTS] + sizes[WATCHES], after, before)
-        while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
-            t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
+            copy_numbers(model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES], after, before)
+        while (
+            counts[COUNTS.REPORTED] < sizes[RUN_SIZES.TIMES]
+            and m.times[counts[COUNTS.REPORTED]] <= end
+        ):
+            t, report = (
+                m.times[counts[COUNTS.REPORTED]],
+                at(m.reports, size * counts[COUNTS.REPORTED]),
+            )
             # A report at the end of a step is the state itself, not an interpolated one.
             if t == t1:
                 copy_numbers(size, y1, report)
             else:
                 interpolate_state(m, t0, y0, f0, t1, y1, f1, t, report)
-            counts[REPORTED] += 1
+            counts[COUNTS.REPORTED] += 1
         if stopped:
             if end < t1:
                 interpolate_state(m, t0, y0, f0, t1, y1, f1, end, y)
             else:
                 copy_numbers(size, y1, y)
             clock[0] = end
-            return STOPPED
+            return ENDING.STOPPED
         # The end of this step is the start of the next one.
         y0, y1 = y1, y0
         f0, f1 = f1, f0
         copy_numbers(size, y0, y)
     # The caller finds the derivative in the same place, whatever the number of steps.
     copy_numbers(size, f0, at(work, size))
-    return DONE
+    return ENDING.DONE
 
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
@@ -294,11 +279,11 @@ def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
         Whether the derivative is finite.
     """
     if (
-        m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0
-        and m.model[MODEL.CONTACTS] + m.sizes[WATCHES] == 0
+        m.data[m.sizes[RUN_SIZES.METHOD_AT] + METHOD_WORK.HAS_DERIVATIVE] > 0.0
+        and m.model[MODEL.CONTACTS] + m.sizes[RUN_SIZES.WATCHES] == 0
     ):
         return is_finite(m.model[MODEL.STATE_SIZE], f1)
-    m.counts[EVALUATIONS] += 1
+    m.counts[COUNTS.EVALUATIONS] += 1
     return evaluate_state(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(
         m.model[MODEL.STATE_SIZE], f1
     )
@@ -317,19 +302,19 @@ def take_step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
         The time at the end of the step (s); t0 - 1 without an accepted step, t0 after too many tried steps.
     """
     counts, clock, sizes = m.counts, m.clock, m.sizes
-    h = at(m.data, sizes[METHOD_AT])
+    h = at(m.data, sizes[RUN_SIZES.METHOD_AT])
     # A step at the resolution of time that is rejected ends the run.
-    smallest = max(shortest_step(t0, counts[ATTEMPTED]), h[SHORTEST])
-    h[REACHED], h[NEXT_STEP] = t0, clock[1]
-    while counts[ATTEMPTED] < sizes[MOST_TRIES]:
-        tried = h[NEXT_STEP]
-        counts[ATTEMPTED] += 1
-        call(sizes[METHOD], m.model, m.reals, m.data, y0, y1, sizes[METHOD_AT])
-        counts[EVALUATIONS] += int(h[EVALUATED])
-        clock[1] = h[NEXT_STEP]
-        if h[REACHED] > t0:
-            return float(h[REACHED])
+    smallest = max(shortest_step(t0, counts[COUNTS.ATTEMPTED]), h[METHOD_WORK.SHORTEST])
+    h[METHOD_WORK.REACHED], h[METHOD_WORK.NEXT_STEP] = t0, clock[1]
+    while counts[COUNTS.ATTEMPTED] < sizes[RUN_SIZES.MOST_TRIES]:
+        tried = h[METHOD_WORK.NEXT_STEP]
+        counts[COUNTS.ATTEMPTED] += 1
+        call(sizes[RUN_SIZES.METHOD], m.model, m.reals, m.data, y0, y1, sizes[RUN_SIZES.METHOD_AT])
+        counts[COUNTS.EVALUATIONS] += int(h[METHOD_WORK.EVALUATED])
+        clock[1] = h[METHOD_WORK.NEXT_STEP]
+        if h[METHOD_WORK.REACHED] > t0:
+            return float(h[METHOD_WORK.REACHED])
         if tried <= smallest:
             return t0 - 1.0
-        h[NEXT_STEP] = clock[1] = max(h[NEXT_STEP], smallest)
+        h[METHOD_WORK.NEXT_STEP] = clock[1] = max(h[METHOD_WORK.NEXT_STEP], smallest)
     return t0

@@ -66,22 +66,27 @@ class SENSOR_NUMBERS(metaclass=Record):
     WEIGHT, MASS, STEP, LAGS, HEAD = range(5)
 
 
-IN_ROW = 0
-"""Kind of source: a number of the row."""
-SPINDLE = 1
-"""Kind of source: firing rate of muscle spindles, from a length and a velocity of the row.
+class SOURCE_TYPE(metaclass=Record):
+    """Types of sources."""
 
-Source: A. Prochazka, Prog. Brain Res. 123, 1999, p. 135, with a velocity over the optimal fiber
-length as in SCONE.
+    IN_ROW = 0
+    """A number of the row."""
+    SPINDLE = 1
+    """Firing rate of muscle spindles, from a length and a velocity of the row.
+
+    Source: A. Prochazka, Prog. Brain Res. 123, 1999, p. 135, with a velocity over the optimal fiber
+    length as in SCONE.
 """
-POSITION = 2
-"""Kind of source: position of a point of a link along a direction of ground (m)."""
-VELOCITY = 3
-"""Kind of source: velocity of a point of a link along a direction of ground (m/s)."""
-ANGLE = 4
-"""Kind of source: sum of the angles of successive rotations about y, z and x of a link (rad)."""
-TURN = 5
-"""Kind of source: angular velocity about an axis of a link (rad/s)."""
+    POSITION = 2
+    """Position of a point of a link along a direction of ground (m)."""
+    VELOCITY = 3
+    """Velocity of a point of a link along a direction of ground (m/s)."""
+    ANGLE = 4
+    """Sum of the angles of successive rotations about y, z and x of a link (rad)."""
+    TURN = 5
+    """Angular velocity about an axis of a link (rad/s)."""
+
+
 SPINDLE_GAIN = 65.0 / 200.0
 """Ratio of the coefficients of velocity and length in Prochazka's formula."""
 
@@ -90,7 +95,7 @@ class SOURCE(metaclass=Record):
     """Integers of a source.
 
     Attributes:
-        KIND: kind, such as IN_ROW.
+        KIND: kind, such as SOURCE_TYPE.IN_ROW.
         PLACE: index in the row, or number of a link.
         MORE: second index in the row, or offset of the numbers: point and direction; axes of a frame
             and factors of the angles; or an axis.
@@ -110,15 +115,15 @@ def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats)
         row: sensor row.
     """
     kind, index = source[SOURCE.KIND], source[SOURCE.PLACE]
-    if kind == IN_ROW:
+    if kind == SOURCE_TYPE.IN_ROW:
         return row[index]
-    if kind == SPINDLE:
+    if kind == SOURCE_TYPE.SPINDLE:
         speed = row[source[SOURCE.MORE]]
         # Prochazka's formula contains the square root of the velocity, odd in its sign. Rates are
         # not negative.
         return max(row[index] + SPINDLE_GAIN * (sqrt(speed) if speed > 0.0 else -sqrt(-speed)), 0.0)
     numbers = at(p, source[SOURCE.MORE])
-    if kind == ANGLE:
+    if kind == SOURCE_TYPE.ANGLE:
         # Angles of successive rotations, by the entries of the rotation matrix of the link.
         xx, yx, zx = direction(model, data, index, vector(numbers, 0))
         _, yy, _ = direction(model, data, index, vector(numbers, 3))
@@ -126,13 +131,14 @@ def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats)
         return dot(
             vector(numbers, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx)))
         )
-    if kind == TURN:
+    if kind == SOURCE_TYPE.TURN:
         return dot(
             direction(model, data, index, vector(numbers, 0)), angular_velocity(model, data, index)
         )
     point = station(model, data, index, vector(numbers, 0))
     return dot(
-        vector(numbers, 3), point if kind == POSITION else velocity(model, data, index, point)
+        vector(numbers, 3),
+        point if kind == SOURCE_TYPE.POSITION else velocity(model, data, index, point),
     )
 
 

@@ -10,22 +10,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from osimlite.mechanics.kernels.criteria import begin_criteria, update_criteria
-from osimlite.mechanics.kernels.error_control import HAS_DERIVATIVE, LAST_TIME, MEMORY
-from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
+from osimlite.mechanics.kernels.error_control import METHOD_WORK
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers, is_finite
-from osimlite.mechanics.kernels.record import (
-    COUNTED,
-    DONE,
-    EVALUATIONS,
-    FAILED,
-    METHOD_AT,
-    Motion,
-    evaluate_state,
-)
+from osimlite.mechanics.kernels.record import COUNTS, ENDING, RUN_SIZES, Motion, evaluate_state
 from osimlite.mechanics.kernels.reflexes import (
-    EARLY_STANCE,
+    LEG_STATE,
     REFLEXES,
-    UNKNOWN,
     add_noise,
     add_reflexes,
     record_sensors,
@@ -34,22 +25,33 @@ from osimlite.mechanics.kernels.reflexes import (
 from osimlite.mechanics.kernels.runs import integrate_run, select_run
 from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, fill_sensor_row
 
-FEEL = -1
-"""Order to fill the sensor rows only, in place of a number of control steps."""
-BEGIN = -2
-"""Order to fill the sensor rows, and to start reflexes and excitations."""
-START = -3
-"""Order to fill the sensor rows, and to start the criteria."""
-STEPS = 0
-"""Index in the progress of the number of control steps."""
-FRAMES = 1
-"""Index of the number of sensor rows."""
-GOING = 2
-"""Index of 1 while the walk continues, then 0."""
-FORCES = 3
-"""Index of the number of evaluations."""
-COUNTS = 4
-"""Length of the progress."""
+
+class ORDER(metaclass=Record):
+    """What `walk_several` does in place of a number of control steps."""
+
+    FEEL = -1
+    """Order to fill the sensor rows only, in place of a number of control steps."""
+    BEGIN = -2
+    """Order to fill the sensor rows, and to start reflexes and excitations."""
+    START = -3
+    """Order to fill the sensor rows, and to start the criteria."""
+
+
+class PROGRESS(metaclass=Record):
+    """Progress of a walk."""
+
+    STEPS = 0
+    """Number of control steps."""
+    FRAMES = 1
+    """Number of sensor rows."""
+    GOING = 2
+    """1 while the walk continues, then 0."""
+    FORCES = 3
+    """Number of evaluations."""
+    SIZE = 4
+    """Length of the progress."""
+
+
 LEGS = 2
 """Number of states of legs at the start of the memory of a walk.
 
@@ -76,7 +78,7 @@ class Walk(NamedTuple):
     row: Floats  # sensor row
     excitations: Floats  # excitations during the control step (c,)
     record: Floats  # record of control steps
-    progress: Ints  # see STEPS
+    progress: Ints  # see `PROGRESS`
 
 
 def hold_several(
@@ -152,7 +154,7 @@ def select_motion(
         k: number of the copy.
     """
     peak = at(peaks, 2 * k * model[MODEL.CONTACTS])
-    clock, count = at(clocks, 2 * k), at(counts, COUNTED * k)
+    clock, count = at(clocks, 2 * k), at(counts, COUNTS.SIZE * k)
     # Vectors of records without rows are never read or written; any vector serves.
     return Motion(
         model, reals, data, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak
@@ -172,9 +174,11 @@ def integrate_control_step(m: Motion, y: Floats, has_derivative: bool) -> bool:
     """
     # Every control step starts at time 0, so that times have the same digits in all steps.
     m.clock[0] = 0.0
-    for k in range(COUNTED):
+    for k in range(COUNTS.SIZE):
         m.counts[k] = 0
-    return integrate_run(m, y, has_derivative) == DONE and is_finite(m.model[MODEL.STATE_SIZE], y)
+    return integrate_run(m, y, has_derivative) == ENDING.DONE and is_finite(
+        m.model[MODEL.STATE_SIZE], y
+    )
 
 
 def walk_several(
@@ -202,7 +206,7 @@ def walk_several(
     first: int,
     last: int,
 ) -> int:
-    """Carry out an order for the walks `first` to `last` - 1, see FEEL.
+    """Carry out an order for the walks `first` to `last` - 1, see `ORDER`.
 
     The first of all is recorded.
 
@@ -226,13 +230,13 @@ def walk_several(
         rows: per walk the sensor row.
         excitations: per walk the excitations.
         record: filled per control step of the first walk with state, excitations and loads.
-        progress: per walk the progress, see STEPS.
-        order: FEEL, BEGIN, START, or a number of control steps.
+        progress: per walk the progress, see `PROGRESS`.
+        order: ORDER.FEEL, ORDER.BEGIN, ORDER.START, or a number of control steps.
         first: number of the first walk.
         last: end of the walks.
 
     Returns:
-        The worst outcome of the evaluations of FEEL, BEGIN and START.
+        The worst outcome of the evaluations of FEEL, BEGIN and START of `ORDER`.
     """
     size, status = model[MODEL.STATE_SIZE], OUTCOME.OK
     for k in range(first, last):
@@ -250,7 +254,7 @@ def walk_several(
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
             record,
-            at(progress, COUNTS * k),
+            at(progress, PROGRESS.SIZE * k),
         )
         y = at(states, size * k)
         if order < 0:
@@ -266,7 +270,7 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
     Args:
         a: the walk.
         y: state.
-        order: FEEL, BEGIN or START.
+        order: FEEL, BEGIN or START of `ORDER`.
 
     Returns:
         Outcome of the evaluation.
@@ -279,13 +283,20 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
     if status != OUTCOME.OK:
         return status
     fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
-    if order == BEGIN:
+    if order == ORDER.BEGIN:
         for k in range(LEGS):
-            a.room[k] = UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else EARLY_STANCE
-        a.progress[STEPS], a.progress[FRAMES], a.progress[GOING], a.progress[FORCES] = 0, 1, 1, 0
+            a.room[k] = (
+                LEG_STATE.UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else LEG_STATE.EARLY_STANCE
+            )
+        (
+            a.progress[PROGRESS.STEPS],
+            a.progress[PROGRESS.FRAMES],
+            a.progress[PROGRESS.GOING],
+            a.progress[PROGRESS.FORCES],
+        ) = 0, 1, 1, 0
         record_sensors(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
         update_excitations(a)
-    elif order == START:
+    elif order == ORDER.START:
         begin_criteria(a.senses, a.criteria, a.row, criteria_work(a))
     return status
 
@@ -313,7 +324,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
             m, a.known[SENSOR_NUMBERS.STEP], previous, at(previous, size), STAGE.ACCELERATION
         )
     for number in range(steps):
-        if progress[GOING] == 0:
+        if progress[PROGRESS.GOING] == 0:
             return
         update_excitations(a)
         if is_recorded:
@@ -327,26 +338,29 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
             )
         apply_excitations(a)
         has_reached_end = integrate_control_step(m, y, lags)
-        progress[STEPS] += 1
-        progress[FORCES] += m.counts[EVALUATIONS]
+        progress[PROGRESS.STEPS] += 1
+        progress[PROGRESS.FORCES] += m.counts[COUNTS.EVALUATIONS]
         # A motion that fails ends the walk, as a fall does.
         if not has_reached_end:
-            progress[GOING] = 0
+            progress[PROGRESS.GOING] = 0
             return
-        if m.model[MODEL.CONTACTS] == 0 and m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
+        if (
+            m.model[MODEL.CONTACTS] == 0
+            and m.data[m.sizes[RUN_SIZES.METHOD_AT] + METHOD_WORK.HAS_DERIVATIVE] > 0.0
+        ):
             # The method has not evaluated the forces at the end.
             evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
         fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
         record_sensors(
-            m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS)
+            m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.room, LEGS)
         )
-        progress[FRAMES] += 1
+        progress[PROGRESS.FRAMES] += 1
         # Time in control steps, which has no accumulated rounding.
-        t = progress[STEPS] * a.known[SENSOR_NUMBERS.STEP]
+        t = progress[PROGRESS.STEPS] * a.known[SENSOR_NUMBERS.STEP]
         if update_criteria(
             a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, criteria_work(a)
         ):
-            progress[GOING] = 0
+            progress[PROGRESS.GOING] = 0
 
 
 def apply_excitations(a: Walk) -> None:
@@ -362,14 +376,18 @@ def criteria_work(a: Walk) -> Floats:
 
 def update_excitations(a: Walk) -> None:
     """Advance the states of the legs, and compute the excitations by reflexes, within their bounds."""
-    history, frames, count = at(a.room, LEGS), a.progress[FRAMES], a.senses[SENSES.CONTROLS]
+    history, frames, count = (
+        at(a.room, LEGS),
+        a.progress[PROGRESS.FRAMES],
+        a.senses[SENSES.CONTROLS],
+    )
     if a.plan[REFLEXES.HAS_STATES] > 0:
         update_leg_states(a.senses, a.plan, a.numbers, frames, a.row, history, a.room)
     for k in range(count):
         a.excitations[k] = 0.0
     add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
     # Noise is added before bounds apply, as in SCONE.
-    add_noise(a.plan, a.numbers, a.progress[STEPS], count, a.excitations)
+    add_noise(a.plan, a.numbers, a.progress[PROGRESS.STEPS], count, a.excitations)
     least = at(a.known, SENSOR_NUMBERS.HEAD + 2 * a.senses[SENSES.MUSCLES])
     most = at(least, count)
     for k in range(count):
@@ -426,7 +444,7 @@ def run_by_reflexes(
         peaks: per run the largest forces of contacts.
         watches: watches, see `record.Motion`.
         levels: numbers of the watches.
-        endings: filled with the ending of each run, see `record.DONE`.
+        endings: filled with the ending of each run, see `record.ENDING.DONE`.
         senses: plan of the sensor rows, see `sensors.SENSES`.
         known: per run the numbers of the sensor row, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
@@ -436,7 +454,7 @@ def run_by_reflexes(
         rows: per run the sensor row.
         excitations: per run the excitations.
         record: per run the record of control steps, see `begin_control_step`.
-        progress: per run the progress, see STEPS.
+        progress: per run the progress, see `PROGRESS`.
         first: number of the first run.
         last: end of the runs.
 
@@ -476,7 +494,7 @@ def run_by_reflexes(
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
             at(record, plan[REFLEXES.ROWS] * k * control_record_size(senses, plan)),
-            at(progress, COUNTS * k),
+            at(progress, PROGRESS.SIZE * k),
         )
         endings[k] = integrate_with_reflexes(walk, at(states, k * model[MODEL.STATE_SIZE]))
     return OUTCOME.OK
@@ -504,24 +522,26 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
         y: state; changed.
 
     Returns:
-        The ending, see `record.DONE`.
+        The ending, see `record.ENDING.DONE`.
     """
     m, progress = a.m, a.progress
-    h = at(m.data, m.sizes[METHOD_AT])
-    end, ending = h[LAST_TIME], DONE
-    while ending == DONE:
-        if m.clock[0] >= progress[STEPS] * a.known[SENSOR_NUMBERS.STEP] and not begin_control_step(
-            a, y
-        ):
-            ending = FAILED
+    h = at(m.data, m.sizes[RUN_SIZES.METHOD_AT])
+    end, ending = h[METHOD_WORK.LAST_TIME], ENDING.DONE
+    while ending == ENDING.DONE:
+        if m.clock[0] >= progress[PROGRESS.STEPS] * a.known[
+            SENSOR_NUMBERS.STEP
+        ] and not begin_control_step(a, y):
+            ending = ENDING.FAILED
         elif m.clock[0] >= end:
             break
         else:
             apply_excitations(a)
             # Integrate to the end of the control step or of the run, the earlier of both.
-            h[LAST_TIME] = min(progress[STEPS] * a.known[SENSOR_NUMBERS.STEP], end)
+            h[METHOD_WORK.LAST_TIME] = min(
+                progress[PROGRESS.STEPS] * a.known[SENSOR_NUMBERS.STEP], end
+            )
             ending = integrate_run(m, y, False)
-    h[LAST_TIME] = end
+    h[METHOD_WORK.LAST_TIME] = end
     return ending
 
 
@@ -540,25 +560,27 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     """
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
     # The motion has a kink here: the method must forget its history.
-    at(m.data, m.sizes[METHOD_AT])[MEMORY] = 0.0
+    at(m.data, m.sizes[RUN_SIZES.METHOD_AT])[METHOD_WORK.MEMORY] = 0.0
     apply_excitations(a)
-    m.counts[EVALUATIONS] += 1
+    m.counts[COUNTS.EVALUATIONS] += 1
     if (
         evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
         != OUTCOME.OK
     ):
         return False
     fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
-    record_sensors(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
-    progress[FRAMES] += 1
+    record_sensors(
+        m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.room, LEGS)
+    )
+    progress[PROGRESS.FRAMES] += 1
     update_excitations(a)
-    row = progress[STEPS] - a.plan[REFLEXES.FIRST]
+    row = progress[PROGRESS.STEPS] - a.plan[REFLEXES.FIRST]
     if row < a.plan[REFLEXES.ROWS]:
         record = at(a.record, row * control_record_size(a.senses, a.plan))
-        kept = sensors * ((progress[FRAMES] - 1) % a.plan[REFLEXES.KEPT])
+        kept = sensors * ((progress[PROGRESS.FRAMES] - 1) % a.plan[REFLEXES.KEPT])
         copy_numbers(sensors, at(a.room, LEGS + kept), record)
         copy_numbers(LEGS, a.room, at(record, sensors))
         copy_numbers(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
         record[control_record_size(a.senses, a.plan) - 1] = m.clock[1]
-    progress[STEPS] += 1
+    progress[PROGRESS.STEPS] += 1
     return True

@@ -8,22 +8,13 @@ from __future__ import annotations
 
 from math import cos, isnan, nan, pi, sin, sqrt
 
-from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, point_in_ground
-from osimlite.mechanics.kernels.paths import (
-    COUNT,
-    NODE_INTS,
-    NODE_WORK,
-    NODES_AT,
-    ORDER,
-    PLACE,
-    POINTS,
-    WRAPS,
-)
+from osimlite.mechanics.kernels.layout import ITEM, Record
+from osimlite.mechanics.kernels.path_wraps import PATH_WRAP, SURFACE_WORK, point_in_ground
+from osimlite.mechanics.kernels.paths import NODE, NODE_WORK, PATH, PATH_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.wrap_ellipsoid import invert_components, polar_coordinates
 from osimlite.mechanics.kernels.wrap_torus import point_from_cylinder, point_in_cylinder
-from osimlite.mechanics.kernels.wrapping import CURVE, FIRST_TANGENT, SECOND_TANGENT, SIZES
+from osimlite.mechanics.kernels.wrapping import WRAP_SURFACE, WRAP_WORK
 from osimlite.mechanics.laws.vectors import (
     Vector,
     add_scaled,
@@ -40,12 +31,17 @@ ANGLE = 0.15
 """Largest angle between neighbouring points (rad); the polyline is within 0.3 % of the radius."""
 MOST = 60.0
 """Largest number of segments on a surface."""
-FIRST = BEST
-"""Offset in the record of a surface of the first tangent point."""
-SECOND = BEST + SECOND_TANGENT - FIRST_TANGENT
-"""Offset of the second tangent point."""
-SHAPE = BEST + CURVE - FIRST_TANGENT
-"""Offset of the numbers that trace the curve."""
+
+
+class TANGENTS(metaclass=Record):
+    """Results of the law of a surface in its record, see `SURFACE_WORK`."""
+
+    FIRST = SURFACE_WORK.BEST
+    """First tangent point."""
+    SECOND = SURFACE_WORK.BEST + WRAP_WORK.SECOND_TANGENT - WRAP_WORK.FIRST_TANGENT
+    """Second tangent point."""
+    SHAPE = SURFACE_WORK.BEST + WRAP_WORK.CURVE - WRAP_WORK.FIRST_TANGENT
+    """Numbers that trace the curve."""
 
 
 def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -66,21 +62,25 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         Number of corners.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    points, wraps = i[POINTS], i[WRAPS]
+    points, wraps = i[PATH.POINTS], i[PATH.WRAPS]
     size = points + 2 * wraps
-    order, work = at(result, ORDER), at(result, ORDER + size)
-    own = at(i, NODES_AT + NODE_INTS * size)
+    order, work = at(result, PATH_WORK.ORDER), at(result, PATH_WORK.ORDER + size)
+    own = at(i, PATH.NODES_AT + NODE.SIZE * size)
     count = 0
-    for k in range(int(result[COUNT])):
+    for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
-        store_vector(f, 3 * count, vector(work, NODE_WORK * number + PLACE))
+        store_vector(f, 3 * count, vector(work, NODE_WORK.SIZE * number + NODE_WORK.PLACE))
         count += 1
         wrap = (number - points) // 2
         # Of the two nodes of a wrap, points follow the first one.
-        if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
-            surface = item - own[WRAP_INTS * wrap + BACK]
+        if (
+            number >= points
+            and number == points + 2 * wrap
+            and own[PATH_WRAP.SIZE * wraps + wrap] != 0
+        ):
+            surface = item - own[PATH_WRAP.SIZE * wrap + PATH_WRAP.BACK]
             count += call(
-                own[WRAP_INTS * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface
+                own[PATH_WRAP.SIZE * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface
             )
     return count
 
@@ -108,11 +108,13 @@ def trace_cylinder(
         Number of points.
     """
     e = at(data, model[item + ITEM.RECORD])
-    one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
+    one, two, turn = vector(e, TANGENTS.FIRST), vector(e, TANGENTS.SECOND), e[TANGENTS.SHAPE]
     count = count_segments(turn)
     for k in range(1, count):
         store_vector(
-            f, 3 * (k - 1), point_in_ground(at(e, POSE), helix_point(one, two, turn, k / count))
+            f,
+            3 * (k - 1),
+            point_in_ground(at(e, SURFACE_WORK.POSE), helix_point(one, two, turn, k / count)),
         )
     return count - 1
 
@@ -132,15 +134,17 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         Number of points.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
+    ring, outwards = p[WRAP_SURFACE.SIZES + 1], (e[TANGENTS.SHAPE + 1], e[TANGENTS.SHAPE + 2], 0.0)
     one, two = (
-        point_in_cylinder(vector(e, FIRST), outwards, ring),
-        point_in_cylinder(vector(e, SECOND), outwards, ring),
+        point_in_cylinder(vector(e, TANGENTS.FIRST), outwards, ring),
+        point_in_cylinder(vector(e, TANGENTS.SECOND), outwards, ring),
     )
-    count = count_segments(e[SHAPE])
+    count = count_segments(e[TANGENTS.SHAPE])
     for k in range(1, count):
-        point = point_from_cylinder(helix_point(one, two, e[SHAPE], k / count), outwards, ring)
-        store_vector(f, 3 * (k - 1), point_in_ground(at(e, POSE), point))
+        point = point_from_cylinder(
+            helix_point(one, two, e[TANGENTS.SHAPE], k / count), outwards, ring
+        )
+        store_vector(f, 3 * (k - 1), point_in_ground(at(e, SURFACE_WORK.POSE), point))
     return count - 1
 
 
@@ -174,15 +178,17 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         Number of points.
     """
     e = at(data, model[item + ITEM.RECORD])
-    one, turn = vector(e, FIRST), e[SHAPE]
-    across = cross(unit(cross(one, vector(e, SECOND))), one)
+    one, turn = vector(e, TANGENTS.FIRST), e[TANGENTS.SHAPE]
+    across = cross(unit(cross(one, vector(e, TANGENTS.SECOND))), one)
     count = count_segments(turn)
     for k in range(1, count):
         angle = turn * k / count
         store_vector(
             f,
             3 * (k - 1),
-            point_in_ground(at(e, POSE), add_scaled(times(cos(angle), one), sin(angle), across)),
+            point_in_ground(
+                at(e, SURFACE_WORK.POSE), add_scaled(times(cos(angle), one), sin(angle), across)
+            ),
         )
     return count - 1
 
@@ -204,12 +210,14 @@ def trace_ellipsoid(
         Number of points, 0 where OpenSim's points are not numbers.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    a, b, c = vector(p, SIZES)
+    a, b, c = vector(p, WRAP_SURFACE.SIZES)
     factor = 3.0 / (a + b + c)
-    one, two = times(factor, vector(e, FIRST)), times(factor, vector(e, SECOND))
-    centre, to_one, across, turn = polar_coordinates(one, two, vector(e, SHAPE), e[SHAPE + 3])
+    one, two = times(factor, vector(e, TANGENTS.FIRST)), times(factor, vector(e, TANGENTS.SECOND))
+    centre, to_one, across, turn = polar_coordinates(
+        one, two, vector(e, TANGENTS.SHAPE), e[TANGENTS.SHAPE + 3]
+    )
     # OpenSim may take the longer way around the section.
-    turn -= 2.0 * pi * e[SHAPE + 4]
+    turn -= 2.0 * pi * e[TANGENTS.SHAPE + 4]
     scale = times(1.0 / factor, invert_components((a, b, c)))
     count = count_segments(turn)
     for k in range(1, count):
@@ -225,7 +233,9 @@ def trace_ellipsoid(
         store_vector(
             f,
             3 * (k - 1),
-            point_in_ground(at(e, POSE), times(1.0 / factor, add_scaled(centre, size, way))),
+            point_in_ground(
+                at(e, SURFACE_WORK.POSE), times(1.0 / factor, add_scaled(centre, size, way))
+            ),
         )
     return count - 1
 

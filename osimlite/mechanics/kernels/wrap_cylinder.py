@@ -16,19 +16,9 @@ from math import atan2, cos, inf, pi, radians, sin, sqrt, tan
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.wrapping import (
-    ALONE,
-    AXIS,
-    CURVE,
-    FIRST_END,
-    FIRST_TANGENT,
-    INSIDE,
-    MANDATORY,
-    NONE,
-    SECOND_END,
-    SECOND_TANGENT,
-    SIDE,
-    SIZES,
-    SURFACE_LENGTH,
+    WRAP_SURFACE,
+    WRAP_WORK,
+    WRAPPING,
     decide_wrapping,
     find_tangents,
     is_on_side,
@@ -73,12 +63,19 @@ def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         item: offset of the surface in the model.
 
     Returns:
-        INSIDE, NONE, WRAPPED or MANDATORY.
+        WRAPPING.INSIDE, WRAPPING.NONE, WRAPPED or WRAPPING.MANDATORY.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    first, second = vector(e, FIRST_END), vector(e, SECOND_END)
+    first, second = vector(e, WRAP_WORK.FIRST_END), vector(e, WRAP_WORK.SECOND_END)
     return bend_around_cylinder(
-        first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e
+        first,
+        second,
+        p[WRAP_SURFACE.SIZES],
+        p[WRAP_SURFACE.SIZES + 1],
+        int(p[WRAP_SURFACE.AXIS]),
+        p[WRAP_SURFACE.SIDE],
+        p[WRAP_SURFACE.ALONE] == 1.0,
+        e,
     )
 
 
@@ -105,20 +102,20 @@ def bend_around_cylinder(
         e: record of the law; filled with tangent points and length.
 
     Returns:
-        INSIDE, NONE, WRAPPED or MANDATORY.
+        WRAPPING.INSIDE, WRAPPING.NONE, WRAPPED or WRAPPING.MANDATORY.
     """
     px, py, pz = first
     qx, qy, qz = second
     if px * px + py * py < radius * radius or qx * qx + qy * qy < radius * radius:
-        return INSIDE
+        return WRAPPING.INSIDE
     closest, crosses = closest_to_axis(first, second, radius)
     if side != 0.0:
         active = is_on_side(first, axis, side), is_on_side(second, axis, side)
         code = decide_wrapping(*active, is_on_side(closest, axis, side), crosses)
     else:
-        code = MANDATORY if crosses else NONE
-    if code == NONE:
-        return NONE
+        code = WRAPPING.MANDATORY if crosses else WRAPPING.NONE
+    if code == WRAPPING.NONE:
+        return WRAPPING.NONE
 
     # The tangents are found in the plane across the axis; heights follow later.
     flat_first, flat_second = set_height(first, 0.0), set_height(second, 0.0)
@@ -161,7 +158,7 @@ def bend_around_cylinder(
         )
     # Both tangent points beyond the ends of the cylinder: the path misses it.
     if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
-        return NONE
+        return WRAPPING.NONE
     x1, y1, _ = one
     x2, y2, _ = two
     angle = atan2(x1 * y2 - y1 * x2, x1 * x2 + y1 * y2)
@@ -173,9 +170,9 @@ def bend_around_cylinder(
     # OpenSim smooths the heights only if a path has several PathWraps.
     if not alone:
         z1, z2 = smooth_heights(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
-    store_vector(e, FIRST_TANGENT, (x1, y1, z1))
-    store_vector(e, SECOND_TANGENT, (x2, y2, z2))
-    e[SURFACE_LENGTH], e[CURVE] = helix_length(radius * angle, z2 - z1), turn
+    store_vector(e, WRAP_WORK.FIRST_TANGENT, (x1, y1, z1))
+    store_vector(e, WRAP_WORK.SECOND_TANGENT, (x2, y2, z2))
+    e[WRAP_WORK.SURFACE_LENGTH], e[WRAP_WORK.CURVE] = helix_length(radius * angle, z2 - z1), turn
     return code
 
 

@@ -21,22 +21,10 @@ from osimlite.mechanics.kernels.closest_on_ellipsoid import (
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.wrapping import (
-    AXIAL,
-    AXIS,
-    CURVE,
-    FIRST_END,
-    FIRST_TANGENT,
-    INSIDE,
-    MANDATORY,
-    METHOD,
-    MIDPOINT,
-    NONE,
-    ROOM,
-    SECOND_END,
-    SECOND_TANGENT,
-    SIDE,
-    SIZES,
-    SURFACE_LENGTH,
+    ELLIPSOID_METHOD,
+    WRAP_SURFACE,
+    WRAP_WORK,
+    WRAPPING,
     clear_tangents,
     is_on_side,
 )
@@ -93,25 +81,28 @@ def wrap_ellipsoid(
         item: offset of the surface in the model.
 
     Returns:
-        INSIDE, NONE or MANDATORY.
+        INSIDE, NONE or MANDATORY of `WRAPPING`.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    a, b, c = vector(p, SIZES)
+    a, b, c = vector(p, WRAP_SURFACE.SIZES)
     # OpenSim scales the surface to a mean radius of 1, so that its tolerances are relative.
-    factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
+    factor, axis, side = 3.0 / (a + b + c), int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]
     radii = times(factor, (a, b, c))
-    first, second = times(factor, vector(e, FIRST_END)), times(factor, vector(e, SECOND_END))
+    first, second = (
+        times(factor, vector(e, WRAP_WORK.FIRST_END)),
+        times(factor, vector(e, WRAP_WORK.SECOND_END)),
+    )
     first_height, second_height = ellipsoid_height(radii, first), ellipsoid_height(radii, second)
     if first_height < -CLOSE or second_height < -CLOSE:
-        return INSIDE
+        return WRAPPING.INSIDE
     way = minus(first, second)
     enters, leaves = find_crossings(radii, second, way)
     one, two = add_scaled(second, enters, way), add_scaled(second, leaves, way)
     # Ends in the same direction have no plane; a chord outside of the segment does not cross.
     if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
-        return NONE
+        return WRAPPING.NONE
     support, by_fan, starts = support_point(
-        p[METHOD], radii, one, minus(two, one), way, at(e, ROOM)
+        p[WRAP_SURFACE.METHOD], radii, one, minus(two, one), way, at(e, WRAP_WORK.ROOM)
     )
     if starts:
         one = two = support
@@ -134,9 +125,9 @@ def wrap_ellipsoid(
     length = norm(minus(one, two)) / factor
     # OpenSim's search may fail; it then wraps without points.
     if isnan(length):
-        return clear_tangents(e, MANDATORY)
-    store_vector(e, CURVE, normal)
-    e[CURVE + 3], e[CURVE + 4] = offset, 0.0
+        return clear_tangents(e, WRAPPING.MANDATORY)
+    store_vector(e, WRAP_WORK.CURVE, normal)
+    e[WRAP_WORK.CURVE + 3], e[WRAP_WORK.CURVE + 4] = offset, 0.0
     # A short path is measured by its chord, a long one by a polyline as OpenSim draws it.
     if length >= PIECE:
         pieces = int(min(length / PIECE, 1.0 * PIECES))
@@ -150,12 +141,12 @@ def wrap_ellipsoid(
             and (bends_back(first, one, next_one) or bends_back(second, two, next_two))
         ):
             length, _, _ = measure_polyline(radii, one, two, normal, offset, pieces, True)
-            e[CURVE + 4] = 1.0
+            e[WRAP_WORK.CURVE + 4] = 1.0
         length /= factor
-    store_vector(e, FIRST_TANGENT, times(1.0 / factor, one))
-    store_vector(e, SECOND_TANGENT, times(1.0 / factor, two))
-    e[SURFACE_LENGTH] = length
-    return MANDATORY
+    store_vector(e, WRAP_WORK.FIRST_TANGENT, times(1.0 / factor, one))
+    store_vector(e, WRAP_WORK.SECOND_TANGENT, times(1.0 / factor, two))
+    e[WRAP_WORK.SURFACE_LENGTH] = length
+    return WRAPPING.MANDATORY
 
 
 def ellipsoid_height(radii: Vector, point: Vector) -> float:
@@ -205,7 +196,7 @@ def support_point(
     """Return the point of the surface that determines the plane.
 
     Args:
-        method: HYBRID, MIDPOINT or AXIAL.
+        method: HYBRID, MIDPOINT or AXIAL of `ELLIPSOID_METHOD`.
         radii: half axes.
         start: point where the chord enters.
         chord: vector to the point where it leaves.
@@ -216,13 +207,13 @@ def support_point(
         The point, the weight of the fan, and whether the search for tangent points starts there.
     """
     middle = add_scaled(start, 0.5, chord)
-    if method == MIDPOINT:
+    if method == ELLIPSOID_METHOD.MIDPOINT:
         return closest_point(radii, middle), 0.0, True
     # OpenSim's axial method uses the plane of symmetry across the largest component of the segment.
     axis = longest_axis(way)
     passes = -component(start, axis) / component(chord, axis)
     axial = closest_in_plane(radii, add_scaled(start, passes, chord), axis)
-    if method == AXIAL:
+    if method == ELLIPSOID_METHOD.AXIAL:
         return axial, 0.0, 0.0 < passes < 1.0
     cosine = abs(component(unit(way), axis))
     # Where the chord crosses this plane near one of its ends, the fan is phased in.

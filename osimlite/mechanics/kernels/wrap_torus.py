@@ -15,17 +15,9 @@ from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.wrap_cylinder import bend_around_cylinder
 from osimlite.mechanics.kernels.wrapping import (
-    ALONE,
-    AXIS,
-    CURVE,
-    FIRST_END,
-    FIRST_TANGENT,
-    NONE,
-    SECOND_END,
-    SECOND_TANGENT,
-    SIDE,
-    SIZES,
-    WRAPPED,
+    WRAP_SURFACE,
+    WRAP_WORK,
+    WRAPPING,
     clear_tangents,
     is_on_side,
 )
@@ -69,36 +61,45 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         item: offset of the surface in the model.
 
     Returns:
-        NONE or WRAPPED.
+        NONE or WRAPPED of `WRAPPING`.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
+    first, second, ring = (
+        vector(e, WRAP_WORK.FIRST_END),
+        vector(e, WRAP_WORK.SECOND_END),
+        p[WRAP_SURFACE.SIZES + 1],
+    )
     # The search stops early, so that its result depends on the end from which it starts; OpenSim
     # tries both.
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
-    if p[SIDE] != 0.0:
+    if p[WRAP_SURFACE.SIDE] != 0.0:
         one_active, two_active = (
-            is_on_side(one, int(p[AXIS]), p[SIDE]),
-            is_on_side(two, int(p[AXIS]), p[SIDE]),
+            is_on_side(one, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
+            is_on_side(two, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
         )
         if not (one_active or two_active):
-            return NONE
+            return WRAPPING.NONE
         closer = one_active and (closer or not two_active)
     rx, ry, _ = one if closer else two
     distance = sqrt(rx * rx + ry * ry)
     # On the axis no part of the ring is nearest.
     if not distance > 0.0:
-        return clear_tangents(e, WRAPPED)
+        return clear_tangents(e, WRAPPING.WRAPPED)
     outwards = (rx / distance, ry / distance, 0.0)
     a, b = point_in_cylinder(first, outwards, ring), point_in_cylinder(second, outwards, ring)
     # The side x > 0 of the cylinder is the inside of the ring, which the path must touch.
-    if bend_around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
-        return clear_tangents(e, WRAPPED)
-    for place in (FIRST_TANGENT, SECOND_TANGENT):
+    if (
+        bend_around_cylinder(
+            a, b, p[WRAP_SURFACE.SIZES], LENGTH, 0, 1.0, p[WRAP_SURFACE.ALONE] == 1.0, e
+        )
+        <= WRAPPING.NONE
+    ):
+        return clear_tangents(e, WRAPPING.WRAPPED)
+    for place in (WRAP_WORK.FIRST_TANGENT, WRAP_WORK.SECOND_TANGENT):
         store_vector(e, place, point_from_cylinder(vector(e, place), outwards, ring))
-    e[CURVE + 1], e[CURVE + 2], _ = outwards
-    return WRAPPED
+    e[WRAP_WORK.CURVE + 1], e[WRAP_WORK.CURVE + 2], _ = outwards
+    return WRAPPING.WRAPPED
 
 
 def point_in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:

@@ -5,9 +5,9 @@ All points are in the frame of the wrap object, in m. The numbers p of the item 
 record e holds the ends of the segment, to which the law adds two tangent points, the length on the
 surface between them, and numbers that `wrap_curves` needs to trace the curve.
 
-A law returns INSIDE, NONE, WRAPPED or MANDATORY; its results in e count in the last two cases only.
-Where OpenSim wraps a segment but then finds no points, the tangent points are NaN: such a segment
-stays straight.
+A law returns INSIDE, NONE, WRAPPED or MANDATORY of `WRAPPING`; its results in e count in the last
+two cases only. Where OpenSim wraps a segment but then finds no points, the tangent points are NaN:
+such a segment stays straight.
 
 A path wraps around a sphere along the great circle in the plane of both ends and the centre.
 Source: OpenSim 4.6's WrapSphere.
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from math import atan2, nan, pi, sqrt
 
-from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.layout import ITEM, Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.laws.vectors import (
     Vector,
@@ -34,51 +34,72 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-AXIS = 0
-"""Index in the numbers of the axis of the quadrant, 0, 1 or 2."""
-SIDE = 1
-"""Index of the sign of the quadrant, 0.0 for the complete surface."""
-METHOD = 2
-"""Index of the method of an ellipsoid, such as HYBRID."""
-ALONE = 3
-"""Index of 1.0 if the path has no other PathWrap, else 0.0."""
-SIZES = 4
-"""Offset of the dimensions (m).
 
-Cylinder: radius, length; sphere: radius; ellipsoid: three radii; torus: inner and outer radius.
+class WRAP_SURFACE(metaclass=Record):
+    """Numbers of a wrap surface."""
+
+    AXIS = 0
+    """Axis of the quadrant, 0, 1 or 2."""
+    SIDE = 1
+    """Sign of the quadrant, 0.0 for the complete surface."""
+    METHOD = 2
+    """Method of an ellipsoid, such as ELLIPSOID_METHOD.HYBRID."""
+    ALONE = 3
+    """1.0 if the path has no other PathWrap, else 0.0."""
+    SIZES = 4
+    """Dimensions (m).
+
+    Cylinder: radius, length; sphere: radius; ellipsoid: three radii; torus: inner and outer radius.
 """
-HYBRID = 0.0
-"""Method of an ellipsoid: a blend of axial point and fan, OpenSim's default."""
-MIDPOINT = 1.0
-"""Method of an ellipsoid: the point closest to the middle of the chord."""
-AXIAL = 2.0
-"""Method of an ellipsoid: the point where the chord crosses a plane of symmetry."""
 
-FIRST_END = 0
-"""Offset in the record of the first end of the segment (m)."""
-SECOND_END = 3
-"""Offset of the second end of the segment (m)."""
-FIRST_TANGENT = 6
-"""Offset of the tangent point next to the first end (m)."""
-SECOND_TANGENT = 9
-"""Offset of the tangent point next to the second end (m)."""
-SURFACE_LENGTH = 12
-"""Index of the length on the surface between the tangent points (m)."""
-CURVE = 13
-"""Offset of the numbers that trace the curve between the tangent points."""
-ROOM = 18
-"""Offset of workspace of the law."""
-ENDS = 98
-"""End of the record of the law."""
 
-INSIDE = -1
-"""Result of a law: an end of the segment is inside the surface."""
-NONE = 0
-"""Result of a law: the segment stays straight."""
-WRAPPED = 1
-"""Result of a law: the segment may wrap."""
-MANDATORY = 2
-"""Result of a law: the segment must wrap."""
+class ELLIPSOID_METHOD(metaclass=Record):
+    """Methods for an ellipsoid."""
+
+    HYBRID = 0.0
+    """A blend of axial point and fan, OpenSim's default."""
+    MIDPOINT = 1.0
+    """The point closest to the middle of the chord."""
+    AXIAL = 2.0
+    """The point where the chord crosses a plane of symmetry."""
+
+
+class WRAP_WORK(metaclass=Record):
+    """Record of the law of a wrap surface."""
+
+    FIRST_END = 0
+    """First end of the segment (m)."""
+    SECOND_END = 3
+    """Second end of the segment (m)."""
+    FIRST_TANGENT = 6
+    """Tangent point next to the first end (m)."""
+    SECOND_TANGENT = 9
+    """Tangent point next to the second end (m)."""
+    SURFACE_LENGTH = 12
+    """Length on the surface between the tangent points (m)."""
+    CURVE = 13
+    """Numbers that trace the curve between the tangent points."""
+    ROOM = 18
+    """Workspace of the law."""
+    END = 98
+    """End of the record of the law."""
+
+
+class WRAPPING(metaclass=Record):
+    """Results of the law of a wrap surface."""
+
+    INSIDE = -1
+    """An end of the segment is inside the surface."""
+    NONE = 0
+    """The segment stays straight."""
+    WRAPPED = 1
+    """The segment may wrap."""
+    MANDATORY = 2
+    """The segment must wrap."""
+    NOWHERE = -2
+    """Wrap whose range contains no active point; OpenSim then leaves the path as it is."""
+    BEYOND = -3
+    """Wrap whose range ends beyond the path; OpenSim then fails."""
 
 
 def is_on_side(point: Vector, axis: int, side: float) -> bool:
@@ -104,13 +125,13 @@ def decide_wrapping(first: bool, second: bool, closest: bool, crosses: bool) -> 
         crosses: whether the segment passes through the surface.
 
     Returns:
-        NONE, WRAPPED or MANDATORY, as OpenSim decides.
+        NONE, WRAPPED or MANDATORY of `WRAPPING`, as OpenSim decides.
     """
     if not (first or second):
-        return WRAPPED
+        return WRAPPING.WRAPPED
     if crosses:
-        return MANDATORY
-    return WRAPPED if first != second and not closest else NONE
+        return WRAPPING.MANDATORY
+    return WRAPPING.WRAPPED if first != second and not closest else WRAPPING.NONE
 
 
 def find_tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, Vector]:
@@ -163,9 +184,9 @@ def clear_tangents(e: Floats, code: int) -> int:
         e: record of the law; changed.
         code: result of the law.
     """
-    store_vector(e, FIRST_TANGENT, (nan, nan, nan))
-    store_vector(e, SECOND_TANGENT, (nan, nan, nan))
-    e[SURFACE_LENGTH] = nan
+    store_vector(e, WRAP_WORK.FIRST_TANGENT, (nan, nan, nan))
+    store_vector(e, WRAP_WORK.SECOND_TANGENT, (nan, nan, nan))
+    e[WRAP_WORK.SURFACE_LENGTH] = nan
     return code
 
 
@@ -189,43 +210,47 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         item: offset of the surface in the model.
 
     Returns:
-        INSIDE, NONE, WRAPPED or MANDATORY.
+        INSIDE, NONE, WRAPPED or MANDATORY of `WRAPPING`.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
+    first, second, radius = (
+        vector(e, WRAP_WORK.FIRST_END),
+        vector(e, WRAP_WORK.SECOND_END),
+        p[WRAP_SURFACE.SIZES],
+    )
     if norm(first) < radius or norm(second) < radius:
-        return INSIDE
+        return WRAPPING.INSIDE
     if not crosses_sphere(first, second, radius):
-        return NONE
+        return WRAPPING.NONE
     way = unit(minus(first, second))
     normal = cross(way, unit(second))
     # Ends and centre on one line define no plane.
     if norm(normal) < STRAIGHT:
-        return clear_tangents(e, WRAPPED)
+        return clear_tangents(e, WRAPPING.WRAPPED)
     normal = unit(normal)
     a1, b1 = find_tangents(first, radius, normal)
     a2, b2 = find_tangents(second, radius, normal)
     one, two = nearest_pair(a1, b1, a2, b2)
-    code, far = WRAPPED, False
-    if p[SIDE] != 0.0:
-        axis, side = int(p[AXIS]), p[SIDE]
+    code, far = WRAPPING.WRAPPED, False
+    if p[WRAP_SURFACE.SIDE] != 0.0:
+        axis, side = int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]
         active = is_on_side(first, axis, side), is_on_side(second, axis, side)
         before = dot(first, way)
         # OpenSim compares an absolute distance with 1 m here, see above.
         code = decide_wrapping(
             *active, is_on_side(add_scaled(first, -before, way), axis, side), before < 1.0
         )
-        if code == NONE:
-            return NONE
+        if code == WRAPPING.NONE:
+            return WRAPPING.NONE
         # Only where an end is on the other side may the longer arc be the active one.
         if not (active[0] and active[1]):
             one, two, far = pair_on_side(first, second, a1, b1, a2, b2, axis, side)
     angle = atan2(norm(cross(one, two)), dot(one, two))
-    store_vector(e, FIRST_TANGENT, one)
-    store_vector(e, SECOND_TANGENT, two)
+    store_vector(e, WRAP_WORK.FIRST_TANGENT, one)
+    store_vector(e, WRAP_WORK.SECOND_TANGENT, two)
     # The far arc has a negative length in OpenSim; the drawn arc goes the other way, too.
-    e[CURVE] = angle - 2.0 * pi if far else angle
-    e[SURFACE_LENGTH] = radius * e[CURVE]
+    e[WRAP_WORK.CURVE] = angle - 2.0 * pi if far else angle
+    e[WRAP_WORK.SURFACE_LENGTH] = radius * e[WRAP_WORK.CURVE]
     return code
 
 

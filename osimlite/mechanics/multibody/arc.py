@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constant_curvature import evaluate_arc
-from osimlite.mechanics.kernels.functions import ARC
+from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.multibody.functions import Arguments, Evaluated, SmoothFunction, make_floats
 
 # 16 terms are exact in double precision for angles up to half a turn.
@@ -32,7 +32,7 @@ class ArcPoint(SmoothFunction):
     def table(self) -> Sequence[float]:
         """Table of the function: component, length, neutral angles and the series."""
         return [
-            ARC,
+            FUNCTION_TYPE.ARC,
             1.0,
             float(self.component),
             self.length,

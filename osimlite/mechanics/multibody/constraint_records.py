@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import UnsupportedError
-from osimlite.mechanics.kernels.constraint_equations import (
-    ARM,
-    AXIS,
-    DISTANCE,
-    MEETING,
-    PRODUCT,
-    SLIP,
-)
+from osimlite.mechanics.kernels.constraint_equations import EQUATION_TYPE, VECTOR_TYPE
 from osimlite.mechanics.kernels.layout import COORDINATE
 from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.multibody import body_constraints as b
@@ -58,7 +51,7 @@ class _Vector(NamedTuple):
 
 
 class _Equation(NamedTuple):
-    kind: int  # PRODUCT, DISTANCE or SLIP
+    kind: int  # PRODUCT, DISTANCE or SLIP of `EQUATION_TYPE`
     first: _Vector
     second: _Vector
     wanted: float = 0.0  # value of the scalar product (m²) or length (m)
@@ -93,10 +86,14 @@ def constraint_record(
             return _coupler(constraint, places, balls)
         case b.RollingConstraint():
             equations = _rolling(constraint, places)
-            return _record_between_bodies(equations, sum(item.kind != SLIP for item in equations))
+            return _record_between_bodies(
+                equations, sum(item.kind != EQUATION_TYPE.SLIP for item in equations)
+            )
         case b.DistanceConstraint():
             arm = _arm(places, constraint.first, constraint.second)
-            return _record_between_bodies([_Equation(DISTANCE, arm, arm, constraint.distance)])
+            return _record_between_bodies(
+                [_Equation(EQUATION_TYPE.DISTANCE, arm, arm, constraint.distance)]
+            )
         case b.PointEquations():
             return _record_between_bodies(_meeting(places, constraint.first, constraint.second))
         case b.PointOnLineEquations():
@@ -105,7 +102,9 @@ def constraint_record(
                 _axis(places, constraint.line.body, axis)
                 for axis in constraint.find_normal_directions()
             )
-            return _record_between_bodies([_Equation(PRODUCT, axis, arm) for axis in axes])
+            return _record_between_bodies(
+                [_Equation(EQUATION_TYPE.PRODUCT, axis, arm) for axis in axes]
+            )
         case b.WeldEquations():
             return _record_between_bodies(_weld(constraint, places))
     raise UnsupportedError(
@@ -204,7 +203,9 @@ def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
         axis: direction in the frame of the body (3,).
     """
     direction = places.direction(body, np.asarray(axis, dtype=float).tolist())
-    return _Vector([AXIS, places.placement(body).link, GROUND], [*direction, 0.0, 0.0, 0.0])
+    return _Vector(
+        [VECTOR_TYPE.AXIS, places.placement(body).link, GROUND], [*direction, 0.0, 0.0, 0.0]
+    )
 
 
 def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
@@ -218,7 +219,7 @@ def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _
     (one, start), (two, end) = (
         places.station(body, point.tolist()) for body, point in (first, second)
     )
-    return _Vector([ARM, one, two], [*start, *end])
+    return _Vector([VECTOR_TYPE.ARM, one, two], [*start, *end])
 
 
 def _meeting(places: Places, first: StationPlacement, second: StationPlacement) -> list[_Equation]:
@@ -231,9 +232,12 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
     """
     arm = _arm(places, first, second)
     # Rates relative to the coincident point keep the equations exact while a small error remains.
-    arm.ints[0] = MEETING
-    axes = (_Vector([AXIS, GROUND, GROUND], [*axis, 0.0, 0.0, 0.0]) for axis in np.eye(3).tolist())
-    return [_Equation(PRODUCT, axis, arm) for axis in axes]
+    arm.ints[0] = VECTOR_TYPE.MEETING
+    axes = (
+        _Vector([VECTOR_TYPE.AXIS, GROUND, GROUND], [*axis, 0.0, 0.0, 0.0])
+        for axis in np.eye(3).tolist()
+    )
+    return [_Equation(EQUATION_TYPE.PRODUCT, axis, arm) for axis in axes]
 
 
 def _weld(constraint: b.WeldEquations, places: Places) -> list[_Equation]:
@@ -248,7 +252,7 @@ def _weld(constraint: b.WeldEquations, places: Places) -> list[_Equation]:
     # the other.
     turns = [
         _Equation(
-            PRODUCT,
+            EQUATION_TYPE.PRODUCT,
             _axis(places, two, outer[:3, axis]),
             _axis(places, one, inner[:3, (axis + 1) % 3]),
         )
@@ -273,10 +277,10 @@ def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]
     )
     x, _, z = np.eye(3)
     normal: Array = constraint.normal / np.linalg.norm(constraint.normal)
-    square = _Equation(PRODUCT, _axis(places, surface, x), _axis(places, roller, z))
-    slips = [_Equation(SLIP, _axis(places, surface, axis), arm) for axis in (x, z)]
+    square = _Equation(EQUATION_TYPE.PRODUCT, _axis(places, surface, x), _axis(places, roller, z))
+    slips = [_Equation(EQUATION_TYPE.SLIP, _axis(places, surface, axis), arm) for axis in (x, z)]
     return [
-        _Equation(PRODUCT, _axis(places, surface, normal), arm, constraint.height),
+        _Equation(EQUATION_TYPE.PRODUCT, _axis(places, surface, normal), arm, constraint.height),
         square,
         *slips,
     ]

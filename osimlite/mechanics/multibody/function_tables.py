@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import isfinite
 
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.mechanics.kernels.functions import PIECES_OF_OPENSIM
+from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.multibody import functions as f
 
 
@@ -77,5 +77,5 @@ def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
         for (power,), coefficient in zip(function.powers, function.coefficients, strict=True):
             coefficients[power] += coefficient
         kind, *rest = f.Polynomial(tuple(reversed(coefficients))).table
-        return [PIECES_OF_OPENSIM if function.opensim_derivatives else kind, *rest]
+        return [FUNCTION_TYPE.PIECES_OF_OPENSIM if function.opensim_derivatives else kind, *rest]
     return _has_table([*function.table], function, where)

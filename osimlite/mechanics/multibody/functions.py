@@ -16,11 +16,7 @@ from typing import TYPE_CHECKING, Any
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.functions import (
-    MONOMIALS,
-    MONOMIALS_OF_OPENSIM,
-    PIECES,
-    SINE,
-    STEP,
+    FUNCTION_TYPE,
     evaluate_function,
     evaluate_monomials,
 )
@@ -217,7 +213,7 @@ class SineWave(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """Table of a sine: amplitude, angular frequency, phase and offset."""
-        return SINE, 1.0, self.amplitude, self.omega, self.phase, self.offset
+        return FUNCTION_TYPE.SINE, 1.0, self.amplitude, self.omega, self.phase, self.offset
 
 
 @dataclass(frozen=True)
@@ -232,7 +228,7 @@ class WeightedSum(Multivariate):
         """Table of monomials: one for each argument, and one for the constant."""
         size = len(self.weights)
         powers = (float(term == place) for term in range(size + 1) for place in range(size))
-        return [MONOMIALS, 1.0, size + 1.0, *self.weights, self.start, *powers]
+        return [FUNCTION_TYPE.MONOMIALS, 1.0, size + 1.0, *self.weights, self.start, *powers]
 
 
 @dataclass(frozen=True)
@@ -250,7 +246,7 @@ class QuinticStep(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """Table of a step: arguments of both ends, then the values there."""
-        return STEP, 1.0, self.start, self.end, self.start_value, self.end_value
+        return FUNCTION_TYPE.STEP, 1.0, self.start, self.end, self.start_value, self.end_value
 
 
 @dataclass(frozen=True)
@@ -299,7 +295,11 @@ class MultivariatePolynomial(Multivariate):
     @property
     def table(self) -> Sequence[float]:
         """Table of all monomials with their powers."""
-        kind = MONOMIALS_OF_OPENSIM if self.opensim_derivatives else MONOMIALS
+        kind = (
+            FUNCTION_TYPE.MONOMIALS_OF_OPENSIM
+            if self.opensim_derivatives
+            else FUNCTION_TYPE.MONOMIALS
+        )
         powers = (float(power) for each in self.powers for power in each)
         return [kind, 1.0, float(len(self.powers)), *self.coefficients, *powers]
 
@@ -423,7 +423,14 @@ def _tabulate_pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) 
     """
     width = max(map(len, pieces))
     rows = [(*piece, *[0.0] * (width - len(piece))) for piece in pieces]
-    return [PIECES, 1.0, float(len(knots)), float(width), *knots, *chain.from_iterable(rows)]
+    return [
+        FUNCTION_TYPE.PIECES,
+        1.0,
+        float(len(knots)),
+        float(width),
+        *knots,
+        *chain.from_iterable(rows),
+    ]
 
 
 def table_at_knots(function: SmoothFunction) -> list[float]:

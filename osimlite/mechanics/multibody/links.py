@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass, field
 from osimlite.errors import UnsupportedError
-from osimlite.mechanics.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM
+from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.kernels.layout import (
     CONSTRAINED,
     CONSTRAINT,
@@ -50,9 +50,9 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
 LAWS_OF_FUNCTIONS = {
-    MONOMIALS: "amount_by_several",
-    MONOMIALS_OF_OPENSIM: "amount_by_several",
-    ARC: "amount_by_arc",
+    FUNCTION_TYPE.MONOMIALS: "amount_by_several",
+    FUNCTION_TYPE.MONOMIALS_OF_OPENSIM: "amount_by_several",
+    FUNCTION_TYPE.ARC: "amount_by_arc",
 }
 """Law of each kind of function that takes several coordinates."""
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, GRAVITY_AT, MODEL
+from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, REALS
 from osimlite.mechanics.kernels.pointers import Floats, Ints, register_law
 from osimlite.mechanics.kernels.table import LAW_NUMBERS, load_kernel
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Equations
@@ -60,7 +60,7 @@ class PackedMechanism:
         self.model: Ints = integers
         # Kinematics must not contain gravity, which the kernels treat as an acceleration of ground.
         self.reals, self.heavy = make_floats(packer.numbers), make_floats(packer.numbers)
-        for k in range(GRAVITY_AT, GRAVITY_AT + 3):
+        for k in range(REALS.GRAVITY, REALS.GRAVITY + 3):
             self.reals[k] = 0.0
         self.order = list(order)
         self.freedoms = np.argsort(order)

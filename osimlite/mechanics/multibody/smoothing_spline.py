@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.functions import PIECES
+from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.multibody.functions import Univariate
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -36,7 +36,7 @@ class PiecewisePolynomial(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """Table of the pieces, see `kernels.functions`."""
-        head = PIECES, 1.0, len(self.knots), self.pieces.shape[1]
+        head = FUNCTION_TYPE.PIECES, 1.0, len(self.knots), self.pieces.shape[1]
         numbers: list[float] = np.concatenate([head, self.knots, self.pieces.ravel()]).tolist()
         return numbers
 

@@ -107,7 +107,7 @@ class BatchWorkspace:
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
-        self.counts = np.zeros((count, record.COUNTED), dtype=np.int64)
+        self.counts = np.zeros((count, record.COUNTS.SIZE), dtype=np.int64)
         self.endings = np.zeros(count, dtype=np.int64)
         # Rows that a run does not reach stay NaN.
         self.reports = np.full((count, len(self._times), size), np.nan)
@@ -122,7 +122,7 @@ class BatchWorkspace:
         Args:
             steps: number of steps.
         """
-        self._sizes[record.MOST_LOGGED] = min(steps, len(self.log))
+        self._sizes[record.RUN_SIZES.MOST_LOGGED] = min(steps, len(self.log))
 
     def make_workspace(self) -> Floats:
         """Return a new workspace of :meth:`run`.

@@ -18,7 +18,7 @@ from osimlite.base.cores import count_cores
 from osimlite.base.text import suggest_name
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.mechanics.kernels import record
-from osimlite.mechanics.kernels.contacts import RADIUS
+from osimlite.mechanics.kernels.condensation import CONTACT_NUMBERS
 from osimlite.mechanics.kernels.layout import ITEM, MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -105,7 +105,7 @@ def run_many(
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
     kept = [
         rows[:total]
-        for rows, total in zip(batch.events, batch.counts[:, record.EVENTS], strict=True)
+        for rows, total in zip(batch.events, batch.counts[:, record.COUNTS.EVENTS], strict=True)
     ]
     named = [
         [(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()]
@@ -164,7 +164,7 @@ def get_contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) 
     s = engine.structure
     records = s[s[MODEL.CONTACT_AT] : s[MODEL.CONTACT_AT] + len(engine.contacts)]
     # Read from the numbers, as runs may differ in their radii.
-    return _to_number_rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
+    return _to_number_rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + CONTACT_NUMBERS.RADIUS]
 
 
 def _to_number_rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
@@ -201,20 +201,20 @@ def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[I
                 raise OsimliteError(
                     f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked"
                 )
-            kinds[row] = record.COORDINATE, engine.order.index(place), watch.stops
+            kinds[row] = record.WATCH.COORDINATE, engine.order.index(place), watch.stops
             levels[row, 6] = watch.level
         elif watch.contact:
             if watch.contact not in engine.contacts:
                 near = suggest_name(watch.contact, engine.contacts)
                 raise OsimliteError(f"the model has no contact '{watch.contact}'{near}")
-            kinds[row] = record.TOUCH, engine.contacts.index(watch.contact), watch.stops
+            kinds[row] = record.WATCH.TOUCH, engine.contacts.index(watch.contact), watch.stops
         else:
             body, frame = mechanism.placement(watch.body)
             link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]
             # The kernels know links, not bodies, so the point is expressed in the frame of the
             # link.
             station = (placed @ frame @ np.array((*watch.station, 1.0)))[:3]
-            kinds[row] = record.HEIGHT, link, watch.stops
+            kinds[row] = record.WATCH.HEIGHT, link, watch.stops
             levels[row] = (*station, *watch.direction, watch.level)
     return kinds, levels
 

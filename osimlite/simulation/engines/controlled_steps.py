@@ -194,7 +194,7 @@ class ControlledSteps(Stepper):
             start_holds=True,
             held=self._held,
         )
-        batch.counts[0, : record.REPORTED] = self.taken, self.attempted, self.evaluations
+        batch.counts[0, : record.COUNTS.REPORTED] = self.taken, self.attempted, self.evaluations
         batch.reports[0, : bisect_right(times, self.time)] = self.state
         return batch
 
@@ -208,8 +208,8 @@ class ControlledSteps(Stepper):
         Yields:
             Mean length of the steps of each call, s.
         """
-        ending = record.FULL
-        while ending == record.FULL:
+        ending = record.ENDING.FULL
+        while ending == record.ENDING.FULL:
             started = perf_counter()
             before = self.time
             taken = self.taken
@@ -234,22 +234,22 @@ class ControlledSteps(Stepper):
         """
         (count,) = batch.counts
         # The log of the last call was copied, so it starts anew.
-        count[record.LOGGED] = 0
+        count[record.COUNTS.LOGGED] = 0
         batch.limit_steps(steps)
         if self._room is None:
             self._room = batch.make_workspace()
         batch.run(self._room)
-        (ending,), logged = batch.endings.tolist(), int(count[record.LOGGED])
+        (ending,), logged = batch.endings.tolist(), int(count[record.COUNTS.LOGGED])
         log = batch.log[:logged].copy(), batch.forces[:logged].copy()
         clock = batch.clocks[0].tolist()
         state = batch.states[0].tolist()
-        counts = count[: record.REPORTED].tolist()
+        counts = count[: record.COUNTS.REPORTED].tolist()
         # Python handles Ctrl-C between calls of functions. These lines call none, so an
         # interruption finds all of them set, or none of them.
         self._put_off += (log,)
         (self.time, self.next_step), self.state = clock, state
         self.taken, self.attempted, self.evaluations = counts
-        if ending == record.FAILED:
+        if ending == record.ENDING.FAILED:
             self._raise_failure(batch.errors.tolist())
         return int(ending)
 

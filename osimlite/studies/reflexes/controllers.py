@@ -16,7 +16,7 @@ import numpy as np
 from osimlite.base.quantity import warn_caller
 from osimlite.base.text import join_words, suggest_or_list
 from osimlite.mechanics.kernels.pointers import Ints
-from osimlite.mechanics.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, REFLEXES, TERM
+from osimlite.mechanics.kernels.reflexes import LIMITS, REFLEXES, TERM, TERM_TYPE
 from osimlite.mechanics.kernels.walks import LEGS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.parameters import Parameters
@@ -483,7 +483,13 @@ class Reflexes:
                 source = make_source(
                     self.walkers, node, number, SIDES[leg] if self._is_sided else ""
                 )
-                sign = FREE if free else OF_RESULT if kind.corrects else OF_SENSOR
+                sign = (
+                    TERM_TYPE.FREE
+                    if free
+                    else TERM_TYPE.OF_RESULT
+                    if kind.corrects
+                    else TERM_TYPE.OF_SENSOR
+                )
                 term = target, self._add_sensor(source), sign, leg, states, gate
                 self.terms.append(
                     TermOrGate(term, delay, -gain if kind.corrects else gain, numbers[f"{letter}0"])
@@ -492,7 +498,9 @@ class Reflexes:
         # A constant excitation is a function of time of degree 0 that starts at once.
         if np.any(constant != 0.0) or f"{before}C0" in parameters.requested:
             zero = np.zeros_like(constant)
-            self.terms.append(TermOrGate((target, -1, FREE, leg, states, -1), zero, constant, zero))
+            self.terms.append(
+                TermOrGate((target, -1, TERM_TYPE.FREE, leg, states, -1), zero, constant, zero)
+            )
         node.refuse_unread_parts(f"a {name}")
 
     def _add_gate(self, node: SettingNode, parameters: Parameters, before: str, leg: int) -> int:

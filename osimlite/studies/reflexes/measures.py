@@ -16,18 +16,11 @@ import numpy as np
 from osimlite.base.text import suggest_or_list
 from osimlite.mechanics.kernels.criteria import (
     CRITERION,
-    GAIT,
+    CRITERION_TYPE,
     GAIT_WORK,
-    JUMP,
+    JUMP_PHASE,
     JUMP_WORK,
-    LARGEST_LOAD,
-    NUMBER,
-    POWERS,
-    PREPARES,
     SAMPLE_WORK,
-    TENSIONS,
-    WANG,
-    WHOLE_LOAD,
 )
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.sensors import SENSES
@@ -38,11 +31,11 @@ from osimlite.studies.reflexes.walkers import SIDES, Walkers
 SPEED_OF_LIGHT_M_S = 299792458.0
 """Upper bound (m/s) of the speed of a gait whose scenario sets none, as in SCONE."""
 EFFORTS = {
-    "Wang2012": (WANG, 0),
-    "TotalForce": (TENSIONS, 0),
-    "MuscleActivation": (POWERS, 1),
-    "SquaredMuscleActivation": (POWERS, 2),
-    "CubedMuscleActivation": (POWERS, 3),
+    "Wang2012": (CRITERION_TYPE.WANG, 0),
+    "TotalForce": (CRITERION_TYPE.TENSIONS, 0),
+    "MuscleActivation": (CRITERION_TYPE.POWERS, 1),
+    "SquaredMuscleActivation": (CRITERION_TYPE.POWERS, 2),
+    "CubedMuscleActivation": (CRITERION_TYPE.POWERS, 3),
 }
 """Kind of criterion and power of activations, by the names of effort measures in SCONE."""
 
@@ -66,7 +59,7 @@ class Criteria:
         """Request a criterion for the time in which a measure is active.
 
         Args:
-            kind: kind of criterion, such as `GAIT` of the kernels.
+            kind: kind of criterion, such as `CRITERION_TYPE.GAIT` of the kernels.
             place: index in the sensor row, or a power of activations.
             measure: measure that needs it.
             numbers: numbers of the criterion, see `CRITERION_NUMBERS` of the kernels.
@@ -77,7 +70,11 @@ class Criteria:
         first = self.size
         self._ints += kind, place, len(self._numbers), first
         self._numbers += measure.start, measure.stop, *numbers
-        self.size += GAIT_WORK.STEPS + 2 * self.max_steps if kind == GAIT else SAMPLE_WORK.SIZE
+        self.size += (
+            GAIT_WORK.STEPS + 2 * self.max_steps
+            if kind == CRITERION_TYPE.GAIT
+            else SAMPLE_WORK.SIZE
+        )
         return first
 
     def pack(self) -> tuple[Ints, Array]:
@@ -240,7 +237,7 @@ class GaitMeasure(Measure):
         self.walkers.expect_legs()
         numbers = (("termination_height", 0.5), ("load_threshold", 0.1), ("min_step_duration", 0.1))
         self._first = self.criteria.add(
-            GAIT, 0, self, *(node.number(key, value) for key, value in numbers)
+            CRITERION_TYPE.GAIT, 0, self, *(node.number(key, value) for key, value in numbers)
         )
 
     def compute_result(self, times: Array, duration: float) -> Array:
@@ -306,7 +303,7 @@ class JumpMeasure(Measure):
             node.number("prepare_time", 0.2),
             float(at_peak),
         )
-        self._first = self.criteria.add(JUMP, 0, self, *numbers)
+        self._first = self.criteria.add(CRITERION_TYPE.JUMP, 0, self, *numbers)
 
     def compute_result(self, times: Array, duration: float) -> Array:
         """Return the peak height minus the rise during preparation (w,) (cm).
@@ -325,7 +322,9 @@ class JumpMeasure(Measure):
         early = 100.0 * np.maximum(prepared - start, 0.0)
         self.report = {"jump height": 100.0 * peak, "early rise": early}
         found = np.where(
-            does == PREPARES, 100.0 * (start + (here - start) / times), 100.0 * peak - early
+            does == JUMP_PHASE.PREPARES,
+            100.0 * (start + (here - start) / times),
+            100.0 * peak - early,
         )
         return -found if self.negates else found
 
@@ -374,7 +373,7 @@ class EffortMeasure(Measure):
         # A smallest distance keeps walkers that fall at once from having an infinite cost of
         # transport.
         far = np.maximum(self.least_distance, np.abs(here - start))
-        if self._kind == WANG:
+        if self._kind == CRITERION_TYPE.WANG:
             mass = self.walkers.mass
             self.report = {
                 "power": self.average_over_time(self._first) / mass,
@@ -462,7 +461,9 @@ class DofMeasure(Penalty):
         ):
             part = node.get(what)
             if part is not None:
-                self.penalize(part, NUMBER, int(senses[first]) + names.index(name), scale)
+                self.penalize(
+                    part, CRITERION_TYPE.NUMBER, int(senses[first]) + names.index(name), scale
+                )
                 part.refuse_unread_parts(f"a {what}")
 
     def default_name(self) -> str:
@@ -476,7 +477,12 @@ class ReactionForceMeasure(Penalty):
     def read(self, node: SettingNode) -> None:
         """Read the range, and whether it is for the more loaded leg or for the total."""
         self.walkers.expect_legs()
-        self.penalize(node, LARGEST_LOAD if node.flag("use_force_per_leg", False) else WHOLE_LOAD)
+        self.penalize(
+            node,
+            CRITERION_TYPE.LARGEST_LOAD
+            if node.flag("use_force_per_leg", False)
+            else CRITERION_TYPE.WHOLE_LOAD,
+        )
 
 
 class CompositeMeasure(Measure):

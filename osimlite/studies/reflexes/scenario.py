@@ -13,7 +13,7 @@ from osimlite.base.text import join_words, suggest_or_list
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.document.reader import read
 from osimlite.io.tables.storage import StoTable, read_sto
-from osimlite.mechanics.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
+from osimlite.mechanics.kernels.walks import ORDER, PROGRESS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.options import DEFAULT_ACCURACY, IntegrationOptions
@@ -399,14 +399,14 @@ class Candidates:
         # SCONE computes the first excitations from muscles in equilibrium at a small activation, and
         # then brings the muscles into equilibrium with these excitations as activations.
         walkers.equilibrate_muscles(np.full(walkers.excitations.shape, small))
-        walkers.advance(BEGIN)
+        walkers.advance(ORDER.BEGIN)
         walkers.equilibrate_muscles(walkers.excitations)
-        walkers.advance(START)
+        walkers.advance(ORDER.START)
         rows, going = [], list(range(walkers.count))
         for first in range(0, self._steps, STEPS_PER_CALL):
             rows.append(walkers.advance(min(STEPS_PER_CALL, self._steps - first), going))
             # Candidates that have fallen are not simulated any further.
-            going = np.flatnonzero(walkers.progress[:, GOING]).tolist()
+            going = np.flatnonzero(walkers.progress[:, PROGRESS.GOING]).tolist()
             if not going:
                 break
         # The kernels record the start of each step; the end of the last one is added here.
@@ -415,7 +415,7 @@ class Candidates:
                 [walkers.copies.states[0], walkers.excitations[0], walkers.get_leg_loads()[0]]
             )[None]
         )
-        times = walkers.step * walkers.progress[:, STEPS].astype(np.float64)
+        times = walkers.step * walkers.progress[:, PROGRESS.STEPS].astype(np.float64)
         results = self.measure.add_weighted(times, self.duration) * (
             1.0 if self.measure.minimize else -1.0
         )
@@ -507,7 +507,7 @@ def _settle_on_ground(walkers: Walkers, which: int, height: int, load: float) ->
 
     def compute_load(value: float) -> float:
         state[height] = value
-        walkers.advance(FEEL, (which,))
+        walkers.advance(ORDER.FEEL, (which,))
         return float(walkers.get_leg_loads()[which].sum())
 
     # The load falls with height; bracket the root, then bisect.

@@ -10,15 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.mechanics.kernels.sensors import (
-    ANGLE,
-    IN_ROW,
-    POSITION,
-    SENSES,
-    SPINDLE,
-    TURN,
-    VELOCITY,
-)
+from osimlite.mechanics.kernels.sensors import SENSES, SOURCE_TYPE
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import SettingNode
 from osimlite.studies.reflexes.walkers import SIDES, SensedModel
@@ -29,7 +21,7 @@ class Source(NamedTuple):
 
     Attributes:
         name: name in records.
-        kind: kind of sensor, such as `IN_ROW` of the kernels.
+        kind: kind of sensor, such as `SOURCE_TYPE.IN_ROW` of the kernels.
         place: index in the sensor row, or number of a link.
         more: second index in the sensor row, where the kind has one.
         numbers: numbers of the sensor, such as a point and a direction. If there are any, the
@@ -115,7 +107,7 @@ def _select_muscle_factory(what: str, first: int) -> SourceFactory:
     def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
             f"{sensed.paths[number].removeprefix('/')}.{what}",
-            IN_ROW,
+            SOURCE_TYPE.IN_ROW,
             int(sensed.sensor_plan[first]) + number,
         )
 
@@ -127,7 +119,9 @@ def _make_spindle_source(sensed: SensedModel, node: SettingNode, number: int, si
     length, speed = (
         int(sensed.sensor_plan[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES)
     )
-    return Source(f"{sensed.paths[number].removeprefix('/')}.spindle", SPINDLE, length, speed)
+    return Source(
+        f"{sensed.paths[number].removeprefix('/')}.spindle", SOURCE_TYPE.SPINDLE, length, speed
+    )
 
 
 def select_coordinate_factory(what: str, first: int) -> SourceFactory:
@@ -140,7 +134,9 @@ def select_coordinate_factory(what: str, first: int) -> SourceFactory:
 
     def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
-            f"{sensed.coordinates[number]}.{what}", IN_ROW, int(sensed.sensor_plan[first]) + number
+            f"{sensed.coordinates[number]}.{what}",
+            SOURCE_TYPE.IN_ROW,
+            int(sensed.sensor_plan[first]) + number,
         )
 
     return feel
@@ -160,7 +156,9 @@ def make_load_source(sensed: SensedModel, leg: int) -> Source:
         leg: index of the leg.
     """
     return Source(
-        f"leg{sensed.legs[leg].side}.load", IN_ROW, int(sensed.sensor_plan[SENSES.LOADS]) + leg
+        f"leg{sensed.legs[leg].side}.load",
+        SOURCE_TYPE.IN_ROW,
+        int(sensed.sensor_plan[SENSES.LOADS]) + leg,
     )
 
 
@@ -174,7 +172,7 @@ def _select_point_factory(what: str, kind: int) -> SourceFactory:
 
     Args:
         what: quantity for the name of the sensor.
-        kind: kind of sensor, `POSITION` or `VELOCITY`.
+        kind: kind of sensor, `SOURCE_TYPE.POSITION` or `SOURCE_TYPE.VELOCITY`.
     """
 
     def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
@@ -221,7 +219,7 @@ def _make_angle_source(sensed: SensedModel, node: SettingNode, number: int, side
             "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"
         )
     name = f"{_list_bodies(sensed)[number]}.angle{_format_vectors(axis)}"
-    return Source(name, ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))
+    return Source(name, SOURCE_TYPE.ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))
 
 
 def _make_angular_velocity_source(
@@ -231,7 +229,7 @@ def _make_angular_velocity_source(
     axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
     return Source(
         f"{_list_bodies(sensed)[number]}.turn{_format_vectors(axis)}",
-        TURN,
+        SOURCE_TYPE.TURN,
         link,
         0,
         # The axis is in the frame of the body, the kernels know its link only.
@@ -270,8 +268,8 @@ REFLEX_TYPES = {
     "BodyPointReflex": ReflexType(
         _list_bodies,
         (
-            Channel("P", _select_point_factory("position", POSITION), is_free=None),
-            Channel("V", _select_point_factory("speed", VELOCITY), is_free=None),
+            Channel("P", _select_point_factory("position", SOURCE_TYPE.POSITION), is_free=None),
+            Channel("V", _select_point_factory("speed", SOURCE_TYPE.VELOCITY), is_free=None),
         ),
         settings=("offset", "direction"),
         refused=("KA",),

@@ -14,7 +14,7 @@ from osimlite.mechanics.kernels.layout import OUTCOME
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.reflexes import REFLEXES
 from osimlite.mechanics.kernels.sensors import OF_MUSCLES, SENSES
-from osimlite.mechanics.kernels.walks import COUNTS, STEPS
+from osimlite.mechanics.kernels.walks import PROGRESS
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce
@@ -245,7 +245,7 @@ class Walkers(SensedModel):
         offsets: per path of a state variable its offset in the state.
         rows: sensor row of each candidate (w, r).
         excitations: excitations that are held over a control step (w, c).
-        progress: counts of each walk (w, p), see `STEPS` in
+        progress: counts of each walk (w, p), see `PROGRESS` in
             :mod:`osimlite.mechanics.kernels.walks`.
         criteria_work: workspaces of the criteria (w, k).
 
@@ -288,7 +288,7 @@ class Walkers(SensedModel):
         self._activations = np.array([self.offsets[f"{path}/activation"] for path in self.paths])
         self.rows = np.zeros((count, self.sensor_plan[SENSES.SIZE]))
         self.excitations = np.zeros((count, len(self.names)))
-        self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
+        self.progress: Ints = np.zeros((count, PROGRESS.SIZE), dtype=np.int64)
         self._driven: Ints = self.copies.places[self.order]
 
     # ------------------------------------------------------------------------------------------------- walking
@@ -338,13 +338,13 @@ class Walkers(SensedModel):
         states = self.copies.states
         record = np.empty((max(order, 0), states.shape[1] + len(self.names) + len(self.legs)))
         selected = range(self.count) if which is None else which
-        before = int(self.progress[0, STEPS])
+        before = int(self.progress[0, PROGRESS.STEPS])
         parts = *self._walk_arguments, self.rows, self.excitations, record, self.progress, order
         if self.copies.walk_some(selected, *parts) != OUTCOME.OK:
             # The kernels return a code only; evaluating again in Python raises the error with its cause.
             for k in selected:
                 self.engine.compute_applied_forces(0.0, states[k].tolist())
-        return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
+        return record[: int(self.progress[0, PROGRESS.STEPS]) - before] if order > 0 else record
 
     def get_leg_loads(self) -> Array:
         """Return the latest ground reaction forces on the legs over the weight (w, l)."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from osimlite.base.records import dataclass, field
-from osimlite.mechanics.kernels.paths import CONDITIONAL, MOVING
+from osimlite.mechanics.kernels.paths import NODE_TYPE
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import Force
@@ -133,8 +133,12 @@ def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
         if len(touch.poses)
     ]
     result = [
-        *(["a point that moves with a coordinate"] if MOVING in kinds else []),
-        *(["a point that comes and goes with a coordinate"] if CONDITIONAL in kinds else []),
+        *(["a point that moves with a coordinate"] if NODE_TYPE.MOVING in kinds else []),
+        *(
+            ["a point that comes and goes with a coordinate"]
+            if NODE_TYPE.CONDITIONAL in kinds
+            else []
+        ),
         *sorted({f"a {_SURFACE_NAMES[surface.law]}" for surface in touched}),
     ]
     several = ", several at a time" if len(touched) > 1 else ""

@@ -14,7 +14,7 @@ from itertools import chain, combinations, groupby, pairwise, product
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.paths import CONDITIONAL, MOVING
+from osimlite.mechanics.kernels.paths import NODE_TYPE
 from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
 from osimlite.translate.mjcf.moving import fit_composition
@@ -101,7 +101,9 @@ class Router:
         slots: list[Tendon] = []
         settle: dict[int, Callable[[Choose], Tendon]] = {}
         points = list(enumerate(self.route.points))
-        for comes_and_goes, group in groupby(points, lambda item: item[1].kind == CONDITIONAL):
+        for comes_and_goes, group in groupby(
+            points, lambda item: item[1].kind == NODE_TYPE.CONDITIONAL
+        ):
             numbers = [number for number, _ in group]
             for run in [numbers] if comes_and_goes else [[number] for number in numbers]:
                 own = tuple(make_site(self.route.points[number]) for number in run)
@@ -372,7 +374,7 @@ class Router:
 def make_site(point: Node) -> TendonSite:
     """Return the site of a path point; a moving point slides along quartics of its coordinate."""
     place = point.frame[:3, :3] @ point.location + point.frame[:3, 3]
-    if point.kind != MOVING:
+    if point.kind != NODE_TYPE.MOVING:
         return TendonSite(point.body, place, name=point.name)
     drive, slides = fit_composition(point.functions, point.range)
     return TendonSite(

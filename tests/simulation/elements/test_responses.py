@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from osimlite.mechanics.kernels import layout, pointers
-from osimlite.mechanics.kernels.condensation import INVERSE, WIDTH
+from osimlite.mechanics.kernels.condensation import RESPONSE_WORK, WIDTH
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation
@@ -131,5 +131,7 @@ def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
                 np.zeros(len(y)),
             )
         assert kernel(int(s[place + layout.RESPONSE.ITEM])) == OUTCOME.OK
-        result[name] = np.array(system.work_vector[WORK.SCRATCH : WORK.SCRATCH + INVERSE])
+        result[name] = np.array(
+            system.work_vector[WORK.SCRATCH : WORK.SCRATCH + RESPONSE_WORK.INVERSE]
+        )
     return result

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.mechanics.kernels.walks import FEEL
+from osimlite.mechanics.kernels.walks import ORDER
 from osimlite.models.walking import write_scenario
 from osimlite.studies.reflexes.parameters import Parameters
 from osimlite.studies.reflexes.scenario import Candidates, Scenario
@@ -365,4 +365,4 @@ def test_a_start_that_cannot_be_computed_is_told(ours) -> None:
     walkers = candidates.walkers
     walkers.copies.states[1, walkers.offsets["/forceset/vasti_l/fiber_length"]] = np.nan
     with pytest.raises(OsimliteError, match="state of the motion is no longer finite"):
-        walkers.advance(FEEL)
+        walkers.advance(ORDER.FEEL)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.mechanics.kernels.function_paths import ARMS, DERIVATIVES
+from osimlite.mechanics.kernels.function_paths import FUNCTION_PATH_WORK, FUNCTION_WORK
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
@@ -81,7 +81,12 @@ class CoordinatePath:
         ints = backs[0], len(values), backs[1], backs[-1] if of_speeds else 0, *freedoms, *arms
         return [
             *parts,
-            ForceRecord("function_path", ints, record_size=ARMS + len(values), is_part=True),
+            ForceRecord(
+                "function_path",
+                ints,
+                record_size=FUNCTION_PATH_WORK.ARMS + len(values),
+                is_part=True,
+            ),
         ]
 
     def _make_function_record(
@@ -94,7 +99,7 @@ class CoordinatePath:
             arguments: index in y of each argument, -1 for a locked coordinate.
             values: value of each argument that is locked.
         """
-        size, work = len(arguments), DERIVATIVES + len(arguments)
+        size, work = len(arguments), FUNCTION_WORK.DERIVATIVES + len(arguments)
         if isinstance(function, Formula):
             # A formula is differentiated symbolically, and its derivatives are formulas of the same
             # record.

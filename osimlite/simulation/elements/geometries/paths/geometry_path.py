@@ -14,21 +14,13 @@ import numpy as np
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError
-from osimlite.mechanics.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
+from osimlite.mechanics.kernels.cable_surfaces import SURFACE_TYPE
 from osimlite.mechanics.kernels.geodesic_paths import layout_slots
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.path_wraps import SURFACE_WORK
-from osimlite.mechanics.kernels.paths import (
-    CLAMPED,
-    CONDITIONAL,
-    FIXED,
-    MOVING,
-    NODE_WORK,
-    ORDER,
-    TANGENT,
-)
+from osimlite.mechanics.kernels.paths import NODE_TYPE, NODE_WORK, PATH_WORK
 from osimlite.mechanics.kernels.wrap_curves import MOST
-from osimlite.mechanics.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
+from osimlite.mechanics.kernels.wrapping import ELLIPSOID_METHOD
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.links import Places
@@ -68,7 +60,7 @@ class Node:
     body: int
     frame: Array
     location: Array
-    kind: int = FIXED
+    kind: int = NODE_TYPE.FIXED
     coordinate: int = -1
     range: tuple[float, float] = (-inf, inf)
     functions: tuple[SmoothFunction, ...] = ()
@@ -197,7 +189,11 @@ class ThroughPoints:
             if surface.law:
                 parts.append(
                     ForceRecord(
-                        surface.law, (), surface.numbers, record_size=SURFACE_WORK, is_part=True
+                        surface.law,
+                        (),
+                        surface.numbers,
+                        record_size=SURFACE_WORK.SIZE,
+                        is_part=True,
                     )
                 )
                 wraps.append(ITEM.OWN * (behind + 2 - len(parts)))
@@ -212,14 +208,16 @@ class ThroughPoints:
             # With geodesics all lines pull except chords of surfaces, because points may move in
             # their bodies.
             piece = (
-                node.body if not self.geodesic else (-1 - of if node.kind == TANGENT else number)
+                node.body
+                if not self.geodesic
+                else (-1 - of if node.kind == NODE_TYPE.TANGENT else number)
             )
             own, more = node.pack(places, of, len(numbers), self.path, piece)
             ints += own
             numbers += more
         kernel, work = (
             "wrapped_path" if self.surfaces else "straight_path",
-            ORDER + len(nodes) * (1 + NODE_WORK),
+            PATH_WORK.ORDER + len(nodes) * (1 + NODE_WORK.SIZE),
         )
         if self.geodesic and self.surfaces:
             for surface in self.surfaces:
@@ -288,12 +286,13 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
                 f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {len(points)}"
             )
         may_leave |= surface.active and all(
-            point.kind == CONDITIONAL for point in points[first : last + 1]
+            point.kind == NODE_TYPE.CONDITIONAL for point in points[first : last + 1]
         )
     # Geodesics need points that move continuously.
     if builder.geodesic:
         points = [
-            replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points
+            replace(point, kind=NODE_TYPE.CLAMPED) if point.kind == NODE_TYPE.MOVING else point
+            for point in points
         ]
         # Each segment within the range of a wrap may go around the surface.
         end = len(points) - 1
@@ -341,7 +340,7 @@ def _read_surface(
         frame = builder.tree.parent_of(frame)
     body, placed = builder.find_placement(frame)
     placed = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
-    tangent = Node(body, placed, np.zeros(3), TANGENT, name=surface.name)
+    tangent = Node(body, placed, np.zeros(3), NODE_TYPE.TANGENT, name=surface.name)
     numbers = (*side, method, alone, *sizes)
     if builder.geodesic:
         numbers = (*side, *_list_geodesic_numbers(surface))
@@ -362,13 +361,27 @@ def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
             :mod:`osimlite.mechanics.kernels.cable_surfaces`.
     """
     if isinstance(surface, WrapCylinder):
-        return surface.length / 2.0, CYLINDER, surface.radius, surface.radius**2, 1.0, 1.0, 0.0
+        return (
+            surface.length / 2.0,
+            SURFACE_TYPE.CYLINDER,
+            surface.radius,
+            surface.radius**2,
+            1.0,
+            1.0,
+            0.0,
+        )
     if isinstance(surface, WrapSphere):
-        return inf, SPHERE, surface.radius, surface.radius**2, 1.0, 1.0, 1.0
+        return inf, SURFACE_TYPE.SPHERE, surface.radius, surface.radius**2, 1.0, 1.0, 1.0
     if isinstance(surface, WrapEllipsoid):
-        return inf, ELLIPSOID, 1.0, 1.0, *(float(radius) ** -2 for radius in surface.dimensions)
+        return (
+            inf,
+            SURFACE_TYPE.ELLIPSOID,
+            1.0,
+            1.0,
+            *(float(radius) ** -2 for radius in surface.dimensions),
+        )
     assert isinstance(surface, WrapTorus)
-    return inf, TORUS, surface.outer_radius, surface.inner_radius, 0.0, 0.0, 0.0
+    return inf, SURFACE_TYPE.TORUS, surface.outer_radius, surface.inner_radius, 0.0, 0.0, 0.0
 
 
 def _read_fixed_point(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
@@ -383,7 +396,13 @@ def _read_conditional_point(builder: ElementBuilder, point: Any, body: int, fram
     # The tolerance keeps points active at a range that is given with few digits.
     within = low - TOLERANCE, high + TOLERANCE
     return Node(
-        body, frame, np.array(point.location), CONDITIONAL, coordinate, within, name=point.name
+        body,
+        frame,
+        np.array(point.location),
+        NODE_TYPE.CONDITIONAL,
+        coordinate,
+        within,
+        name=point.name,
     )
 
 
@@ -400,7 +419,9 @@ def _read_moving_point(builder: ElementBuilder, point: Any, body: int, frame: Ar
             f"the three coordinates of '{builder.path(point)}' differ; name the same one in all sockets"
         )
     within = builder.mechanism.coordinates[coordinate].range
-    return Node(body, frame, np.zeros(3), MOVING, coordinate, within, tuple(functions), point.name)
+    return Node(
+        body, frame, np.zeros(3), NODE_TYPE.MOVING, coordinate, within, tuple(functions), point.name
+    )
 
 
 READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array], Node]] = {
@@ -428,5 +449,10 @@ SIDES = {
 SIDES |= {"all": (0.0, 0.0), "unassigned": (0.0, 0.0)}
 """Axis and sign of a quadrant."""
 
-METHODS = {"hybrid": HYBRID, "midpoint": MIDPOINT, "axial": AXIAL, "unassigned": HYBRID}
+METHODS = {
+    "hybrid": ELLIPSOID_METHOD.HYBRID,
+    "midpoint": ELLIPSOID_METHOD.MIDPOINT,
+    "axial": ELLIPSOID_METHOD.AXIAL,
+    "unassigned": ELLIPSOID_METHOD.HYBRID,
+}
 """Number of a wrap method in the kernels, by the text in the file."""

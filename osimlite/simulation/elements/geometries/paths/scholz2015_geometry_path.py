@@ -14,35 +14,23 @@ import numpy as np
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.mechanics.kernels.cable_paths import (
-    ELEMENT_INTS,
-    ELEMENTS,
-    FIRST,
-    GEODESIC,
-    GUESSED,
-    KEPT,
-    LIFTED,
+    CABLE,
+    CABLE_POINT_WORK,
+    CABLE_WORK,
+    ELEMENT,
+    OBSTACLE_STATE,
     OBSTACLE_WORK,
-    POINT_WORK,
-    STATE,
-    TOUCH_NUMBERS,
-    TRACKED,
     cable_path,
     solver_size,
 )
 from osimlite.mechanics.kernels.cable_surfaces import (
-    CYLINDER,
-    ELLIPSOID,
-    END,
-    PLANE,
-    POINT,
-    SPHERE,
-    START,
-    STEP,
-    TORUS,
+    END_NUMBERS,
+    GEODESIC,
+    SURFACE_TYPE,
     surface_value,
 )
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.paths import LENGTH
+from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.kernels.wrap_curves import MOST
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
@@ -78,7 +66,7 @@ class CablePoint:
     runs: Array
     pulls: Array
 
-    size: ClassVar[int] = POINT_WORK
+    size: ClassVar[int] = CABLE_POINT_WORK.SIZE
     is_obstacle: ClassVar[bool] = False
 
     def pack(self, places: Places) -> tuple[int, list[float]]:
@@ -111,7 +99,7 @@ class CableObstacle:
     surface: tuple[float, ...]
     begin: Array
 
-    size: ClassVar[int] = OBSTACLE_WORK
+    size: ClassVar[int] = OBSTACLE_WORK.SIZE
     is_obstacle: ClassVar[bool] = True
 
     def pack(self, places: Places) -> tuple[int, list[float]]:
@@ -170,7 +158,7 @@ class Cable:
             places: placement of the bodies in the links of the tree.
         """
         most = together = 0
-        ints, numbers, work = list[int](), list[float](), FIRST
+        ints, numbers, work = list[int](), list[float](), CABLE_WORK.FIRST
         for element in self.elements:
             # The solver couples obstacles between two points, so its size follows from the longest
             # run of obstacles.
@@ -212,12 +200,12 @@ class Cable:
             # As Python, kernels raise where machine code gets NaN: a path that is normal to a plane
             # at its hint has no direction on it.
             return None
-        if np.isnan(work[LENGTH]):
+        if np.isnan(work[PATH_WORK.LENGTH]):
             return None
-        kept = ints[ELEMENTS + KEPT :: ELEMENT_INTS].tolist()
+        kept = ints[CABLE.ELEMENTS + ELEMENT.KEPT :: ELEMENT.SIZE].tolist()
         return Cable(
             tuple(
-                replace(element, begin=work[place : place + TOUCH_NUMBERS].copy())
+                replace(element, begin=work[place : place + OBSTACLE_WORK.TOUCH_SIZE].copy())
                 if isinstance(element, CableObstacle)
                 else element
                 for element, place in zip(self.elements, kept, strict=True)
@@ -354,20 +342,25 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
     body, _ = builder.find_placement(
         builder.resolve_target(geometry, "socket_frame", geometry.socket_frame)
     )
-    begin = np.zeros(TOUCH_NUMBERS)
-    begin[STATE] = LIFTED
+    begin = np.zeros(OBSTACLE_WORK.TOUCH_SIZE)
+    begin[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.LIFTED
     if has_hint:
-        begin[STATE] = GUESSED
-        begin[TRACKED : TRACKED + 3] = hint
+        begin[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.GUESSED
+        begin[OBSTACLE_WORK.TRACKED : OBSTACLE_WORK.TRACKED + 3] = hint
         if _is_middle(surface, hint):
             raise ModelError(
                 f"the contact_hint of the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is in the "
                 "middle of the surface, so that no point of it is nearest; move it off the middle"
             )
         near = _find_nearest_point(surface, hint)
-        for end in (START, END):
-            begin[GEODESIC + end + POINT : GEODESIC + end + POINT + 3] = near
-    begin[GEODESIC + STEP] = FIRST_STEP
+        for end in (GEODESIC.START, GEODESIC.END):
+            begin[
+                OBSTACLE_WORK.CURVE + end + END_NUMBERS.POINT : OBSTACLE_WORK.CURVE
+                + end
+                + END_NUMBERS.POINT
+                + 3
+            ] = near
+    begin[OBSTACLE_WORK.CURVE + GEODESIC.STEP] = FIRST_STEP
     return CableObstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
 
 
@@ -383,21 +376,21 @@ def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None
             None if a cable cannot run over it.
     """
     if isinstance(geometry, ContactSphere):
-        return SPHERE, geometry.radius, geometry.radius**2, 1.0, 1.0, 1.0
+        return SURFACE_TYPE.SPHERE, geometry.radius, geometry.radius**2, 1.0, 1.0, 1.0
     if isinstance(geometry, ContactCylinder):
-        return CYLINDER, geometry.radius, geometry.radius**2, 1.0, 1.0, 0.0
+        return SURFACE_TYPE.CYLINDER, geometry.radius, geometry.radius**2, 1.0, 1.0, 0.0
     if isinstance(geometry, ContactEllipsoid):
         return (
-            ELLIPSOID,
+            SURFACE_TYPE.ELLIPSOID,
             1.0,
             1.0,
             *(radius**-2 if radius > 0.0 else -1.0 for radius in geometry.radii),
         )
     if isinstance(geometry, ContactTorus):
-        return TORUS, geometry.torus_radius, geometry.tube_radius, 0.0, 0.0, 0.0
+        return SURFACE_TYPE.TORUS, geometry.torus_radius, geometry.tube_radius, 0.0, 0.0, 0.0
     if isinstance(geometry, ContactHalfSpace):
         # The numbers of its size are not used; its weights of 0 leave it without curvature.
-        return PLANE, 1.0, 1.0, 0.0, 0.0, 0.0
+        return SURFACE_TYPE.PLANE, 1.0, 1.0, 0.0, 0.0, 0.0
     return None
 
 
@@ -409,10 +402,10 @@ def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
         hint: the point (3,) in the frame of the surface, m.
     """
     kind, radius, _, *weights = surface
-    if kind == TORUS:
+    if kind == SURFACE_TYPE.TORUS:
         across = float(np.hypot(hint[0], hint[1]))
         return across == 0.0 or (across == radius and hint[2] == 0.0)
-    return kind != PLANE and not (np.array(weights) * hint).any()
+    return kind != SURFACE_TYPE.PLANE and not (np.array(weights) * hint).any()
 
 
 def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
@@ -426,11 +419,11 @@ def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
         The nearest point (3,), m.
     """
     kind, radius, square, *weights = surface
-    if kind == TORUS:
+    if kind == SURFACE_TYPE.TORUS:
         ring = hint * (1.0, 1.0, 0.0)
         ring *= radius / np.linalg.norm(ring)
         return ring + square * (hint - ring) / np.linalg.norm(hint - ring)
-    if kind == PLANE:
+    if kind == SURFACE_TYPE.PLANE:
         return hint * (0.0, 1.0, 1.0)
     k = np.array(weights)
     # The nearest point x satisfies x (1 + t k) = hint.
