@@ -13,7 +13,7 @@ from osimlite.base.text import format_json, join_words, suggest_name
 from osimlite.base.writing import write_into
 from osimlite.cli import _options as options
 from osimlite.cli._console import add_row, create_console, create_table, say
-from osimlite.cli.translate import tabulate
+from osimlite.cli._fidelity_table import tabulate
 from osimlite.errors import SettingError
 from osimlite.translate.exporters import EXPORTERS, Exporter
 from osimlite.translate.importers import MARKERS, OSIM, PROJECT, find_format, list_importers

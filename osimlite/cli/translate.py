@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.base.text import join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import add_row, create_console, create_table, say
+from osimlite.cli._console import create_console, say
 from osimlite.translate.exporters import list_exporters
 from osimlite.translate.importers import OSIM, find_format, list_importers
 
 if TYPE_CHECKING:
     from osimlite.base.options import OptionSpec
-    from osimlite.translate.fidelity import Fidelity
     from osimlite.translate.importers import Importer
 
 
@@ -127,6 +126,8 @@ def translate(
     written = made.write(folder)
 
     if len(made.fidelity):
+        from osimlite.cli._fidelity_table import tabulate
+
         create_console().print(tabulate(made.fidelity, to.upper()))
     same, otherwise, lost = made.fidelity.counts()
     say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
@@ -163,36 +164,3 @@ def _find_importer(file: Path) -> Importer:
             f"this is no file of {words}, which --to {OSIM} converts", file=str(file)
         )
     return known[name]
-
-
-def tabulate(fidelity: Fidelity, target: str) -> Any:
-    """Return a table of what the translation lost or approximated.
-
-    Components with equal records share a row.
-
-    Args:
-        fidelity: records of the translation.
-        target: name of the format.
-    """
-    table = create_table(
-        f"Lost or approximated in {target}: {fidelity.model}", padding=(0, 2, 1, 0)
-    )
-    table.add_column("what", overflow="fold", ratio=4)
-    table.add_column("translation", overflow="fold", ratio=3)
-    table.add_column("components", overflow="fold", ratio=3)
-    measured = any(record.errors for record in fidelity)
-    if measured:
-        table.add_column("worst error", overflow="fold", ratio=2)
-    for group in fidelity.groups():
-        # Users know a path by the name of its muscle.
-        owners = (component.removesuffix("/path") for component in group.components)
-        names = dict.fromkeys(owner.rsplit("/", 1)[1] or "the model" for owner in owners)
-        worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
-        add_row(
-            table,
-            group.cannot_say,
-            group.done,
-            join_words(list(names), most=3),
-            *([", ".join(worst)] if measured else []),
-        )
-    return table

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.cli.translate import tabulate
+from osimlite.cli._fidelity_table import tabulate
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.geometry import Mesh
 from osimlite.translate.fidelity import Fidelity

@@ -1,0 +1,44 @@
+"""Table of what a translation lost or approximated, for terminals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from osimlite.base.text import join_words
+from osimlite.cli._console import add_row, create_table
+
+if TYPE_CHECKING:
+    from osimlite.translate.fidelity import Fidelity
+
+
+def tabulate(fidelity: Fidelity, target: str) -> Any:
+    """Return a table of what the translation lost or approximated.
+
+    Components with equal records share a row.
+
+    Args:
+        fidelity: records of the translation.
+        target: name of the format.
+    """
+    table = create_table(
+        f"Lost or approximated in {target}: {fidelity.model}", padding=(0, 2, 1, 0)
+    )
+    table.add_column("what", overflow="fold", ratio=4)
+    table.add_column("translation", overflow="fold", ratio=3)
+    table.add_column("components", overflow="fold", ratio=3)
+    measured = any(record.errors for record in fidelity)
+    if measured:
+        table.add_column("worst error", overflow="fold", ratio=2)
+    for group in fidelity.groups():
+        # Users know a path by the name of its muscle.
+        owners = (component.removesuffix("/path") for component in group.components)
+        names = dict.fromkeys(owner.rsplit("/", 1)[1] or "the model" for owner in owners)
+        worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
+        add_row(
+            table,
+            group.cannot_say,
+            group.done,
+            join_words(list(names), most=3),
+            *([", ".join(worst)] if measured else []),
+        )
+    return table
