@@ -350,7 +350,10 @@ def _describe_type(data: Any) -> str:
 
 
 def _format_json(data: Any, indent: str) -> Iterator[str]:
-    """Yield JSON with one property per line; data without nested data is on one line."""
+    """Yield JSON with one property per line; data without nested data is on one line.
+
+    `json.dumps` can only put every number of a vector on a line of its own, or all on one line.
+    """
     if not isinstance(data, (dict, list)) or not any(
         isinstance(part, (dict, list)) for part in _list_parts(data)
     ):

@@ -7,6 +7,11 @@ space is ignored.
 
 As in Lepton, a formula is simplified while it is read: ``0*x`` is 0, ``x-x`` is 0 and ``x/x`` is 1,
 whatever x is. What is simplified away may be NaN, or an unknown name.
+
+Python's `ast` cannot read these formulas: it refuses names such as ``lambda`` and numbers such as
+``007``, which Lepton accepts; it reads ``^`` as a bitwise operator below ``+`` in precedence; and it
+ends at 200 nested parentheses or at sums of some thousand terms, which polynomials fitted to paths
+have.
 """
 
 from __future__ import annotations
