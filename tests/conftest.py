@@ -12,7 +12,10 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 
+from osimlite.schema.model import Model
 from tests import separate
+from tests.bare import BareEnvironment
+from tests.simple_models import read_walker
 from tests.suite import Suite
 
 # For the tests of tests/suite.py and tests/separate.py.
@@ -37,17 +40,25 @@ settings.load_profile("osimlite")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that runs the full suite."""
+    """Add the options that choose the tests and their order."""
     parser.addoption(
         "--full",
         action="store_true",
         help="run all tests, also those marked `full` (release, nightly)",
     )
+    parser.addoption(
+        "--shuffle",
+        type=int,
+        metavar="SEED",
+        help="run the files, and the tests of each, in the random order of this seed",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
-    config.pluginmanager.register(Suite(config.getoption("--full")), "osimlite-suite")
+    config.pluginmanager.register(
+        Suite(config.getoption("--full"), config.getoption("--shuffle")), "osimlite-suite"
+    )
     if not config.getoption("--full"):
         settings.load_profile("osimlite-quick")
     if not separate.is_server(config):
@@ -136,6 +147,18 @@ def repo() -> Path:
 def fixtures() -> Path:
     """The small inputs that are committed with the tests."""
     return ROOT / "fixtures"
+
+
+@pytest.fixture(scope="session")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
+    """An environment with the base dependencies alone."""
+    return BareEnvironment(tmp_path_factory.mktemp("bare") / "environment")
+
+
+@pytest.fixture
+def walker() -> Model:
+    """The dynamic walker as OpenSim wrote it; each test has its own."""
+    return read_walker()
 
 
 @pytest.fixture(scope="session")

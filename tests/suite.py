@@ -1,16 +1,25 @@
-"""The quick and the full suite: the option ``--full``, and how tests ask which of the two runs."""
+"""The quick and the full suite: the option ``--full``, how tests ask which of the two runs, and their order.
+
+It also ends a process in which a test hangs, and tells pytest-xdist to go on when one has ended.
+"""
 
 from __future__ import annotations
 
+import faulthandler
+import random
+from collections.abc import Generator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from _pytest.faulthandler import fault_handler_stderr_fd_key
 
 from tests import separate
 from tests.quick_cases import QUICK_CASES, QUICK_STRIDES
 
 HOW = "`pytest --full` runs them"
+SECONDS_TO_END = 60.0
+"""What tearing down a test that has timed out may take, besides a fifth of its limit."""
 _ANSWER = "tests_of_the_full_suite"
 _state = {"full": False, "deselected": 0}
 
@@ -28,14 +37,16 @@ def choose(quick: Any, full: Any) -> Any:
 class Suite:
     """Pytest plugin that leaves tests marked ``full`` out unless the option ``--full`` is given."""
 
-    def __init__(self, full: bool) -> None:
+    def __init__(self, full: bool, seed: int | None = None) -> None:
         _state["full"] = full
+        self.seed = seed
 
     def pytest_report_header(self) -> str:
         """Name the suite. The count follows at the end: workers collect the tests, after this header."""
+        order = "" if self.seed is None else f"; in random order {self.seed}"
         if is_full():
-            return "suite: full"
-        return f"suite: quick, without the tests marked `full`; {HOW}"
+            return f"suite: full{order}"
+        return f"suite: quick, without the tests marked `full`; {HOW}{order}"
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(
@@ -43,8 +54,10 @@ class Suite:
     ) -> None:
         """Deselect the tests of the full suite."""
         if not separate.is_server(config):
-            # The process that asks for tests of `check_*.py` has chosen them.
+            # The process that asks for tests of `check_*.py` has chosen them, and their order.
             _mark_cases(config, items)
+            if self.seed is not None:
+                items[:] = shuffle_tests(items, self.seed)
         if is_full():
             return
         slow = [item for item in items if item.get_closest_marker("full")]
@@ -52,6 +65,35 @@ class Suite:
             items[:] = [item for item in items if not item.get_closest_marker("full")]
             config.hook.pytest_deselected(items=slow)
         _state["deselected"] = len(slow)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> Any:
+        """Distribute tests in a way that goes on when a worker dies."""
+        from tests.scheduling import make_scheduler
+
+        return make_scheduler(config, log)
+
+    @pytest.hookimpl(optionalhook=True, wrapper=True)
+    def pytest_timeout_set_timer(
+        self, item: pytest.Item, settings: Any
+    ) -> Generator[None, Any, Any]:
+        """End the process some time after pytest-timeout should have ended the test.
+
+        Pytest-timeout raises in Python code, which never comes where a library hangs.
+        """
+        if settings.timeout > 0:
+            faulthandler.dump_traceback_later(
+                1.2 * settings.timeout + SECONDS_TO_END,
+                file=item.config.stash[fault_handler_stderr_fd_key],
+                exit=True,
+            )
+        return (yield)
+
+    @pytest.hookimpl(optionalhook=True, wrapper=True)
+    def pytest_timeout_cancel_timer(self, item: pytest.Item) -> Generator[None, Any, Any]:
+        """Let the process live: the test has ended in time."""
+        faulthandler.cancel_dump_traceback_later()
+        return (yield)
 
     def pytest_report_collectionfinish(self) -> list[str]:
         """Count the tests that were left out, where this process has collected them itself."""
@@ -77,6 +119,21 @@ class Suite:
             )
             for line in _describe(_state["deselected"]):
                 terminalreporter.write_line(line)
+
+
+def shuffle_tests(items: Sequence[pytest.Item], seed: int) -> list[pytest.Item]:
+    """Return tests in a random order: the files, and the tests of each file.
+
+    A file stays together, for what its tests share is set up once. Every worker must get the same
+    order, so it depends on the seed alone.
+    """
+    draw = random.Random(seed)
+    files: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.nodeid.partition("::")[0], []).append(item)
+    for tests in files.values():
+        draw.shuffle(tests)
+    return [item for name in draw.sample(list(files), len(files)) for item in files[name]]
 
 
 def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -11,11 +11,6 @@ import pytest
 from tests.bare import BareEnvironment
 
 
-@pytest.fixture(scope="module")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
-    return BareEnvironment(tmp_path_factory.mktemp("bare") / "environment")
-
-
 def test_optional_packages_are_absent(bare: BareEnvironment, tmp_path: Path) -> None:
     done = bare.call(folder=tmp_path, code="import osimlite, numpy")
     assert done.stderr.splitlines()[-1] == "ModuleNotFoundError: No module named 'numpy'"

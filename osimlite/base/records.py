@@ -1,8 +1,8 @@
 """Records: classes like dataclasses whose methods are compiled with the first object.
 
 ``dataclasses.dataclass`` writes and compiles half a dozen methods of each class when its module is
-imported. A command loads some 150 records and creates objects of few. Here ``__init__`` is compiled
-with the first object, and all classes share the functions that compare and print. Everything else
+imported. A command loads some 150 records, and creates few objects of most of them. Here ``__init__``
+is compiled with the fifth object, and all classes share the functions that compare and print. Everything else
 equals dataclasses, whose `replace` and `fields` accept records.
 """
 
@@ -14,6 +14,9 @@ from typing import Any, TypeVar, cast, dataclass_transform, overload
 
 T = TypeVar("T")
 _NOTHING: Any = object()
+
+UNCOMPILED = 4
+"""Objects of a record that are created without its compiled ``__init__``: compiling takes as long as twenty of them."""
 
 
 class _Field:
@@ -150,13 +153,55 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
 
 
 def _make_first_init(cls: Any, frozen: bool) -> Callable[..., None]:
-    """Return an ``__init__`` that compiles the final one when the first object is created."""
+    """Return an ``__init__`` for the first objects, which compiles the final one after them."""
+    count = 0
+    set_value: Callable[[Any, str, Any], None] = object.__setattr__ if frozen else setattr
 
     def __init__(self: Any, *values: Any, **named: Any) -> None:
-        cls.__init__ = _compile_init(cls, frozen)
-        cls.__init__(self, *values, **named)
+        nonlocal count
+        count += 1
+        bound = None if count > UNCOMPILED else _bind_arguments(cls, values, named)
+        if bound is None:
+            cls.__init__ = _compile_init(cls, frozen)
+            cls.__init__(self, *values, **named)
+            return
+        for name, value in bound:
+            set_value(self, name, value)
+        if hasattr(cls, "__post_init__"):
+            self.__post_init__()
 
     return __init__
+
+
+def _bind_arguments(
+    cls: Any, values: tuple[Any, ...], named: dict[str, Any]
+) -> list[tuple[str, Any]] | None:
+    """Return the attributes that arguments of ``__init__`` give.
+
+    Returns:
+        Names and values in the order of the fields; None if arguments are wrong, about which the
+        compiled function complains.
+    """
+    bound = []
+    place = used = 0
+    for name, each in cls.__record_fields__.items():
+        if each.init and not each.kw_only and place < len(values):
+            if name in named:
+                return None
+            bound.append((name, values[place]))
+            place += 1
+        elif each.init and name in named:
+            bound.append((name, named[name]))
+            used += 1
+        elif each.default_factory is not _NOTHING:
+            bound.append((name, each.default_factory()))
+        elif not each.init:
+            continue
+        elif each.default is _NOTHING:
+            return None
+        else:
+            bound.append((name, each.default))
+    return bound if place == len(values) and used == len(named) else None
 
 
 def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:

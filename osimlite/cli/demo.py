@@ -167,7 +167,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation
 
-    result = []
+    result, sentences = [], []
     # The stack closes all simulations, also if the tour fails half-way.
     with ExitStack() as work:
         with tour.step("Make three models ready to move") as tell:
@@ -189,7 +189,8 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 folder = tour.folder / motion.model
                 trajectory.write(folder)
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
-                tell(motion.describe(trajectory), folder)
+                sentences.append(motion.describe(trajectory))
+                tell(sentences[-1], folder)
             result.append(trajectory)
     # The first motion is the one that PyBullet can compute, without muscles.
     _compare_engines(tour, result[0])
@@ -215,10 +216,10 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
             (human_title, human_page),
         ]
         # `Simulation` keeps the model of its trajectories.
-        for motion, trajectory in zip(MOTIONS, result, strict=True):
+        for motion, trajectory, sentence in zip(MOTIONS, result, sentences, strict=True):
             assert trajectory.model is not None
             shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
-            words = f"{motion.describe(trajectory)} {motion.seen}"
+            words = f"{sentence} {motion.seen}"
             story = Story(words, motion.command.format(tour.folder), f"{motion.model}.html", titles)
             pages.append(shown.write_page(tour.folder / story.page, story))
         shown = Shown.of(human.model, build_mechanism(human.model), motion=states)

@@ -67,13 +67,26 @@ def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
         word: the word.
         known: known names.
     """
+    lower = word.lower()
+    # Names of fewer than eight letters differ from many words by two letters.
+    if len(word) < 8:
+        return next((name for name in known if name.lower() == lower), None)
+    letters = set(lower)
+    # Each of two changes replaces at most one letter by another. Hardly a name passes, and importing
+    # rapidfuzz takes as long as reading a small file.
+    near = [
+        name
+        for name in known
+        if abs(len(name) - len(word)) <= 2 and len(letters.symmetric_difference(name.lower())) <= 4
+    ]
+    if not near:
+        return None
+    if word in near:
+        return word
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
 
-    # Names of fewer than eight letters differ from many words by two letters.
-    if len(word) < 8:
-        return next((name for name in known if name.lower() == word.lower()), None)
-    result = extractOne(word, list(known), scorer=OSA.distance, processor=str.lower, score_cutoff=2)
+    result = extractOne(word, near, scorer=OSA.distance, processor=str.lower, score_cutoff=2)
     return result[0] if result else None
 
 

@@ -311,9 +311,22 @@ RULE_MODULES: Mapping[str, tuple[str, ...]] = {
 }
 """Modules of `osimlite.lint.rules` by what their rules are about.
 
-Modules under "model" are always loaded: their rules on text and files apply to every document.
-The others are loaded only for subjects of their kind.
+Modules are loaded only for subjects of their kind.
 """
+
+DOCUMENT_MODULES = (
+    "classes",
+    "domains",
+    "files",
+    "leftovers",
+    "markup",
+    "relations",
+    "structure",
+    "text",
+    "values",
+    "versions",
+)
+"""Modules under "model" with rules on text, tags, values and files, which apply to every document."""
 
 
 @cache
@@ -328,10 +341,10 @@ def all_rules(about: str = "") -> tuple[Rule, ...]:
         The rules.
     """
     for subject, modules in RULE_MODULES.items():
-        # Rules on text apply to tables and setups too, therefore modules of "model" are always
-        # needed.
-        if about in ("", subject) or subject == "model":
-            for module in modules:
+        for module in modules:
+            # Rules on text, tags and values apply to setups too.
+            is_shared = about == "document" and module in DOCUMENT_MODULES
+            if about in ("", subject) or is_shared:
                 import_module(f"osimlite.lint.rules.{module}")
     return tuple(_RULES[code] for code in sorted(_RULES))
 

@@ -28,9 +28,8 @@ from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema.base import Object
 from osimlite.simulation.elements.control_sets import ControlCurves
-from osimlite.simulation.elements.control_tables import read_controls
+from osimlite.simulation.elements.control_tables import TableColumn, read_controls
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.synergies import TableColumn
 
 PRINTED_TIME_TOLERANCE_S = 1e-6
 """Tolerance at the ends of a table, s, because its times are printed with few digits."""

@@ -109,19 +109,20 @@ class System(StateEvaluator):
         result = np.zeros((len(moments), len(self.columns)))
         if not self.columns:
             return result
-        slices, places = [], list[int]()
-        for items in self._items:
+        copied, sources, computed = self._sort_columns()
+        slices, places = [], list[int](sources)
+        for number, columns in computed:
             own = []
-            for place, room in items:
+            for place, room in self._items[number]:
                 own.append(slice(len(places), len(places) + room))
                 places += range(place, place + room)
-            slices.append(own)
+            slices.append((self.forces.elements[number], own, columns))
         # Reports of torques need the origins of the bodies, hence rotation and position of each
         # link.
         links = int(self.structure[MODEL.WORK_LINK])
         size = LINK_WORK.SIZE
         count = len(places)
-        for number in range(len(self._links)):
+        for number in range(len(self._links) if computed else 0):
             first = links + size * number
             places += [
                 *range(first, first + 9),
@@ -130,16 +131,37 @@ class System(StateEvaluator):
         # Chunks bound the memory for the work vectors of long motions.
         for start in range(0, len(moments), MOMENTS_PER_CALL):
             found = self.evaluate_moments(moments[start : start + MOMENTS_PER_CALL], places)
+            rows = result[start : start + MOMENTS_PER_CALL]
+            rows[:, copied] = found[:, : len(copied)]
+            if not computed:
+                continue
             origins = self._compute_origins(found[:, count:].reshape(len(found), -1, 12)).tolist()
-            for number, (work, known) in enumerate(
-                zip(found[:, :count].tolist(), origins, strict=True), start
-            ):
-                rows = (
-                    element.report([work[part] for part in own], known)
-                    for element, own in zip(self.forces.elements, slices, strict=True)
-                )
-                result[number] = [value for row in rows for value in row]
+            work = found[:, :count].tolist()
+            for element, own, columns in slices:
+                rows[:, columns] = [
+                    element.report([moment[part] for part in own], known)
+                    for moment, known in zip(work, origins, strict=True)
+                ]
         return result
+
+    def _sort_columns(self) -> tuple[list[int], list[int], list[tuple[int, slice]]]:
+        """Divide `columns` into copies of numbers in the work vector and columns that elements compute.
+
+        Returns:
+            Copied columns, their places in the work vector, and numbers and columns of the elements
+            that compute theirs.
+        """
+        copied, sources, computed = list[int](), list[int](), list[tuple[int, slice]]()
+        first = 0
+        for number, element in enumerate(self.forces.elements):
+            columns = slice(first, first := first + len(element.columns))
+            own = element.find_copied_places()
+            if own is None:
+                computed.append((number, columns))
+            elif own:
+                copied += range(columns.start, columns.stop)
+                sources += [self._items[number][-1][0] + place for place in own]
+        return copied, sources, computed
 
     def _compute_origins(self, links: Floats) -> Floats:
         """Return the origins of all bodies and of ground.

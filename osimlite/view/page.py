@@ -284,7 +284,7 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
     poses = [scene.at(row) for row in rows]
     moves = find_moving_bodies(poses)[:-1]
     middles = np.array([pose.origins[:-1][moves].mean(axis=0) for pose in poses])
-    boxes = np.array([scene.box(row) for row in rows])
+    boxes = np.array([scene.box_of(pose) for pose in poses])
     travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(
         boxes[0, 1] - boxes[0, 0]
     )

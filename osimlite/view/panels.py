@@ -38,6 +38,8 @@ SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", ""
 """Color and name of the curves of each side."""
 DASHES = (0.0, (4.0, 4.0))
 """Line style of a curve that lies on another."""
+EXPONENTS = (-4, 6)
+"""Powers of ten of ordinates beyond which a common power is written above the axis."""
 DPI = 110
 """Resolution of the pages, dots per inch: a page of twelve panels has 1,210 by 1,050 pixels."""
 
@@ -338,13 +340,14 @@ def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False)
             # The curve below shows through, as in a symmetric motion.
             curve = curve._replace(style=DASHES)
         _draw_curve(place, curve, cyclic=cyclic)
+    style_axes(place, abscissa)
     words = panel.title.replace("_", " ")
     unit = f" ({panel.unit})" if panel.unit else ""
-    place.set_title(f"{words}{unit}", fontsize=10, loc="left")
+    height = find_title_height(place)
+    place.set_title(f"{words}{unit}", fontsize=10, loc="left", y=height)
     group = panel.group.replace("_", " ")
     if group and group not in words and len(words + unit + group) < 40:
-        place.set_title(group, fontsize=8, loc="right", color="0.5")
-    style_axes(place, abscissa)
+        place.set_title(group, fontsize=8, loc="right", color="0.5", y=height)
 
 
 def _coincide(curve: PanelCurve, other: PanelCurve) -> bool:
@@ -407,9 +410,24 @@ def style_axes(place: Any, label: str) -> None:
     place.spines[["top", "right"]].set_visible(False)
     place.tick_params(labelsize=8)
     # No common offset at the axis: it is easily overlooked.
-    place.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 6))
+    place.ticklabel_format(axis="y", useOffset=False, scilimits=EXPONENTS)
     place.margins(x=0.0)
     place.set_xlabel(label, fontsize=8)
+
+
+def find_title_height(place: Any) -> float | None:
+    """Return the height of the title of axes that `style_axes` has styled, in axes coordinates.
+
+    Matplotlib measures all labels of the axes several times to find a height, which takes a third of the time
+    of a page. Only a power of ten above the axis of ordinates can be in the way of the title.
+
+    Returns:
+        1, or None where matplotlib must find the height.
+    """
+    largest = max(map(abs, place.get_ylim()))
+    # Ticks may be smaller than the limits by a digit.
+    low, high = EXPONENTS
+    return 1.0 if 10.0 ** (low + 2) <= largest < 10.0**high else None
 
 
 def figure_of(title: str, size: tuple[float, float]) -> Any:
@@ -459,6 +477,9 @@ def write_pages(figures: Iterable[Any], folder: Path, stem: str) -> list[Path]:
 
 def render_png(figure: Any, dpi: float = DPI) -> bytes:
     """Return a figure of matplotlib as a PNG file."""
+    agg = require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=dpi)
+    # `savefig` draws everything once more, only to lay the page out.
+    figure.set_dpi(dpi)
+    agg.FigureCanvasAgg(figure).print_png(out)
     return out.getvalue()

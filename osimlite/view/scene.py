@@ -227,7 +227,14 @@ class Scene:
         Returns:
             Least and greatest coordinates (3,), m, widened if the box is a point.
         """
-        bodies = self.at(q)
+        return self.box_of(self.at(q))
+
+    def box_of(self, bodies: Bodies) -> tuple[Array, Array]:
+        """Compute the bounding box of known poses of the bodies, as `box` does.
+
+        Returns:
+            Least and greatest coordinates (3,), m, widened if the box is a point.
+        """
         result: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
         points = np.concatenate(result or [bodies.origins])
         low, high = points.min(axis=0), points.max(axis=0)

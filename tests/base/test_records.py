@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from osimlite.base.records import dataclass, field, replace
+from osimlite.base.records import UNCOMPILED, dataclass, field, replace
 
 
 @dataclass(frozen=True)
@@ -109,12 +109,58 @@ def test_objects_can_be_copied_pickled_and_varied(item: Any) -> None:
     assert fields_of(item) == [(name, name != "seen") for name in item.__record_fields__]
 
 
-def test_nothing_is_compiled_before_an_object_is_made() -> None:
+def test_nothing_is_compiled_before_several_objects_are_made() -> None:
     @dataclass
     class Late:
         size: int = 1
 
     before: Any = vars(Late)["__init__"]
+    assert [Late().size for _ in range(UNCOMPILED)] == [1] * UNCOMPILED
+    assert vars(Late)["__init__"] is before
     assert Late().size == 1 and vars(Late)["__init__"] is not before
     made: Any = vars(Late)["__init__"]
     assert Late(2).size == 2 and vars(Late)["__init__"] is made
+
+
+def make_fresh():
+    """Return a record of which there are no objects yet, and the same as a dataclass."""
+
+    def declare(make, attribute):
+        class Item:
+            name: str
+            depth: float = 0.5
+            parts: list[int] = attribute(default_factory=list)
+            total: int = attribute(default=0, init=False)
+
+            def __post_init__(self) -> None:
+                self.total = len(self.parts)
+
+        return make(Item)
+
+    return declare(dataclass, field), declare(dataclasses.dataclass, dataclasses.field)
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        (("a",), {}),
+        (("a", 1.0, [1, 2]), {}),
+        ((), {"parts": [3], "name": "a"}),
+        ((), {}),
+        (("a", 1.0, [], 4), {}),
+        (("a",), {"name": "b"}),
+        (("a",), {"total": 3}),
+        (("a",), {"other": 3}),
+    ],
+)
+def test_the_first_objects_are_like_later_ones(values, named) -> None:
+    ours, theirs = make_fresh()
+    for _ in range(2 * UNCOMPILED):
+        try:
+            expected = vars(theirs(*values, **named))
+        except TypeError as error:
+            with pytest.raises(TypeError) as raised:
+                ours(*values, **named)
+            assert str(raised.value) == str(error)
+        else:
+            assert vars(ours(*values, **named)) == expected

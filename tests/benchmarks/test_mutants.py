@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.mutants import Mutant, find_mutants, try_mutant
+from benchmarks.mutants import Mutant, Trials, find_mutants
 
 TEXT = '''
 LEFT_ALONE = 1 + 2
@@ -39,15 +39,19 @@ def test_tests_are_called_with_the_mutant_in_place(tmp_path: Path, repo: Path) -
     shutil.copy(repo / "pyproject.toml", tmp_path)
     (tmp_path / "clipping.py").write_text("def double(x):\n    return x * 2\n")
     (tmp_path / "test_it.py").write_text(
-        "from clipping import double\n\ndef test_it():\n    assert double(3) == 6\n"
+        "from clipping import double\n\ndef test_wrong():\n    assert double(3) == 7\n\n"
+        "def test_it():\n    assert double(3) == 6\n"
     )
     (mutant, *_) = (
         each
         for each in find_mutants("clipping.py", (tmp_path / "clipping.py").read_text())
         if each.old == "*"
     )
-    assert try_mutant(mutant, ["test_it.py"], tmp_path, full=False, seconds=60) == "killed"
+    trials = Trials(tmp_path, full=False, seconds=60)
+    wrong, right = "test_it.py::test_wrong", "test_it.py::test_it"
+    # What fails without the mutant too says nothing about it.
+    assert trials.try_mutant(mutant, [wrong, right]) == ("killed", right)
     harmless = Mutant("clipping.py", 2, mutant.start, mutant.end, "*", " * ")
-    assert try_mutant(harmless, ["test_it.py"], tmp_path, full=False, seconds=60) == "survived"
-    assert try_mutant(harmless, [], tmp_path, full=False, seconds=60) == "untested"
+    assert trials.try_mutant(harmless, [wrong, right]) == ("survived", "")
+    assert trials.try_mutant(harmless, []) == ("untested", "")
     assert "x * 2" in (tmp_path / "clipping.py").read_text()

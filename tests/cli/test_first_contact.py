@@ -10,14 +10,12 @@ import pytest
 import osimlite
 from tests.cli.command import run
 from tests.cli.support import loaded
+from tests.simple_models import make_pendulum
 
 
 @pytest.fixture
 def box(tmp_path: Path) -> Path:
-    model = osimlite.Model(name="box")
-    body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    model.add(osimlite.PinJoint(name="pin").between(model.ground, body))
-    osimlite.write(model, tmp_path / "box.osim")
+    osimlite.write(make_pendulum("b"), tmp_path / "box.osim")
     return tmp_path
 
 

@@ -13,6 +13,7 @@ from osimlite.fitting.marker_data import MarkerData
 from osimlite.io.tables.storage import read_sto
 from osimlite.io.tables.writers import write_trc
 from tests.cli.command import run
+from tests.simple_models import make_marked_body
 
 POINTS = {
     "one": (0.1, 0.0, 0.0),
@@ -25,14 +26,7 @@ POINTS = {
 @pytest.fixture
 def lab(tmp_path: Path) -> Path:
     """A body with markers, and a trial of it."""
-    model = osimlite.Model(name="box")
-    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    model.add(body)
-    model.add(
-        osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
-    )
-    for name, point in POINTS.items():
-        model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=point))
+    model = make_marked_body(POINTS, "box")
     osimlite.write(model, tmp_path / "box.osim")
     mechanism: Any = osimlite.mechanism(model)
     poses = [0.2 * k * np.array((0.3, -0.2, 0.1, 0.5, 0.6, 0.7)) for k in range(5)]

@@ -9,6 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.cli import main
+from tests.simple_models import make_pendulum
 
 
 def run(*words: str) -> int:
@@ -22,13 +23,6 @@ def run(*words: str) -> int:
 @pytest.fixture
 def file(tmp_path: Path) -> str:
     return str(tmp_path / "model.osim")
-
-
-def pendulum() -> osimlite.Model:
-    model = osimlite.Model(name="pendulum")
-    bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=[1, 1, 1, 0, 0, 0]))
-    model.add(osimlite.PinJoint(name="pin").between(model.ground, bob))
-    return model
 
 
 @pytest.mark.parametrize(
@@ -72,19 +66,19 @@ def test_without_a_cycle_the_steps_are_counted_and_the_answer_is_no(
 
 
 def test_what_cannot_walk_leaves_no_folder(tmp_path: Path, file: str) -> None:
-    osimlite.write(pendulum(), file)
+    osimlite.write(make_pendulum(), file)
     assert run(file, "-o", str(tmp_path / "gait")) == 2
     assert not (tmp_path / "gait").exists()
 
 
 def test_parameters_are_of_functions_only(file: str, capsys: pytest.CaptureFixture[str]) -> None:
-    osimlite.write(pendulum(), file)
+    osimlite.write(make_pendulum(), file)
     assert run(file, "-p", "slope=8") == 2
     assert "has no parameters" in capsys.readouterr().err
 
 
 def test_without_contacts(file: str, capsys: pytest.CaptureFixture[str]) -> None:
-    osimlite.write(pendulum(), file)
+    osimlite.write(make_pendulum(), file)
     assert run(file) == 2
     assert "'pendulum' has no contact forces" in capsys.readouterr().err
 
@@ -92,7 +86,7 @@ def test_without_contacts(file: str, capsys: pytest.CaptureFixture[str]) -> None
 def test_what_cannot_be_computed_can_be_left_out(
     file: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model = pendulum()
+    model = make_pendulum()
     for number in range(6):
         model.add(osimlite.ElasticFoundationForce(name=f"foundation{number}", appliesForce=True))
     text = osimlite.to_text(model).replace("ElasticFoundationForce", "MyOwnForce")
@@ -107,7 +101,7 @@ def test_what_cannot_be_computed_can_be_left_out(
 def test_constraints_are_beyond_the_search_for_gaits(
     file: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model = pendulum()
+    model = make_pendulum()
     body = next(iter(model.components(osimlite.Body)))
     model.add(
         osimlite.PointConstraint(name="held", socket_body_1="/ground", socket_body_2=body.path)

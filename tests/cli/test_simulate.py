@@ -19,6 +19,7 @@ from osimlite.simulation import read_sto, write_sto
 from osimlite.simulation.engines import engine_name
 from tests.bare import BareEnvironment
 from tests.cli.command import run
+from tests.simple_models import make_slide
 from tests.simulation.damped import damped
 
 
@@ -51,12 +52,6 @@ def test_files_and_table(walker, tmp_path):
 @pytest.fixture
 def stiff(tmp_path: Path) -> Path:
     """A bob between stops, which swings some ten thousand times in a second."""
-    model = osimlite.Model(name="stiff")
-    bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    slide = osimlite.SliderJoint(
-        name="rail", coordinates=[osimlite.Coordinate(name="x", default_value=1.0)]
-    )
-    model.add(slide.between(model.ground, bob))
     stops = {
         "lower_limit": -0.01,
         "upper_limit": 0.0,
@@ -66,8 +61,7 @@ def stiff(tmp_path: Path) -> Path:
     limit = osimlite.CoordinateLimitForce(
         name="stop", coordinate="x", damping=0.0, transition=1e-3, **stops
     )
-    model.add(limit)
-    osimlite.write(model, tmp_path / "stiff.osim")
+    osimlite.write(make_slide(limit, default_value=1.0), tmp_path / "stiff.osim")
     return tmp_path / "stiff.osim"
 
 
@@ -302,13 +296,7 @@ def test_auto_is_a_deprecated_name_of_the_default():
 @pytest.fixture
 def driven(tmp_path: Path) -> Path:
     """A bob on a rail with a motor, and a table of controls."""
-    model = osimlite.Model(name="driven")
-    bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    rail = osimlite.SliderJoint(name="rail", coordinates=[osimlite.Coordinate(name="x")])
-    model.add(
-        rail.between(model.ground, bob),
-        *(CoordinateActuator(name=name, coordinate="x") for name in "ab"),
-    )
+    model = make_slide(*(CoordinateActuator(name=name, coordinate="x") for name in "ab"))
     osimlite.write(model, tmp_path / "driven.osim")
     write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2], ["/forceset/a"], [[1.0], [3.0]])
     return tmp_path / "driven.osim"

@@ -14,6 +14,7 @@ from osimlite.fitting.scaling import scale_model
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.base import Object
+from tests.simple_models import make_marked_body
 
 MARKERS = ("one", "two", "three", "four")
 
@@ -23,15 +24,7 @@ POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1,
 
 def free_body() -> osimlite.Model:
     """A body with four markers."""
-    model = osimlite.Model(name="one")
-    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    model.add(body)
-    model.add(
-        osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
-    )
-    for name, point in zip(MARKERS, POINTS.tolist(), strict=True):
-        model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=tuple(point)))
-    return model
+    return make_marked_body(dict(zip(MARKERS, POINTS.tolist(), strict=True)))
 
 
 def positions(values: Any) -> Any:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 import osimlite
-from osimlite import Body, FreeJoint, Model, PhysicalOffsetFrame, PinJoint
+from osimlite import Body, Model, PhysicalOffsetFrame, PinJoint
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import CoordinateTarget, MarkerTarget, SensorTarget
@@ -25,6 +25,7 @@ from osimlite.mechanics.multibody.spatial import make_transform, rotation_xyz
 from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from tests.fitting.support import cost_of, places_at
 from tests.mechanics.multibody.strategies import Case, cases, constraint_of
+from tests.simple_models import make_marked_body
 
 ROUND = "ConstantCurvatureJoint"
 """Its functions of several coordinates are bent, which Newton's matrix leaves out."""
@@ -219,11 +220,7 @@ def test_python_and_machine_code_find_the_same_poses() -> None:
 
 def _free_body() -> Mechanism:
     """One free body."""
-    model = Model(name="one")
-    body = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    model.add(body)
-    model.add(FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
-    return osimlite.mechanism(model)
+    return osimlite.mechanism(make_marked_body({}))
 
 
 def _pendulum(**changes: Any) -> Mechanism:

@@ -13,7 +13,6 @@ from osimlite.io.document.source import Source
 from osimlite.lint import Config, measures, validate
 from osimlite.lint.many import check_files
 from osimlite.mechanics.multibody.parts import CoordinateInfo
-from tests.bare import BareEnvironment
 from tests.cli.command import run
 
 JUMPING = "fail-02-two-coordinates.osim"
@@ -25,11 +24,6 @@ def jumping(fixtures: Path, tmp_path: Path) -> Path:
     path.write_bytes((fixtures / "lint" / "OSIM632" / JUMPING).read_bytes())
     (tmp_path / "osimlite.toml").write_text("")
     return path
-
-
-@pytest.fixture(scope="module")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
-    return BareEnvironment(tmp_path_factory.mktemp("bare") / "environment")
 
 
 WHY = (

@@ -15,7 +15,14 @@ from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, rules, validate
 from osimlite.lint.baseline import subtract_baseline, write_baseline
 from osimlite.lint.pages import format_index, format_rule_page
-from osimlite.lint.registry import FAMILIES, RULE_MODULES, Rule, all_rules, rule_groups
+from osimlite.lint.registry import (
+    DOCUMENT_MODULES,
+    FAMILIES,
+    RULE_MODULES,
+    Rule,
+    all_rules,
+    rule_groups,
+)
 from osimlite.schema.model import CURRENT_VERSION
 from tests.cases import of_each
 
@@ -72,6 +79,13 @@ def test_a_module_that_only_some_subjects_load_is_about_these(rule):
     module = rule.check.__module__.rpartition(".")[2]
     (subject,) = (about for about, modules in RULE_MODULES.items() if module in modules)
     assert subject == (rule.about if rule.about in RULE_MODULES else "model")
+
+
+@of_each(all_rules(), lambda rule: rule.code)
+def test_rules_that_apply_to_every_document_are_in_shared_modules(rule):
+    module = rule.check.__module__.rpartition(".")[2]
+    if rule.about == "model" and (rule.code[4] in "012" or rule.name == "included-file"):
+        assert module in DOCUMENT_MODULES
 
 
 def test_the_table_of_rule_modules_names_every_module():

@@ -20,6 +20,7 @@ from osimlite.io.document.survey import survey_source
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.lint import Finding, validate
 from osimlite.lint.subject import Subject
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.actuators import (
     ActivationCoordinateActuator,
     CoordinateActuator,
@@ -438,6 +439,14 @@ TOOL_SETUP = """<OpenSimDocument Version="40600">
     </{tool}>
 </OpenSimDocument>
 """
+
+
+def build_printed(model: Any, folder: Path) -> Mechanism:
+    """Return our mechanism of a model of OpenSim's, by way of a file."""
+    model.finalizeConnections()
+    path = folder / "model.osim"
+    model.printToXML(str(path))
+    return build_mechanism(osimlite.read(path))
 
 
 def real(corpus: Any, name: str) -> Path:

@@ -14,7 +14,17 @@ import osimlite
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody.mechanism import MassProperties
 from tests.oracle.opensim_runs import put
-from tests.oracle.support import CASES, Bodies, Change, _chain, _coupler, _linear, _vec, opensim
+from tests.oracle.support import (
+    CASES,
+    Bodies,
+    Change,
+    _chain,
+    _coupler,
+    _linear,
+    _vec,
+    build_printed,
+    opensim,
+)
 
 pytestmark = pytest.mark.oracle
 
@@ -66,7 +76,7 @@ def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) 
     """OpenSim binds the first independent one, and leaves the dependent one free."""
     model, bodies = _chain(np.random.default_rng(15))
     _coupler(("pin_0",), "free_3", opensim.Constant(0.25))(model, bodies)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     pin, free = (mechanism.coordinate_index(name) for name in ("pin_0", "free_3"))
     values = mechanism.values({})
@@ -76,13 +86,6 @@ def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) 
     assert state.getQErr().to_numpy() == pytest.approx([0.25 - values[pin]])
     (ours,) = (item.position_errors(mechanism.at(values)) for item in mechanism.constraints)
     assert ours == pytest.approx([0.25 - values[free]])
-
-
-def _built(model: Any, folder: Path) -> Mechanism:
-    model.finalizeConnections()
-    path = folder / "model.osim"
-    model.printToXML(str(path))
-    return build_mechanism(osimlite.read(path))
 
 
 def _no_further_than(mechanism: Mechanism, ours: Any, theirs: Any) -> None:
@@ -143,7 +146,7 @@ def test_constrained_motion(case: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
     model, bodies = _chain(rng)
     CASES[case](model, bodies)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     _no_further_than(mechanism, mechanism.default_state()[0], _numbers("", state, coordinates))
     for _ in range(3):
@@ -161,7 +164,7 @@ def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
     model, bodies = _chain(rng)
     _loop(kind, count)(model, bodies)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     assert mechanism.total_mass == pytest.approx(model.getTotalMass(state), rel=1e-14)
     # OpenSim gives the half that it adds the unit inertia about the body's origin for an inertia.
@@ -184,7 +187,7 @@ def test_a_weld_that_closes_a_loop_is_a_constraint(tmp_path: Path) -> None:
     for change in (_loop("WeldJoint", 0), _weld_like_loop):
         model, bodies = _chain(np.random.default_rng(13))
         change(model, bodies)
-        built.append(_built(model, tmp_path))
+        built.append(build_printed(model, tmp_path))
     by_joint, by_constraint = built
     assert by_joint.total_mass == by_constraint.total_mass
     q, _ = by_joint.default_state()
@@ -197,7 +200,7 @@ def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
     rng = np.random.default_rng(14)
     model, bodies = _chain(rng)
     _rolling(model, bodies)
-    plain = _built(model, tmp_path)
+    plain = build_printed(model, tmp_path)
     mechanism = build_mechanism(osimlite.read(tmp_path / "model.osim"), rolling=True)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     roll = model.getConstraintSet().get("roll")
@@ -217,7 +220,7 @@ def test_a_motion_starts_at_opensims_pose(accuracy: float, off: float, tmp_path:
     _coupler(("ball_0",), "pin_0", _linear((1.0, 0.0)))(model, bodies)
     model.set_assembly_accuracy(accuracy)
     model.updJointSet().get("pin").upd_coordinates(0).set_default_value(0.2 + off)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     manager = opensim.Manager(model)
     manager.initialize(state)

@@ -15,6 +15,7 @@ from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.joints import ConstantCurvatureJoint
+from tests.oracle.support import build_printed
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -65,13 +66,6 @@ def _model() -> Any:
     return model
 
 
-def _built(model: Any, folder: Path) -> Mechanism:
-    model.finalizeConnections()
-    path = folder / "model.osim"
-    model.printToXML(str(path))
-    return build_mechanism(osimlite.read(path))
-
-
 def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:
     model.realizeAcceleration(state)
     coordinates = [
@@ -116,7 +110,7 @@ def test_an_ellipsoid_may_be_mirrored(
             joint.set_scapula_winging_axis_origin(index, value)
         joint.set_scapula_winging_axis_direction(0.4)
     model.addJoint(joint)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     state = model.initSystem()
     for index in range(len(mechanism.coordinates)):
         coordinate = model.getCoordinateSet().get(index)
@@ -134,7 +128,7 @@ def test_a_chain_of_two_bodies(kind: str, turned_round: bool, tmp_path: Path) ->
     for name, ends in (("j1", (model.getGround(), inner)), ("j2", (inner, outer))):
         parent, child = reversed(ends) if turned_round else ends
         _join(model, kind, name, parent, child, rng)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     assert [body.mobilizer.reversed for body in mechanism.bodies] == [turned_round] * 2
     state = model.initSystem()
     for _ in range(3):
@@ -158,7 +152,7 @@ def test_locked_coordinates_of_a_ball_joint(places: tuple[int, ...], tmp_path: P
         coordinate.set_locked(index in places)
         coordinate.set_default_value(0.3 + 0.2 * index)
         coordinate.set_default_speed_value(1.0 - 0.3 * index)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     state = model.initSystem()
     q, u = mechanism.default_state()
     assert q == pytest.approx([item.getValue(state) for item in coordinates], abs=1e-15)
@@ -175,7 +169,7 @@ def test_a_ball_speeds_up_where_its_angles_have_no_rates(lock: bool, tmp_path: P
     _join(model, "PinJoint", "j2", inner, outer, rng)
     model.finalizeConnections()
     model.getCoordinateSet().get(3).set_locked(lock)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     state = model.initSystem()
     for index, value in enumerate((0.3, np.pi / 2, 0.2)):
         coordinate = model.getCoordinateSet().get(index)
@@ -206,7 +200,7 @@ def test_awkward_mass_properties(changed: dict[str, Any], kind: str, tmp_path: P
     inner, outer = _body(model, "inner", rng), _body(model, "outer", rng, **changed)
     _join(model, "BallJoint", "j1", model.getGround(), inner, rng)
     _join(model, kind, "j2", inner, outer, rng)
-    mechanism = _built(model, tmp_path)
+    mechanism = build_printed(model, tmp_path)
     state = model.initSystem()
     for index in range(len(mechanism.coordinates)):
         model.getCoordinateSet().get(index).setSpeedValue(state, rng.uniform(-2.0, 2.0))

@@ -17,10 +17,11 @@ from osimlite.simulation import Simulation
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 from benchmarks._opensim_walks import Order, opensim_walks
 from osimlite.studies.gait.steps import walk_many
+from tests.suite import choose
 
 pytestmark = [pytest.mark.oracle, pytest.mark.timeout(900)]
 
-MINUTE = 60.0 if "OSIMLITE_ALL_MODELS" in os.environ else 12.0
+MINUTE = 60.0 if "OSIMLITE_ALL_MODELS" in os.environ else choose(4.0, 12.0)
 """How long they walk; OpenSim takes half a minute for a whole one, which is asked with OSIMLITE_ALL_MODELS=1."""
 LONG = {"steady-walker": MINUTE, "human-walker": MINUTE, "furthest-walker": 5.0}
 ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}
@@ -75,4 +76,6 @@ def test_ours_is_the_same_walk(walks, name):
         assert result == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), (
             field
         )
-    assert theirs.distance == pytest.approx(ours.distance, rel=5e-6, abs=1e-5)
+    # In the middle of a step, where they end, the error of the integration is not yet in its strikes.
+    allowed = max(1e-5, 30.0 * ACCURACY[name])
+    assert theirs.distance == pytest.approx(ours.distance, rel=5e-6, abs=allowed)

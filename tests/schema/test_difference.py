@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 import copy
-from pathlib import Path
-
-import pytest
 
 import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.difference import Difference, find_differences
 from osimlite.schema.model import Model
-
-
-@pytest.fixture
-def walker(fixtures: Path) -> Model:
-    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
 
 
 def test_a_model_does_not_differ_from_its_copies(walker: Model) -> None:

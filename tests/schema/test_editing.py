@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from pathlib import Path
 
 import pytest
 
@@ -15,11 +14,6 @@ from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import Joint, PinJoint
 from osimlite.schema.model import Model
-
-
-@pytest.fixture
-def walker(fixtures: Path) -> Model:
-    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
 
 
 def targets(model: Model) -> list[str]:

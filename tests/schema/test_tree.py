@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-import osimlite
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.contact import ContactSphere
 from osimlite.schema.coordinates import Coordinate
@@ -19,11 +16,6 @@ from osimlite.schema.model import Model
 from osimlite.schema.resolution import normalize_path
 from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import Use
-
-
-@pytest.fixture
-def walker(fixtures: Path) -> Model:
-    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
 
 
 def failure(model: Model, owner: str, tag: str, text: str) -> str | None:

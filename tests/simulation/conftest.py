@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-import osimlite
 from osimlite.schema.model import Model
+from tests.simple_models import read_walker
 
 Table = dict[str, "np.ndarray[Any, Any]"]
 
 
 @pytest.fixture(scope="session")
-def walker(fixtures: Path) -> Model:
-    """The dynamic walker as OpenSim wrote it."""
-    return osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+def walker() -> Model:
+    """The dynamic walker as OpenSim wrote it, which no test of this folder changes."""
+    return read_walker()
 
 
 @pytest.fixture(scope="session")

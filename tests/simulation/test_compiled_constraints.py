@@ -29,6 +29,7 @@ from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.system import System
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.support import MODELS, four_bars, knee, patella, pins
+from tests.suite import choose
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:
@@ -36,7 +37,7 @@ def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:
 
 
 # ------------------------------------------------------------------------------------ random trees and constraints
-@settings(max_examples=60)
+@settings(max_examples=choose(30, 60))
 @given(
     cases(max_bodies=4),
     st.sampled_from([*KINDS, "none"]),
@@ -357,7 +358,7 @@ def test_a_function_that_is_unknown_is_refused_by_name():
 
 
 # ------------------------------------------------------------------------------------------- linear equations
-@settings(max_examples=60)
+@settings(max_examples=choose(30, 60))
 @given(st.integers(1, 7), st.integers(1, 7), st.integers(0, 5), st.integers(0, 2**32 - 1))
 def test_equations_that_repeat_or_contradict_each_other(
     count: int, size: int, rank: int, seed: int

@@ -29,6 +29,7 @@ pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.simulation.engines.bullet.engine import BulletEngine
 from tests.simulation.support import MODELS, constrain, four_bars, half_locked, knee, patella, pins
+from tests.suite import choose
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0, route: str = "auto") -> Any:
@@ -37,7 +38,7 @@ def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0, route: s
 
 
 # ------------------------------------------------------------------------------------ random trees and constraints
-@settings(max_examples=60)
+@settings(max_examples=choose(30, 60))
 @given(
     cases(max_bodies=4),
     st.sampled_from([*KINDS, "none"]),

@@ -9,23 +9,21 @@ import pytest
 
 from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.schema.frames import Body
 from osimlite.schema.functions import Constant, FunctionSet
 from osimlite.schema.joints import FreeJoint
-from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalForce, PrescribedForce
 from osimlite.simulation import simulate, write_sto
 from osimlite.simulation.elements.external_loads import read_external_loads
+from tests.simple_models import make_single_body
 
 LABELS = ["grf_vx", "grf_vy", "grf_vz", "grf_px", "grf_py", "grf_pz", "grf_mx", "grf_my", "grf_mz"]
 
 
 @pytest.fixture
 def model():
-    model = Model(name="block")
-    body = model.add(Body(name="block", mass=2.0, inertia=(0.2, 0.3, 0.4, 0, 0, 0)))
-    model.add(FreeJoint(name="free").between(model.ground, body))
-    return model
+    return make_single_body(
+        FreeJoint(name="free"), body="block", mass=2.0, inertia=(0.2, 0.3, 0.4, 0.0, 0.0, 0.0)
+    )
 
 
 def document(folder: Path, body: str, datafile: str = "grf.mot", version: int = 40600) -> Path:

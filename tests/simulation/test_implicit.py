@@ -150,10 +150,14 @@ def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
     These equations have no J, so that Rosenbrock's method has the order that it has whatever J is.
     """
     power = order if method == "rosenbrock" else order + 1
+    # Rosenbrock's method takes 30 times as many steps at 1e-8 as at 1e-5.
+    accuracies = (1e-5, 1e-8) if order > 2 else (1e-5, 1e-7)
     loose, tight = (
-        steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in (1e-5, 1e-8)
+        steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in accuracies
     )
-    assert tight / loose == pytest.approx(1e3 ** (1.0 / power), rel=0.25)
+    assert tight / loose == pytest.approx(
+        (accuracies[0] / accuracies[1]) ** (1.0 / power), rel=0.25
+    )
 
 
 def test_rosenbrock_has_order_3():

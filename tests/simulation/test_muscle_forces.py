@@ -10,6 +10,7 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, OsimliteError, SettingError, UnsupportedError
 from osimlite.io.tables.storage import read_sto
+from tests.simple_models import make_slide
 
 TIMES = np.linspace(0.0, 1.0, 51)
 UP = 0.5 * TIMES**2
@@ -18,23 +19,14 @@ NEEDED = 2.0 * (1.0 + 9.80665)
 
 def lift(*strengths: float) -> osimlite.Model:
     """A body of 2 kg that moves upwards, with actuators of these strengths."""
-    model = osimlite.Model(name="lift")
-    body = model.add(osimlite.Body(name="body", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    joint = osimlite.SliderJoint(
-        name="j",
-        socket_parent_frame=model.ground,
-        socket_child_frame=body,
-        coordinates=[osimlite.Coordinate(name="y")],
-    )
     # The slider runs along x.
-    joint.socket_parent_frame = osimlite.PhysicalOffsetFrame(
-        name="up", socket_parent=model.ground, orientation=(0.0, 0.0, 0.5 * np.pi)
+    return make_slide(
+        *(actuator(f"a{number}", strength) for number, strength in enumerate(strengths)),
+        coordinate="y",
+        name="lift",
+        mass=2.0,
+        turned=(0.0, 0.0, 0.5 * np.pi),
     )
-    joint.frames.append(joint.socket_parent_frame)
-    model.add(joint)
-    for number, strength in enumerate(strengths):
-        model.add(actuator(f"a{number}", strength))
-    return model
 
 
 def bounded(low: float, high: float) -> osimlite.Model:

@@ -32,15 +32,16 @@ from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.simulation import Interrupted, Simulation, read_sto
 from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.options import compute_report_times
+from tests.simple_models import make_single_body
 
 
 @pytest.fixture
 def pendulum():
-    model = Model(name="pendulum")
-    bob = model.add(Body(name="bob", mass=2.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)))
     joint = PinJoint(name="hinge", coordinates=[Coordinate(name="swing", default_value=0.4)])
-    model.add(joint.between(model.ground, bob, child_at=(0.0, 1.0, 0.0)))
-    return model
+    inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+    return make_single_body(
+        joint, name="pendulum", body="bob", mass=2.0, inertia=inertia, child_at=(0.0, 1.0, 0.0)
+    )
 
 
 # ---------------------------------------------------------------------------------------------- the start

@@ -15,6 +15,7 @@ from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.states import StateLayout, StateVariable
 from tests.oracle.random_models import RandomModel
 from tests.simulation.damped import damped
+from tests.suite import choose
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
 
@@ -33,7 +34,7 @@ def simulations():
 
 
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=choose(25, 50), deadline=None)
 @given(y=numbers)
 def test_a_state_of_another_length_is_refused(simulations, engine, y):
     made = simulations[engine].engine

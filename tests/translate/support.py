@@ -6,11 +6,11 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
-from osimlite.schema.frames import Body
 from osimlite.schema.joints import WeldJoint
 from osimlite.schema.model import Model
 from osimlite.translate.export import Urdf
 from osimlite.translate.survey import CONTAINERS
+from tests.simple_models import make_single_body
 
 
 def kinds(urdf: Urdf) -> dict[str, list[str]]:
@@ -30,11 +30,9 @@ def unaccounted(model: Model, urdf: Urdf) -> list[str]:
 
 def one_body(*shapes, joint=None, **body) -> Model:
     """A model of one body with these shapes, on a weld unless a joint is given."""
-    model = Model(name="one")
-    block = model.add(Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), **body))
-    block.attach(*shapes)
     joint = joint or WeldJoint(name="weld")
-    model.add(joint.between(model.ground, block, at=(0.0, 1.0, 0.0)))
+    model = make_single_body(joint, name="one", body="block", mass=2.0, at=(0.0, 1.0, 0.0), **body)
+    model["/bodyset/block"].attach(*shapes)
     return model
 
 

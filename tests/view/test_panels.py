@@ -9,11 +9,13 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.tools.evidence import Steps
+from osimlite.view import panels
 from osimlite.view.panels import (
     MAX_PANELS,
     Column,
     draw_pages,
     group_columns,
+    render_png,
     split_sides,
     write_pages,
 )
@@ -145,6 +147,31 @@ def test_a_curve_that_lies_on_another_is_dashed():
     columns = [Column("knee_r", "deg", wave()), Column("knee_l", "deg", wave() + 1e-6)]
     (figure,) = drawn(panels_of(columns)[0])
     assert [line.is_dashed() for line in figure.axes[0].get_lines()] == [False, True]
+
+
+@pytest.mark.parametrize("shift", [0.0, 3.0, -1e3])
+def test_titles_are_where_matplotlib_puts_them(monkeypatch, shift):
+    columns = [
+        Column(f"c{power}", "m", 10.0**power * (wave() + shift)) for power in range(-8, 9, 2)
+    ]
+    found, _ = panels_of(columns)
+    quick = [render_png(figure) for figure in draw_pages("Title", found)]
+    monkeypatch.setattr(panels, "find_title_height", lambda _: None)
+    assert quick == [render_png(figure) for figure in draw_pages("Title", found)]
+
+
+def test_a_picture_is_drawn_once(monkeypatch):
+    (figure,) = draw_pages("Title", panels_of([Column("c", "m", wave())])[0])
+    count = 0
+
+    def draw(renderer):
+        nonlocal count
+        count += 1
+        return type(figure).draw(figure, renderer)
+
+    monkeypatch.setattr(figure, "draw", draw)
+    render_png(figure)
+    assert count == 1
 
 
 def table(name, columns, **options):

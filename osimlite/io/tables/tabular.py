@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from html import escape
 from itertools import islice
 from typing import Any
 
@@ -64,6 +63,9 @@ class Tabular(ABC):
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
+        # Only notebooks need it.
+        from html import escape
+
         columns = self._listed
         head = "".join(f"<th>{word}</th>" for word in ("", "smallest", "largest", "unit"))
         rows = "".join(

@@ -7,11 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
 from osimlite.io.tables.storage import StoTable
 from osimlite.io.tables.table_stream import TableStream, find_word_start
-from osimlite.mechanics.multibody.functions import PiecewiseConstant, SmoothFunction
+from osimlite.mechanics.multibody.functions import (
+    PiecewiseConstant,
+    PiecewiseLinear,
+    SmoothFunction,
+)
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
+
+
+@dataclass(frozen=True)
+class TableColumn(PiecewiseLinear):
+    """Linear interpolation between the rows of a table, which is undefined outside of the table."""
+
+    source: str = ""  # path of the component that has the table
 
 
 def read_controls(path: str | Path) -> StoTable:

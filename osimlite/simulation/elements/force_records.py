@@ -113,6 +113,13 @@ class ForceElement(Protocol):
             One number for each of `columns`, SI units.
         """
 
+    def find_copied_places(self) -> Sequence[int] | None:
+        """Return the places in its last record that :meth:`report` copies, so that tables copy whole columns.
+
+        Returns:
+            One place for each of `columns`; None if `report` computes numbers.
+        """
+
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
         """Return the potential energy of the force.
 
@@ -134,6 +141,10 @@ class Silent:
     ) -> list[float]:
         """Return an empty row, since there are no columns."""
         return []
+
+    def find_copied_places(self) -> Sequence[int] | None:
+        """Return no places, since there are no columns."""
+        return ()
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
         """Return 0 J, since nothing is stored."""

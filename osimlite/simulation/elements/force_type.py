@@ -382,6 +382,13 @@ class DeclaredForce:
             for output in force_type.labels.values()
         ]
 
+    def find_copied_places(self) -> Sequence[int] | None:
+        """Return the places in its last record that are columns; None if its geometry computes them."""
+        force_type = self.force_type
+        if force_type.labels is None:
+            return None
+        return [force_type.record_offsets[output] for output in force_type.labels.values()]
+
     def named_values(self, record: Sequence[float]) -> dict[str, float]:
         """Return its scalar parameters and the values of its record, by name.
 

@@ -5,24 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import find_named_file
-from osimlite.mechanics.multibody.functions import PiecewiseLinear, ScaledFunction, SmoothFunction
+from osimlite.mechanics.multibody.functions import ScaledFunction, SmoothFunction
 from osimlite.schema.controller_types import SynergyController
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.builder import ElementBuilder
-from osimlite.simulation.elements.control_tables import read_controls
+from osimlite.simulation.elements.control_tables import TableColumn, read_controls
 from osimlite.simulation.elements.controls import Drive, find_actuators
 from osimlite.simulation.elements.registry import register_controller
-
-
-@dataclass(frozen=True)
-class TableColumn(PiecewiseLinear):
-    """Linear interpolation between the rows of a table, which is undefined outside of the table."""
-
-    source: str = ""  # path of the component that has the table
 
 
 def read_signal(builder: ElementBuilder, controller: Any, text: str) -> SmoothFunction | None:

@@ -13,7 +13,7 @@ import logging
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -32,12 +32,10 @@ from osimlite.mechanics.codegen.toolchain import (
     library_suffix,
 )
 from osimlite.simulation.elements.laws import find_law, get_symbol
+from osimlite.simulation.engines.kept_results import cache_folders
 from osimlite.simulation.engines.private_files import read_private, write_private
 
 _log = logging.getLogger(__name__)
-
-CACHE_VARIABLE = "NUMBA_CACHE_DIR"
-"""Environment variable that names the only folder for compiled files; numba uses it for its own files."""
 
 _libraries: list[ctypes.CDLL] = []
 """Loaded libraries; their machine code is valid as long as these objects exist."""
@@ -202,20 +200,3 @@ def _digest_translator() -> str:
 def _describe_machine() -> tuple[str, ...]:
     """Return what machine code depends on: operating system, architecture, processor features."""
     return sys.platform, machine_name(), *sorted(processor_features())
-
-
-def cache_folders() -> Iterator[Path]:
-    """Yield the folders for compiled files, the preferred one first."""
-    if os.environ.get(CACHE_VARIABLE):
-        yield Path(os.environ[CACHE_VARIABLE])
-        return
-    yield Path(__file__).parents[2] / "mechanics" / "kernels" / "__pycache__"
-    home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    # A relative path would depend on the current folder.
-    if not home or not os.path.isabs(home):
-        try:
-            home = Path.home() / ".cache"
-        except RuntimeError:
-            # Some containers have no home folder for the user.
-            return
-    yield Path(home) / "osimlite"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import os
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from osimlite.mechanics.codegen.processor import processor_features, supports_v3
 from osimlite.mechanics.codegen.sources import compute_digest
 from osimlite.mechanics.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, library_suffix
 from osimlite.simulation.elements.laws import find_law, get_symbol
+from osimlite.simulation.engines.kept_results import KeptResults
 
 PACKAGE = Path(__file__).parents[2]
 """Folder of the package."""
@@ -68,20 +70,50 @@ class KernelLibrary:
     def changed_files(self) -> list[str]:
         """Names of the source files that have changed since the library was compiled."""
         times = self.table.get("times", {})
-        changed = []
-        for name, (size, checksum) in self.table["sources"].items():
-            path = PACKAGE / name
-            try:
-                info = path.stat()
-                # An installed wheel has no times of its sources: there the size must suffice.
-                if info.st_size == size and info.st_mtime_ns == times.get(name, info.st_mtime_ns):
-                    continue
-                if info.st_size == size and crc32(path.read_bytes()) == checksum:
-                    continue
-            except OSError:
-                pass
-            changed.append(name)
+        # An installed wheel has no times of its sources: there the size must suffice.
+        doubtful = [
+            name
+            for name, (size, _) in self.table["sources"].items()
+            if (state := self._states[name])[0] != size or state[1] != times.get(name, state[1])
+        ]
+        if not doubtful:
+            return []
+        changed: list[str] | None = self.kept.get("changed files")
+        if changed is None:
+            changed = [name for name in doubtful if self.has_changed(name)]
+            self.kept.keep("changed files", changed)
         return changed
+
+    @cached_property
+    def _states(self) -> dict[str, tuple[int, int]]:
+        """Size (bytes) and time of change (ns) of each source file; -1 for a missing file."""
+        states = {}
+        for name in self.table["sources"]:
+            try:
+                info = os.stat(PACKAGE / name)
+                states[name] = info.st_size, info.st_mtime_ns
+            except OSError:
+                states[name] = -1, -1
+        return states
+
+    @cached_property
+    def kept(self) -> KeptResults:
+        """Results on the present state of the sources.
+
+        Without them, every process after an edit, or after `git pull`, computes the digests of the
+        laws of its model, which takes up to a quarter of a second.
+        """
+        library = os.stat(self.path)
+        key = self._states, library.st_size, library.st_mtime_ns
+        return KeptResults(f"{PACKAGE} {self.path}", repr(key))
+
+    def has_changed(self, name: str) -> bool:
+        """Return whether the content of a source file differs from that in the library."""
+        try:
+            content = (PACKAGE / name).read_bytes()
+        except OSError:
+            return True
+        return [len(content), crc32(content)] != self.table["sources"][name]
 
     def _is_current(self, name: str, digest: str) -> bool:
         """Return whether the sources of a law are those from which the library was compiled."""
@@ -90,7 +122,11 @@ class KernelLibrary:
         if any(file.startswith("mechanics/codegen/") for file in self.changed_files):
             # With another translator the same law gives other code.
             return False
-        return compute_digest(find_law(name)[0]) == digest
+        present: str | None = self.kept.get(name)
+        if present is None:
+            present = compute_digest(find_law(name)[0])
+            self.kept.keep(name, present)
+        return present == digest
 
 
 @cache

@@ -11,9 +11,11 @@ import osimlite
 from osimlite.io.document.data import from_data, to_json
 from osimlite.schema.model import Model
 from tests.io.document.strategies import models
+from tests.suite import choose
 
 slow = settings(
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], max_examples=150
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    max_examples=choose(60, 150),
 )
 
 

@@ -19,6 +19,7 @@ from osimlite.lint.settings import load_settings
 from osimlite.schema.base import Unknown
 from osimlite.schema.registry import MODULES, find_class, get_plugin_classes
 from osimlite.schema.specs import get_field_specs
+from tests.suite import choose
 
 REPO = Path(__file__).resolve().parents[3]
 CLASSES = re.findall(
@@ -270,7 +271,7 @@ def test_an_output_of_a_plugin_is_one(folder):
 
 def test_a_class_may_derive_from_any(folder):
     """Of every class another is derived; an object of it, wrong in two ways, is checked by all rules."""
-    names = sorted(set(MODULES) - {"Model", "Object", "Unknown"})
+    names = sorted(set(MODULES) - {"Model", "Object", "Unknown"})[:: choose(4, 1)]
     more = {
         "properties": [
             {"name": "gain", "type": "double"},

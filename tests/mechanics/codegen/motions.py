@@ -2,7 +2,7 @@
 
 Run as a program: the path of a shared library with all kernels, the number of motions, and the
 number of models whose derivatives are computed; with `-` for the path, the kernels that osimlite
-takes anyway.
+takes anyway. Models of the shared folder come on top, half as many, where it is there.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import ctypes
 import hashlib
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from osimlite.models.walkers import furthest_walker
 from osimlite.simulation.batches import run_many
 from osimlite.simulation.engines import machine_code
 from osimlite.simulation.run import Simulation
+from tests.simulation.force_cases import FORCES, with_force
 
 ROOT = Path(__file__).parents[3]
 DURATION = 0.1
@@ -29,8 +31,20 @@ DURATION = 0.1
 
 
 def list_models() -> dict[str, Any]:
-    """Return functions that make models, by name: built-in ones, fixtures, and those of the shared folder."""
-    files = [ROOT / "fixtures/kinematics/mixed_joint_tree.osim"]
+    """Return functions that make models, by name, which are there in every clone.
+
+    Built-in models come first, then one joint of each kind, then every force on a chain of bodies.
+    """
+    made: dict[str, Any] = {"walker": furthest_walker, "jumper": jumper}
+    joints = ROOT / "fixtures/kinematics/mixed_joint_tree.osim"
+    made["joints"] = lambda: osimlite.read(joints)
+    for name, make in FORCES.items():
+        made[name] = partial(with_force, make)
+    return made
+
+
+def list_shared_models() -> dict[str, Any]:
+    """Return functions that make the models of the shared folder, by name; none without that folder."""
     shared = next(
         (
             folder
@@ -39,10 +53,8 @@ def list_models() -> dict[str, Any]:
         ),
         None,
     )
-    if shared is not None:
-        files += sorted(shared.glob("corpus/models/*/*.osim"))
-    made = {"walker": furthest_walker, "jumper": jumper}
-    return made | {
+    files = sorted(shared.glob("corpus/models/*/*.osim")) if shared is not None else []
+    return {
         file.parent.name + "/" + file.stem: lambda file=file: osimlite.read(file) for file in files
     }
 
@@ -86,15 +98,19 @@ def differentiate(model: Any) -> str:
 
 
 def collect(action: Any, count: int) -> dict[str, str]:
-    """Return the digests of so many models; those that cannot be computed are left out."""
+    """Return the digests of so many models and of half as many of the shared folder.
+
+    Models that cannot be computed are left out.
+    """
     found: dict[str, str] = {}
-    for name, make in list_models().items():
-        if len(found) == count:
-            break
-        try:
-            found[name] = action(make())
-        except osimlite.OsimliteError:
-            continue
+    for models, limit in ((list_models(), count), (list_shared_models(), count + count // 2)):
+        for name, make in models.items():
+            if len(found) >= limit:
+                break
+            try:
+                found[name] = action(make())
+            except osimlite.OsimliteError:
+                continue
     return found
 
 

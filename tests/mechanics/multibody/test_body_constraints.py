@@ -11,9 +11,10 @@ from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.body_constraints import find_carrier
 from osimlite.mechanics.multibody.linear import solve_with_null_space
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
+from tests.suite import choose
 
 
-@settings(max_examples=50)
+@settings(max_examples=choose(25, 50))
 @given(cases(), st.sampled_from(KINDS), st.integers(0, 2**32 - 1))
 def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     """Along any motion: the errors change at G u - b, and what binds speeds changes at G udot - b.
@@ -57,7 +58,7 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     assert rows @ udot - wanted == pytest.approx(drifts, abs=1e-6 * scale)
 
 
-@settings(max_examples=50)
+@settings(max_examples=choose(25, 50))
 @given(
     cases(),
     st.sampled_from(["point", "distance", "line", "coupler", "prescribed"]),

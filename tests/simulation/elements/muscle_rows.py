@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from osimlite import Body, Model, SliderJoint
+from osimlite import Model
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.functions import PiecewiseLinearFunction
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.schema.registry import find_class
+from tests.simple_models import make_slide
 
 FOLDER = Path(__file__).resolve().parents[3] / "fixtures" / "muscles"
 CONFIGURATIONS: dict[str, Any] = json.loads((FOLDER / "configurations.json").read_text())
@@ -53,12 +54,7 @@ def line() -> GeometryPath:
 
 def hung(force: Any, excitations: Sequence[float] = (0.0,), gravity: float = 0.0) -> Model:
     """The model with a muscle, excited so much at the time 0, 1, 2 ..."""
-    model = Model(name="one", gravity=(gravity, 0, 0))
-    block = model.add(Body(name="block", mass=MASS, inertia=(1, 1, 1, 0, 0, 0)))
-    slide = SliderJoint(name="slide")
-    slide.coordinates[0].name = "x"
-    model.add(slide.between(model.ground, block))
-    model.add(force)
+    model = make_slide(force, name="one", body="block", mass=MASS, gravity=(gravity, 0.0, 0.0))
     brain = PrescribedController(name="brain", socket_actuators=(f"/forceset/{force.name}",))
     times = tuple(map(float, range(len(excitations) + 1)))
     brain.ControlFunctions.objects.append(PiecewiseLinearFunction(x=times, y=(*excitations, 0.0)))

@@ -18,26 +18,23 @@ from osimlite.simulation.elements.force_types.coordinate_forces import (
     compute_exponential_limit,
     compute_linear_stop,
 )
+from tests.simple_models import make_slide
 
 
 def slide(force) -> osimlite.Model:
     """A body of 2 kg on a slide without gravity."""
-    model = osimlite.Model(name="slide", gravity=(0, 0, 0))
-    body = model.add(osimlite.Body(name="b", mass=2.0, inertia=(1, 1, 1, 0, 0, 0)))
-    joint = osimlite.SliderJoint(name="j", coordinates=[osimlite.Coordinate(name="x")])
-    model.add(joint.between(model.ground, body), force)
-    return model
+    return make_slide(force, mass=2.0, gravity=(0.0, 0.0, 0.0))
 
 
 def linear(**more) -> CoordinateLinearStopForce:
     given = {"stiffness": 100.0, "damping": 0.5, "upper_limit": 0.1, "lower_limit": -0.2, **more}
-    return CoordinateLinearStopForce(name="stop", socket_coordinate="/jointset/j/x", **given)
+    return CoordinateLinearStopForce(name="stop", socket_coordinate="/jointset/slide/x", **given)
 
 
 def exponential(lower=(50.0, 75.0)) -> ExponentialCoordinateLimitForce:
     return ExponentialCoordinateLimitForce(
         name="stop",
-        socket_coordinate="/jointset/j/x",
+        socket_coordinate="/jointset/slide/x",
         lower_limit=-0.2,
         upper_limit=0.3,
         lower_shape_parameters=lower,

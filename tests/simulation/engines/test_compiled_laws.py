@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
-from osimlite.simulation.engines import compiled_laws
+from osimlite.simulation.engines import compiled_laws, kept_results
 from osimlite.simulation.engines.compiled_laws import compile_function, load_function
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler is installed")
@@ -106,25 +106,25 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
 
 def test_folders(monkeypatch, tmp_path):
     """The one that is named, or the package's own and then the user's."""
-    monkeypatch.setenv(compiled_laws.CACHE_VARIABLE, str(tmp_path / "named"))
-    assert list(compiled_laws.cache_folders()) == [tmp_path / "named"]
-    monkeypatch.delenv(compiled_laws.CACHE_VARIABLE)
+    monkeypatch.setenv(kept_results.CACHE_VARIABLE, str(tmp_path / "named"))
+    assert list(kept_results.cache_folders()) == [tmp_path / "named"]
+    monkeypatch.delenv(kept_results.CACHE_VARIABLE)
     monkeypatch.delenv("LOCALAPPDATA", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    first, last = compiled_laws.cache_folders()
+    first, last = kept_results.cache_folders()
     assert (first.parent.name, last) == ("kernels", tmp_path / "home" / "osimlite")
 
 
 def test_a_user_without_a_home(monkeypatch):
     """As in a container that runs under a number of no user."""
-    for name in (compiled_laws.CACHE_VARIABLE, "LOCALAPPDATA", "XDG_CACHE_HOME"):
+    for name in (kept_results.CACHE_VARIABLE, "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
 
     def nowhere():
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setattr(compiled_laws.Path, "home", nowhere)
-    (only,) = compiled_laws.cache_folders()
+    (only,) = kept_results.cache_folders()
     assert only.parent.name == "kernels"
 
 
@@ -151,7 +151,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
     kept = {
         **os.environ,
         "OSIMLITE_KERNELS": "compiler",
-        compiled_laws.CACHE_VARIABLE: str(tmp_path),
+        kept_results.CACHE_VARIABLE: str(tmp_path),
     }
     for compiler in ({}, {"CXX": "no-such-compiler"}):
         done = subprocess.run(

@@ -11,6 +11,7 @@ import pytest
 from osimlite.mechanics.codegen.toolchain import NATIVE, library_suffix
 from osimlite.simulation.elements.laws import DIRECTIONS, list_library_laws
 from osimlite.simulation.engines import kernel_library
+from osimlite.simulation.engines.kept_results import CACHE_VARIABLE
 from osimlite.simulation.engines.kernel_library import KernelLibrary, load_library
 
 LIBRARY = load_library()
@@ -40,6 +41,8 @@ def library(tmp_path, monkeypatch):
     """A library beside a copy of the sources that it was made of."""
     package = Path(kernel_library.PACKAGE)
     monkeypatch.setattr(kernel_library, "PACKAGE", tmp_path)
+    # Away from all that other folders could do to the results that are kept.
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "kept"))
     made = KernelLibrary(LIBRARY.path)
     for name in made.table["sources"]:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -47,33 +50,53 @@ def library(tmp_path, monkeypatch):
     return made
 
 
+def edit(library, path):
+    """Append a comment to a file, and return the library as the next process sees it."""
+    path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
+    return KernelLibrary(library.path)
+
+
 @needs_library
 def test_touched_files_count_as_unchanged(library, tmp_path):
     before = library.changed_files
-    del library.changed_files
     os.utime(tmp_path / "mechanics/kernels/dynamics.py", (0, 0))
-    assert library.changed_files == before
+    assert KernelLibrary(library.path).changed_files == before
 
 
 @needs_library
 def test_an_edited_law_is_not_taken_from_the_library(library, tmp_path, monkeypatch):
     if library.changed_files:
         pytest.skip("the sources have changed since the library was compiled: pip install -e .")
-    del library.changed_files
-    path = tmp_path / "mechanics/kernels/dynamics.py"
-    path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
-    assert library.changed_files == ["mechanics/kernels/dynamics.py"]
+    edited = edit(library, tmp_path / "mechanics/kernels/dynamics.py")
+    assert edited.changed_files == ["mechanics/kernels/dynamics.py"]
     # Only a comment: every law is what it was.
-    assert library.get_address("evaluate") is not None
+    assert edited.get_address("evaluate") is not None
     monkeypatch.setattr(kernel_library, "compute_digest", lambda function: "of an edited function")
-    assert library.get_address("evaluate") is None
+    assert KernelLibrary(library.path).get_address("evaluate") is None
 
 
 @needs_library
 def test_another_translator_concerns_all_laws(library, tmp_path):
-    path = tmp_path / "mechanics/codegen/cplusplus/library.py"
-    path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
-    assert library.get_address("evaluate") is None
+    edited = edit(library, tmp_path / "mechanics/codegen/cplusplus/library.py")
+    assert edited.get_address("evaluate") is None
+
+
+@needs_library
+def test_the_next_process_computes_no_digest_again(library, tmp_path, monkeypatch):
+    edited = edit(library, tmp_path / "mechanics/kernels/dynamics.py")
+    address = edited.get_address("evaluate")
+    edited.kept.save()
+
+    def fail(*_):
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr(kernel_library, "compute_digest", fail)
+    monkeypatch.setattr(KernelLibrary, "has_changed", fail)
+    later = KernelLibrary(library.path)
+    assert (later.changed_files, later.get_address("evaluate")) == (edited.changed_files, address)
+    # Another edit makes all of it void.
+    with pytest.raises(AssertionError, match="computed again"):
+        assert edit(library, tmp_path / "mechanics/kernels/dynamics.py").changed_files
 
 
 @pytest.fixture

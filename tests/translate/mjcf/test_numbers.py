@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import osimlite
-from osimlite import Body, Coordinate, CoordinateCouplerConstraint, CustomJoint, Model, PinJoint
+from osimlite import CoordinateCouplerConstraint, CustomJoint, Model
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Object
 from osimlite.schema.functions import SimmSpline
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, Geometry, Sphere
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from tests.simple_models import make_pendulum
 from tests.translate.mjcf.support import HOSTILE, hostile
 
 FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
@@ -78,10 +79,8 @@ def taken(model: Model, **options: Any) -> bool:
 
 
 def with_shape(shape: Geometry) -> Model:
-    model = Model(name="m")
-    body = model.add(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    model.add(PinJoint(name="j", coordinates=[Coordinate(name="q")]).between(model.ground, body))
-    body.attach(shape)
+    model = make_pendulum()
+    model["/bodyset/bob"].attach(shape)
     return model
 
 

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 from osimlite import (
-    Body,
     BushingForce,
     GeometryPath,
     Millard2012EquilibriumMuscle,
     Model,
     PathPoint,
     PointToPointSpring,
-    SliderJoint,
 )
 from osimlite.translate import to_mjcf
+from tests.simple_models import make_slide
 from tests.translate.mjcf.compiled import Compiled
 
 BLOCK = "/bodyset/block"
@@ -26,13 +25,9 @@ BLOCK = "/bodyset/block"
 
 def sled(*forces: Any) -> Model:
     """A block of 2 kg, 0.1 m along its slide from ground."""
-    model = Model(name="sled")
-    block = model.add(Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    slide = model.add(SliderJoint(name="slide").between(model.ground, block))
-    slide.coordinates[0].default_value = 0.1
-    for force in forces:
-        model.add(force)
-    return model
+    return make_slide(
+        *forces, coordinate="slide_coord_0", default_value=0.1, body="block", mass=2.0
+    )
 
 
 def spring(stiffness: float) -> PointToPointSpring:

@@ -180,12 +180,20 @@ def _is_vector(size: int) -> Callable[[str], bool]:
     """Return the predicate for texts that OpenSim reads as a vector of finite numbers."""
 
     def reads(text: str) -> bool:
+        # Nearly all vectors have one space between their numbers, and need no pattern.
+        words = text.split(" ")
+        if len(words) == size and all(map(_is_real, words)):
+            return not any(isinf(float(word)) for word in words)
         result = _vector_pattern(size).fullmatch(text)
         return result is not None and not any(
             number and isinf(float(number)) for number in result.groups()
         )
 
     return reads
+
+
+_is_real = re.compile(_NUMBER).fullmatch
+"""Match of a number without spaces, or None."""
 
 
 @cache

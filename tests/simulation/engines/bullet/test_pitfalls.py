@@ -25,6 +25,7 @@ bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')
 from osimlite.simulation.engines.bullet import world as bullet_world  # noqa: E402
 from osimlite.simulation.engines.bullet.engine import BulletEngine  # noqa: E402
 from osimlite.simulation.engines.bullet.world import World  # noqa: E402
+from tests.simple_models import make_single_body  # noqa: E402
 
 ROUTES = ("mass-matrix", "articulated-body")
 Q = [-0.17453292519943295, 0.1, 0.3, 0.9, 0.4, -0.2, -0.6, -0.3]
@@ -75,14 +76,9 @@ def test_ranges_are_no_limits(walker):
 
 
 def spinning(speed):
-    model = Model(name="wheel", gravity=(0.0, 0.0, 0.0))
-    wheel = model.add(Body(name="wheel", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    model.add(
-        osimlite.PinJoint(
-            name="axle", coordinates=[Coordinate(name="turn", default_speed_value=speed)]
-        ).between(model.ground, wheel)
-    )
-    return model
+    turn = Coordinate(name="turn", default_speed_value=speed)
+    axle = osimlite.PinJoint(name="axle", coordinates=[turn])
+    return make_single_body(axle, body="wheel", gravity=(0.0, 0.0, 0.0))
 
 
 def test_fast_joints_are_not_clipped(monkeypatch):
