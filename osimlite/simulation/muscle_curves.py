@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -13,7 +14,7 @@ from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.records import dataclass, replace
 from osimlite.base.require import require
 from osimlite.base.text import format_count, join_words, suggest_name
-from osimlite.errors import SettingError, SimulationError
+from osimlite.errors import DeprecatedWarning, SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.mechanics.multibody import build_mechanism
@@ -96,6 +97,7 @@ class MuscleCurves(Tabular):
 
     def of(self, indices: Sequence[int]) -> MuscleCurves:
         """Return the same as :meth:`select_muscles`, under its deprecated name."""
+        warnings.warn("use select_muscles", DeprecatedWarning, stacklevel=2)
         return self.select_muscles(indices)
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
+from osimlite.errors import DeprecatedWarning
 from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.io.tables.writers import format_control_set
 from osimlite.mechanics.multibody import build_mechanism
@@ -65,6 +67,7 @@ class MuscleForces(StoTable):
 
     def unsolved(self) -> str:
         """Return the same as :meth:`describe_unsolved`, under its deprecated name."""
+        warnings.warn("use describe_unsolved", DeprecatedWarning, stacklevel=2)
         return self.describe_unsolved()
 
     def write(self, folder: str | Path) -> list[Path]:

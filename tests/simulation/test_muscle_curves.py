@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import SettingError
+from osimlite.errors import DeprecatedWarning, SettingError
 from osimlite.simulation.muscle_curves import MuscleCurves
 from tests.simulation.elements.muscle_rows import hung, muscle
 
@@ -23,6 +23,13 @@ CURVES = MuscleCurves(
 def test_all_combinations_are_poses_the_last_coordinate_first():
     assert CURVES.poses.tolist() == [[a, b] for a in (0.0, 0.5) for b in (0.1, 0.2, 0.3)]
     assert MuscleCurves((), {}, {}).poses.shape == (1, 0)
+
+
+def test_the_deprecated_selection_of_muscles_warns():
+    chosen = CURVES.select_muscles([1])
+    assert chosen.muscles == ("/forceset/c",) and chosen.columns["length"].shape == (6, 1)
+    with pytest.warns(DeprecatedWarning, match="use select_muscles"):
+        assert CURVES.of([1]).muscles == chosen.muscles
 
 
 def test_tables_have_a_row_for_each_muscle_in_each_pose():

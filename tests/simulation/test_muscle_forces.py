@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import ModelError, OsimliteError, SettingError, UnsupportedError
+from osimlite.errors import (
+    DeprecatedWarning,
+    ModelError,
+    OsimliteError,
+    SettingError,
+    UnsupportedError,
+)
 from osimlite.io.tables.storage import read_sto
 from tests.simple_models import make_slide
 
@@ -74,6 +80,8 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     assert not other.solved.any() and np.isnan(other.rows).all()
     assert "no solution at 51 of 51 times, from 0 s on" in (said := other.describe_unsolved())
     assert "the actuators lack 19.61 at y" in said
+    with pytest.warns(DeprecatedWarning, match="use describe_unsolved"):
+        assert other.unsolved() == said
     off = lift(30.0, 10.0)
     off.force_set.objects[1].appliesForce = False
     assert osimlite.static_optimization(off, {"y": UP}, times=TIMES).columns == ("a0",)
