@@ -60,7 +60,11 @@ _import_name = make_lazy_getattr(__name__, _MODULES)
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used; warn if the name is deprecated."""
+    """Import a public name when it is first used; warn if the name is deprecated.
+
+    Returns:
+        The function or class of that name.
+    """
     current = _DEPRECATED.get(name)
     if current is None:
         return _import_name(name)

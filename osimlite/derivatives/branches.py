@@ -286,6 +286,9 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
 
         Returns:
             Merged result and merged writes.
+
+        Raises:
+            NoFormula: the function has too many combinations of branches.
         """
         written = _undo_writes()
         sides = frame.sides

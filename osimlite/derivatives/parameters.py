@@ -161,7 +161,11 @@ def _find_setters(model: Model, name: str) -> list[PropertySetter]:
 
 
 def _read_value(name: str, setters: Sequence[PropertySetter]) -> float:
-    """Return the common value of the numbers that a path stands for."""
+    """Return the common value of the numbers that a path stands for.
+
+    Raises:
+        SettingError: the numbers differ.
+    """
     values = {setter.get_value() for setter in setters}
     if len(values) > 1:
         raise SettingError(f"'{name}' stands for numbers that differ; name them one by one")

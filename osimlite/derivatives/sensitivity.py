@@ -387,6 +387,9 @@ def integrate_sensitivities(
 
         Returns:
             Blocks at the end.
+
+        Raises:
+            SimulationError: a derivative is not finite.
         """
         h = t1 - t0
         y, error = steps.step(t0, t1, y0)

@@ -138,7 +138,11 @@ def replace_kernel(function: Any, twin: Any) -> Iterator[None]:
 
 
 def register_symbolic(function: Any) -> Any:
-    """Register a function that takes symbols as it is, and return it."""
+    """Register a function that takes symbols as it is, and return it.
+
+    Returns:
+        The function itself, so that this can be a decorator.
+    """
     _counterparts[function] = function
     return function
 

@@ -115,6 +115,9 @@ class SymbolicEvaluator:
 
         Args:
             stage: one of `STAGE`.
+
+        Returns:
+            Workspace with the formulas of that stage.
         """
         return self.run(
             lambda model, reals, data, y, f: make_symbolic(evaluate)(
@@ -123,7 +126,11 @@ class SymbolicEvaluator:
         )
 
     def evaluate_probes(self) -> SymbolicWorkspace:
-        """Evaluate the model up to the accelerations, and its probes."""
+        """Evaluate the model up to the accelerations, and its probes.
+
+        Returns:
+            Workspace with the formulas of accelerations and probes.
+        """
         places = list_probe_items(self._packed, self._elements)
 
         def law(
@@ -238,6 +245,9 @@ class SymbolicEvaluator:
         Args:
             law: function of structure, numbers, work vector, state and derivative.
             structure: structure of the model; that of the packed model if None.
+
+        Returns:
+            Workspace with the formulas that the function wrote.
 
         Raises:
             UnsupportedError: a force has no formula.

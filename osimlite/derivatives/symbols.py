@@ -362,7 +362,11 @@ def maximum_of(*values: Any) -> Any:
 
 
 def _reduce_values(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
-    """Reduce numbers by a symbolic operation if one of them is a symbol, else by the numeric one."""
+    """Reduce numbers by a symbolic operation if one of them is a symbol, else by the numeric one.
+
+    Returns:
+        A symbol if one of the values is a symbol, else a number.
+    """
     result, *rest = map(simplify_number, values)
     for value in rest:
         take = symbolic if isinstance(result, SX) or isinstance(value, SX) else numeric

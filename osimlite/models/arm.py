@@ -19,7 +19,11 @@ FOREARM_LENGTH_M = 0.25
 
 
 def arm() -> Model:
-    """Build a forearm with a weight, a muscle that flexes the elbow and one that extends it."""
+    """Build a forearm with a weight, a muscle that flexes the elbow and one that extends it.
+
+    Returns:
+        The model.
+    """
     # OpenSim's default gravity.
     model = Model(name="Arm", gravity=(0.0, -9.80665, 0.0))
     fore = Body(

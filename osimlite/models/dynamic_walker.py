@@ -37,6 +37,9 @@ def dynamic_walker(
         thigh_length: distance from hip to knee (m).
         shank_length: distance from knee to foot (m).
         slope: inclination of the platform towards +x (deg).
+
+    Returns:
+        The model.
     """
     model = Model(name="DynamicWalkerModel", gravity=(0.0, -9.80665, 0.0))
 

@@ -119,6 +119,9 @@ def jumper(driven: bool = True) -> Model:
     Args:
         driven: whether to add the controller that makes it jump; without it the muscles have no
             excitations.
+
+    Returns:
+        The model.
     """
     model = Model(name="Jumper", gravity=(0.0, -9.80665, 0.0))
     model.model_visual_preferences.model_display_hints.show_wrap_geometry = False
@@ -294,7 +297,11 @@ def _add_muscle(
 
 
 def _add_body(model: Model, name: str, mass: float, center: Vec3, inertia: float) -> Body:
-    """Add a body; it moves in the sagittal plane, so that only its inertia about z matters."""
+    """Add a body; it moves in the sagittal plane, so that only its inertia about z matters.
+
+    Returns:
+        The body.
+    """
     body = Body(
         name=name, mass=mass, mass_center=center, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0)
     )

@@ -61,7 +61,11 @@ GUESS_STEP_S = 0.55
 
 
 def human_walks() -> Model:
-    """Build a human model for a predicted walk; its Moco study and guess are written with it."""
+    """Build a human model for a predicted walk; its Moco study and guess are written with it.
+
+    Returns:
+        The model, whose functions are smooth enough for direct collocation.
+    """
     model = human()
     model.name = NAME
     for coordinate in model.components(Coordinate):

@@ -34,6 +34,9 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
             `package.module:function`, or a `.yaml` or `.json` model.
         parameters: arguments of the model function as text; a data file has none.
 
+    Returns:
+        The model.
+
     Raises:
         OsimliteError: the source or a parameter is unknown, or the function does not return a
             Model.
@@ -116,7 +119,11 @@ def describe_model(name: str) -> str:
 
 
 def _find_function(source: str) -> Callable[..., Any]:
-    """Return the function that a source names; an error lists what a source can be."""
+    """Return the function that a source names; an error lists what a source can be.
+
+    Raises:
+        OsimliteError: the source names nothing, or no function.
+    """
     target = BUILT_IN.get(source, source)
     place, _, name = target.rpartition(":")
     # Without a colon the target is a file, whose function is found by itself.
@@ -148,6 +155,9 @@ def _find_function(source: str) -> Callable[..., Any]:
 def _import_built_in(module: str, source: str) -> ModuleType:
     """Import the module of a built-in model.
 
+    Returns:
+        The module.
+
     Raises:
         MissingDependency: the model needs a package that is not installed.
     """
@@ -175,6 +185,9 @@ def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
     """Return the function of a file that makes its model.
 
     It is the one annotated to return a Model, or the only one.
+
+    Raises:
+        OsimliteError: the file has no such function, or several.
     """
     # A script may build its model at once, in a variable.
     ready = getattr(module, "model", None)
@@ -206,7 +219,11 @@ def _returns_model(function: Callable[..., Any]) -> bool:
 def _parse_arguments(
     function: Callable[..., Any], parameters: Mapping[str, str], source: str
 ) -> dict[str, Any]:
-    """Return the arguments of a model function; all parameters without a default must be given."""
+    """Return the arguments of a model function; all parameters without a default must be given.
+
+    Raises:
+        OsimliteError: the function has no such parameter, or one without a default is missing.
+    """
     known = inspect.signature(function).parameters
     arguments = {}
     for name, text in parameters.items():
@@ -227,7 +244,11 @@ def _parse_arguments(
 
 
 def _parse_value(name: str, text: str, parameter: inspect.Parameter) -> Any:
-    """Return the value of a parameter, of the type of its default."""
+    """Return the value of a parameter, of the type of its default.
+
+    Raises:
+        OsimliteError: the text is no value of that type.
+    """
     default = parameter.default
     # The type of the default decides how a text is read.
     kind: type | None = None if default in (inspect.Parameter.empty, None) else type(default)

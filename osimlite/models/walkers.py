@@ -60,6 +60,9 @@ def furthest_walker() -> Model:
     It stands on its right foot, which is at rest, with the left leg drawn up and swinging forward.
     No cycle was found for this walker: the inertia of its shanks is so large that a leg swings too
     slowly.
+
+    Returns:
+        The model.
     """
     model = dynamic_walker()
     model.name = "FurthestWalker"
@@ -77,6 +80,9 @@ def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> 
         shank_inertia: moment of inertia of each shank about its mass centre and the knee axis
             (kg·m²).
         foot_ahead: distance of the sphere of each foot in front of the shank's axis (m).
+
+    Returns:
+        The model.
     """
     model = dynamic_walker()
     model.name = "SteadyWalker"
@@ -110,6 +116,9 @@ def human_walker(
             exercise.
         foot_ahead: distance of the sphere in front of the shank's axis (m).
         knee_stiffness: stiffness of the stops of the knees (N·m/deg).
+
+    Returns:
+        The model.
     """
     model = dynamic_walker(slope=slope)
     model.name = "HumanWalker"
@@ -146,7 +155,11 @@ def human_walker(
 def _set_start_and_track(
     model: Model, start: Mapping[str, tuple[float, float]], way: float
 ) -> Model:
-    """Set the initial state, and extend platform and coordinate range for a distance `way` (m)."""
+    """Set the initial state, and extend platform and coordinate range for a distance `way` (m).
+
+    Returns:
+        The same model.
+    """
     for coordinate in model.components(Coordinate):
         if coordinate.name in start:
             coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]

@@ -65,6 +65,9 @@ class Dynamics:
 
         Args:
             point: point of the grid.
+
+        Returns:
+            Formula of the derivative.
         """
         size = self.size
         f = self.functions
@@ -98,7 +101,11 @@ class Dynamics:
         return rates
 
     def _compute_auxiliary_rates(self, point: PointSymbols) -> Formula:
-        """Compute the rates of the auxiliary states by the force laws, in the order of the states."""
+        """Compute the rates of the auxiliary states by the force laws, in the order of the states.
+
+        Returns:
+            Formula of the rates (m, 1).
+        """
         none = casadi.SX.zeros(len(self.functions.states))
         f = self.functions
         # The residual of an auxiliary state is its rate less the law's rate: at zero rates it is

@@ -158,6 +158,9 @@ class PrescribedMotion:
         A row holds lengths (m) and speeds (m/s) of m paths, the generalized forces that n
         coordinates need, the generalized forces (n, m) of the actuators with 1 N each, and the
         Jacobian G (c, n) of the constraints; matrices row by row.
+
+        Returns:
+            Numbers (t, k).
         """
         values, speeds, accelerations = self._motion(times)
         needed, *matrices = self._force_balance.compute_balance(
@@ -317,7 +320,11 @@ class PrescribedDynamics(Dynamics):
         )
 
     def compute_rates(self, point: PointSymbols) -> Formula:
-        """Compute the rates of the auxiliary states (n, 1), the only states."""
+        """Compute the rates of the auxiliary states (n, 1), the only states.
+
+        Returns:
+            Formula of the rates.
+        """
         count = len(self.functions.path_names)
         return self._insert_tendon_rates(point, -self._compute_bench_residual(point)[2 * count :])
 
@@ -405,7 +412,11 @@ class PrescribedDynamics(Dynamics):
         return formula
 
     def _compute_actuator_forces(self, point: PointSymbols) -> Formula:
-        """Compute the forces of the actuators (m, 1), N or N m; tensions of muscles are positive."""
+        """Compute the forces of the actuators (m, 1), N or N m; tensions of muscles are positive.
+
+        Returns:
+            Formula of the forces.
+        """
         count = len(self.functions.path_names)
         force = -self._compute_bench_residual(point)[count : 2 * count][self.functions.carriages]
         # Muscles pull the carriage back, so that a positive force has the other sign.
@@ -440,6 +451,9 @@ def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
     Args:
         actuators: muscles, and actuators with a force proportional to their control or activation.
         names: name of each actuator on the bench, of its carriage and of the coordinate.
+
+    Returns:
+        The model; body, coordinate and force of each actuator have its name.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
     for item, name in zip(actuators, names, strict=True):

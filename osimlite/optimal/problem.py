@@ -269,7 +269,11 @@ class Problem(StudyContext):
         return initial, final
 
     def _remove_motion(self) -> Motion | None:
-        """Remove an enabled PositionMotion from the model and return its motion, or None."""
+        """Remove an enabled PositionMotion from the model and return its motion, or None.
+
+        Returns:
+            The motion, or None if the model has no enabled PositionMotion.
+        """
         for part in list(self.model.components(PositionMotion)):
             if part.default_enabled:
                 path = part.path
@@ -417,7 +421,11 @@ class Problem(StudyContext):
             raise self.unsupported_error(info, "input controls are not supported")
 
     def _name_constraints(self) -> list[str]:
-        """Name the equations of the model's constraints as OpenSim numbers them: constraint, then row."""
+        """Name the equations of the model's constraints as OpenSim numbers them: constraint, then row.
+
+        Returns:
+            A name for each equation; none without constraints.
+        """
         count = self.functions.constraint_count
         if not count:
             return []
@@ -472,7 +480,11 @@ class Problem(StudyContext):
         return mesh
 
     def _build_terms(self, goal: MocoGoal) -> GoalTerms:
-        """Build the terms of a goal, and check its mode and its scale factors."""
+        """Build the terms of a goal, and check its mode and its scale factors.
+
+        Returns:
+            The terms, as the builder of the class of goals makes them.
+        """
         build = GOAL_BUILDERS.get(type(goal))
         if build is None:
             raise self.unsupported_error(goal, "this class of goals is not supported yet")

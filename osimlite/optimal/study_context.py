@@ -26,6 +26,9 @@ def name_file_in_errors(file: object) -> Iterator[None]:
 
     Args:
         file: file of a study; anything but a path is left alone.
+
+    Raises:
+        OsimliteError: the error of the block, with the file.
     """
     try:
         yield

@@ -96,6 +96,9 @@ class MocoTrajectory:
         Args:
             path: path of the file.
 
+        Returns:
+            The trajectory.
+
         Raises:
             OsimliteError: the file cannot be read.
             DocumentError: the file has no times, or its header counts other columns.

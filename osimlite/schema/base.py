@@ -193,6 +193,9 @@ class Object(BaseModel, metaclass=ObjectType):
             present: properties that the text contains.
             index: index of the object's element in its text.
             home: model that the object will belong to.
+
+        Returns:
+            The instance.
         """
         # Default objects and lists are made on first access (see `__getattr__`), because most are never
         # used.
@@ -215,6 +218,9 @@ class Object(BaseModel, metaclass=ObjectType):
         Args:
             _fields_set: properties that count as set; all of `values` by default.
             values: values by property.
+
+        Returns:
+            The instance.
         """
         return cls.build(values, set(values) if _fields_set is None else _fields_set)
 
@@ -251,7 +257,11 @@ class Object(BaseModel, metaclass=ObjectType):
         return held
 
     def find_contradictions(self) -> Iterable[Contradiction]:
-        """Yield combinations of property values that OpenSim rejects although each value is valid."""
+        """Yield combinations of property values that OpenSim rejects although each value is valid.
+
+        Returns:
+            The combinations; none for a class that does not define this method.
+        """
         return ()
 
     def walk(self) -> Iterator[Object]:
@@ -461,7 +471,11 @@ _PLAIN = frozenset((str, float, int, bool, type(None)))
 def _copy_object(
     item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]], home: Home | None
 ) -> T:
-    """Copy an object and all that it owns; append its references to `naming`, to be redirected at the end."""
+    """Copy an object and all that it owns; append its references to `naming`, to be redirected at the end.
+
+    Returns:
+        The copy; of an object that `memo` contains, the copy made before.
+    """
     if id(item) in memo:
         return cast("T", memo[id(item)])
     state, owned = item.__dict__.copy(), _list_owned_fields(type(item))

@@ -23,7 +23,11 @@ def describe_property(spec: FieldSpec) -> str:
 
 
 def describe_value(spec: FieldSpec) -> str:
-    """Describe the type of a property in a few words: ``one number in N/m, > 0``."""
+    """Describe the type of a property in a few words: ``one number in N/m, > 0``.
+
+    Returns:
+        A phrase without a final dot: number of values, unit and domain, or the class of the objects.
+    """
     kind = spec.kind
     if isinstance(kind, Value):
         words = kind.words()

@@ -118,7 +118,11 @@ class Value(FieldType):
         return items
 
     def words(self) -> str:
-        """Describe the expected text: ``"3 numbers"``, ``"true or false"``."""
+        """Describe the expected text: ``"3 numbers"``, ``"true or false"``.
+
+        Returns:
+            The number of values and what they are, for "expected ..." in a message.
+        """
         nouns = {
             "double": "numbers",
             "int": "whole numbers",

@@ -75,6 +75,9 @@ class Joint(ModelComponent, abstract=True):
             child_at: where the joint is in the child frame (m).
             child_turned: how the joint is turned in the child frame (rad).
 
+        Returns:
+            The joint itself.
+
         Raises:
             ModelError: what is to be connected is no frame.
         """
@@ -100,7 +103,11 @@ class Joint(ModelComponent, abstract=True):
 
 
 def _coordinates(count: int) -> Any:
-    """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out."""
+    """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out.
+
+    Returns:
+        A field whose default is a new list for each joint.
+    """
     return Field(
         default_factory=lambda: ObjectList(
             Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count)

@@ -121,6 +121,9 @@ class Model(ModelComponent):
 
         Args:
             cls: only components of this class and of classes derived from it.
+
+        Returns:
+            An iterator over the components of the present tree.
         """
         return (component for component in self.tree().components if isinstance(component, cls))
 
@@ -161,6 +164,9 @@ class Model(ModelComponent):
 
     def add(self, *components: C) -> C:
         """Add components to the sets for their classes, in order, and return the first one.
+
+        Returns:
+            The first of the components.
 
         Raises:
             ModelError: no set of a model accepts the class, or a sibling has the name.

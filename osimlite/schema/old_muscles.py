@@ -24,7 +24,11 @@ class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
     facts = Facts(states="activation fiber_length")
 
     def find_contradictions(self) -> Iterator[Contradiction]:
-        """Nothing of its dynamics can be left out."""
+        """Nothing of its dynamics can be left out.
+
+        Returns:
+            A contradiction for each property of the dynamics that is missing.
+        """
         return check_complete_dynamics(self)
 
 

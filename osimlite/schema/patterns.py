@@ -138,7 +138,11 @@ class Pattern:
     def _find_matching_starts(
         self, final: int, name: str, known: dict[int, list[set[int]]]
     ) -> list[set[int]]:
-        """Return, before each character of a name and at its end, the states that lead to a final one."""
+        """Return, before each character of a name and at its end, the states that lead to a final one.
+
+        Returns:
+            A set of states for each position in the name, from 0 to its length.
+        """
         result: list[set[int]] = [set() for _ in range(len(name) + 1)]
         for index in range(len(name), -1, -1):
             waiting = [final]
@@ -340,7 +344,12 @@ class _Compiler:
         return _test(characters, is_negated)
 
     def _read_escaped_set(self) -> tuple[frozenset[str], bool]:
-        """Return the characters that an escape stands for, and whether it stands for all others."""
+        """Return the characters that an escape stands for, and whether it stands for all others.
+
+        Raises:
+            PatternError: the digits of a code are no hexadecimal number.
+            UnsupportedPatternError: the escape is none that this matcher knows.
+        """
         letter = self._take()
         if letter.lower() in _ESCAPED_CLASSES:
             return _ESCAPED_CLASSES[letter.lower()], letter.isupper()
@@ -376,7 +385,11 @@ class _Compiler:
         return lambda each: any(test(each) for test in tests) != is_negated
 
     def _bracket_item(self, tests: list[CharacterTest]) -> str | None:
-        """Return the next character of a bracket; of a class, None, and its test is added."""
+        """Return the next character of a bracket; of a class, None, and its test is added.
+
+        Raises:
+            PatternError: a class such as ``[:name:]`` does not exist.
+        """
         if self._takes("[:"):
             end = self.text.find(":]", self.index)
             name = self.text[self.index : max(end, self.index)]

@@ -207,7 +207,11 @@ def add_change_callback(forget: Callable[[], None]) -> None:
 
 
 def cache_by_tags(function: Callable[..., T]) -> Callable[..., T]:
-    """Cache a function of tags or classes until other plug-in classes are registered."""
+    """Cache a function of tags or classes until other plug-in classes are registered.
+
+    Returns:
+        The function with a cache, which is cleared when a class is registered.
+    """
     cached = cache(function)
     add_change_callback(cached.cache_clear)
     return cached

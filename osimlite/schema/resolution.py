@@ -141,13 +141,22 @@ def _make_bare_name_rule(
 
 
 def _resolve_variable(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """Resolve the name of a state, a control or a generalized force."""
+    """Resolve the name of a state, a control or a generalized force.
+
+    Returns:
+        The component with the variable, or the reason why there is none: ``missing`` or ``empty``.
+    """
     result = find_variables(tree, target).get(text)
     return Resolution(result, None if result is not None else "missing" if text else "empty")
 
 
 def _resolve_pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """Resolve a regular expression, which must match the complete name of at least one variable."""
+    """Resolve a regular expression, which must match the complete name of at least one variable.
+
+    Returns:
+        The component of the first variable that matches, or the reason why there is none. A pattern with
+        syntax that only OpenSim reads counts as resolved.
+    """
     try:
         pattern = Pattern(text)
     except UnsupportedPatternError:
@@ -170,6 +179,9 @@ def skip_resolution(tree: Tree, text: str, owner: Component, target: str) -> Res
         text: the text.
         owner: component that has the property.
         target: class of what is named.
+
+    Returns:
+        The owner, so that the text counts as resolved.
     """
     return Resolution(owner)
 

@@ -217,7 +217,11 @@ class Tree:
                     yield Use(holder, owner, spec, value)
 
     def resolve(self, use: Use) -> Resolution:
-        """Resolve one reference by OpenSim's rule for its property."""
+        """Resolve one reference by OpenSim's rule for its property.
+
+        Returns:
+            The component that is named, or the reason why there is none.
+        """
         if isinstance(use.value, str):
             return self.lookup(use.reference, use.value, use.owner)
         known = self.path_of(use.value) is not None
@@ -230,6 +234,9 @@ class Tree:
             reference: type of the property.
             text: the text.
             owner: component that has the property.
+
+        Returns:
+            The component that is named, or the reason why there is none.
         """
         # Only ASCII white space is removed: for OpenSim a no-break space is a letter.
         text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target

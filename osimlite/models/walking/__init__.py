@@ -26,7 +26,11 @@ STANDING = {
 
 
 def human() -> Model:
-    """Build a human model with one ground reaction force per foot, as SCONE scenarios need it."""
+    """Build a human model with one ground reaction force per foot, as SCONE scenarios need it.
+
+    Returns:
+        The model.
+    """
     model = jumper(driven=False)
     model.name = "Human"
     forces = {

@@ -237,6 +237,9 @@ class FrameReference:
         Args:
             problem: problem with the frames.
             paths: paths of the frames.
+
+        Raises:
+            DocumentError: the table holds other quantities than the goal tracks.
         """
         goal = self.goal
         endings = list_suffixes(self.kind)

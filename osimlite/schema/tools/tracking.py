@@ -38,7 +38,11 @@ _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
 
 
 def _body(*words: str, consequence: Consequence = "refused") -> Reference:
-    """Marker of the name of a body, or of a word for something else."""
+    """Marker of the name of a body, or of a word for something else.
+
+    Returns:
+        A reference that may be absent.
+    """
     return Reference(
         "body-name-or-com",
         "Body",
