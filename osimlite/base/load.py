@@ -25,6 +25,9 @@ from osimlite.errors import OsimliteError
 def run_python_file(path: Path) -> ModuleType:
     """Run a Python file and return it as a module.
 
+    Returns:
+        The module, which is also in ``sys.modules`` under a private name.
+
     Raises:
         MissingFileError: the file does not exist.
         OsimliteError: the code raises an error; with the line.
@@ -51,6 +54,9 @@ def make_module_name(name: str) -> str:
 
 def import_user_module(name: str) -> ModuleType:
     """Import a module that a user names, also from the current folder.
+
+    Returns:
+        The module.
 
     Raises:
         OsimliteError: the module cannot be imported.

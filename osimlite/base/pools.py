@@ -352,6 +352,9 @@ def run_remote_task(work: Callable[[Any], Any], values: Any, version: str) -> An
         values: its argument.
         version: version of osimlite that submitted the task.
 
+    Returns:
+        Result of the function.
+
     Raises:
         OsimliteError: the version differs from that of the worker, or the work fails.
     """

@@ -65,6 +65,9 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
         folder: the user's cache folder.
         now: seconds since the epoch.
         max_bytes: largest size of all entries together.
+
+    Returns:
+        Number of entries that were removed.
     """
     entries = sorted(find_entries(os.path.realpath(folder)))
     total = sum(entry.size for entry in entries)
@@ -100,7 +103,11 @@ def _leads_elsewhere(parent: str, name: str) -> bool:
 
 
 def _remove(entry: _Entry) -> bool:
-    """Remove an entry unless its folder has become a link meanwhile; return whether it was removed."""
+    """Remove an entry unless its folder has become a link meanwhile; return whether it was removed.
+
+    Returns:
+        Whether the entry was removed.
+    """
     try:
         if os.unlink not in os.supports_dir_fd:
             if os.path.realpath(entry.folder) != entry.folder:

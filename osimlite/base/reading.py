@@ -26,6 +26,9 @@ _SPECIAL = {
 def open_file(path: str | Path) -> BinaryIO:
     """Open a regular file for reading.
 
+    Returns:
+        The stream of bytes.
+
     Raises:
         SpecialFileError: the path is a pipe, a device or a similar file.
         MissingFileError: the file does not exist or is not readable.
@@ -76,7 +79,11 @@ def read_at_most(path: str | Path, limit: int) -> bytes:
 
 
 def _open_nonblocking(path: str, flags: int) -> int:
-    """Open a file without waiting; refuse it if it has become a pipe since it was checked."""
+    """Open a file without waiting; refuse it if it has become a pipe since it was checked.
+
+    Returns:
+        The file descriptor.
+    """
     handle = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
     try:
         _expect_regular(os.fstat(handle).st_mode, path)

@@ -84,7 +84,11 @@ def dataclass(
     kw_only: bool = False,
     slots: bool = False,
 ) -> Any:
-    """Make a class a record; the arguments are those of ``dataclasses.dataclass``."""
+    """Make a class a record; the arguments are those of ``dataclasses.dataclass``.
+
+    Returns:
+        The class, or without a class a decorator that makes one a record.
+    """
 
     def decorate(cls: type) -> type:
         return _build_record(cls, frozen, eq, kw_only, slots)
@@ -93,7 +97,11 @@ def dataclass(
 
 
 def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool) -> type:
-    """Add the methods of a record to a class; return a new class if it has slots."""
+    """Add the methods of a record to a class; return a new class if it has slots.
+
+    Returns:
+        The class itself, or the new one with slots.
+    """
     namespace = cls.__dict__
     fields: dict[str, _Field] = {}
     for base in reversed(cls.__mro__[1:]):

@@ -37,6 +37,9 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
         purpose: what needs it, as the subject of a sentence: ``"the PyBullet engine"``.
         instead: alternative that works without it, if any.
 
+    Returns:
+        The module.
+
     Raises:
         MissingDependency: the package is not installed, or cannot be loaded.
     """

@@ -57,6 +57,9 @@ def escape_control_sequences(text: str, *, starts_line: bool = True) -> str:
     Args:
         text: complete lines, or a part of one.
         starts_line: whether the text begins at the start of a line.
+
+    Returns:
+        The text with escapes such as ``\x1b`` in their place.
     """
     return _EXECUTED.sub(lambda match: _escape_match(match, starts_line), text)
 
@@ -166,6 +169,9 @@ def suggest_path(name: str, paths: Collection[str]) -> str:
     Args:
         name: unknown name.
         paths: valid paths.
+
+    Returns:
+        The end of a message, ``"; did you mean ...?"``; empty if nothing is similar.
     """
     within = next((f"; did you mean '{path}'?" for path in paths if name in path.split("/")), "")
     return within or suggest_name(name, paths)

@@ -154,6 +154,9 @@ def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
         name: name of the file.
         content: its content.
 
+    Returns:
+        Path of the file.
+
     Raises:
         OsimliteError: as of :func:`open_into`.
     """
@@ -212,6 +215,9 @@ def _prune_daily(folder: Path) -> None:
 
 def open_to_append(path: Path) -> BinaryIO:
     """Open a regular file for appending, or make it; a link or a pipe under its name is refused.
+
+    Returns:
+        The stream of bytes.
 
     Raises:
         OSError: it cannot be opened.
@@ -519,6 +525,9 @@ def replace_with(path: Path, target: Path) -> None:
 def make_folder(path: str | Path) -> Path:
     """Make a folder and those above it unless they exist, and return its path.
 
+    Returns:
+        Path of the folder.
+
     Raises:
         OsimliteError: the folder cannot be made; the message says why.
     """
@@ -585,7 +594,11 @@ def _open_special(target: Path) -> Iterator[BinaryIO]:
 
 
 def _copy_attributes(name: str, target: Path, there: os.stat_result) -> bool:
-    """Copy owner, mode and extended attributes to a new file; return whether all could be copied."""
+    """Copy owner, mode and extended attributes to a new file; return whether all could be copied.
+
+    Returns:
+        Whether all could be copied; no file with several hard links counts as copied.
+    """
     if there.st_nlink > 1:
         return False
     try:
@@ -602,7 +615,11 @@ def _copy_attributes(name: str, target: Path, there: os.stat_result) -> bool:
 
 
 def _replace_file(name: str | Path, target: Path) -> bool:
-    """Replace a file; return False if the old one stays, as on Windows while a program has it open."""
+    """Replace a file; return False if the old one stays, as on Windows while a program has it open.
+
+    Returns:
+        Whether the file was replaced.
+    """
     try:
         os.replace(name, target)
     except PermissionError:

@@ -21,6 +21,9 @@ def write_baseline(path: str | Path, report: Report) -> int:
     Args:
         path: file of the baseline.
         report: the findings.
+
+    Returns:
+        Number of findings.
     """
     counts = Counter(map(_make_key, report.findings))
     findings = [[*key, count] for key, count in sorted(counts.items())]

@@ -49,11 +49,19 @@ class CheckTarget:
         return rule.about == self.about
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure paths and muscles or recall the results; return why not, if that fails."""
+        """Measure paths and muscles or recall the results; return why not, if that fails.
+
+        Returns:
+            The reason why nothing was measured; empty on success.
+        """
         return ""
 
     def find_obstacles(self, *, anew: bool = True) -> str:
-        """Find what stops a computation, for rules that report it; return why not, if that fails."""
+        """Find what stops a computation, for rules that report it; return why not, if that fails.
+
+        Returns:
+            The reason why nothing was computed; empty on success.
+        """
         return ""
 
     def path(self, item: Object | None) -> str:

@@ -29,6 +29,9 @@ def check_source(source: Source, config: Config | None = None) -> Report:
     Args:
         source: the text.
         config: configuration of the check.
+
+    Returns:
+        The report; it has the text too if there are findings.
     """
     subject = make_subject(source, config)
     report = run_rules(subject)

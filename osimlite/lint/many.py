@@ -153,7 +153,11 @@ def count_processes(jobs: list[CheckJob]) -> int:
 
 
 def check_job(job: CheckJob) -> Report:
-    """Check one file, and cache its report."""
+    """Check one file, and cache its report.
+
+    Returns:
+        The report of the file.
+    """
     from osimlite.lint.engine import load_subject, run_rules
     from osimlite.lint.subject import Subject
 

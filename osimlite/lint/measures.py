@@ -58,7 +58,11 @@ class CoordinateSetting(NamedTuple):
         return f"'{self.coordinate}' = {self.format_value(self.value, 4)}"
 
     def format_value(self, value: float, digits: int) -> str:
-        """Format a value of the coordinate with its unit; angles in degrees."""
+        """Format a value of the coordinate with its unit; angles in degrees.
+
+        Returns:
+            Number and unit, such as ``30 deg``.
+        """
         shown, unit = (degrees(value), "deg") if self.unit == "rad" else (value, self.unit)
         return f"{shown:.{digits}g} {unit}".rstrip()
 
@@ -180,6 +184,9 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
     Args:
         subject: with the model.
         anew: whether more is done than to recall what was measured before.
+
+    Returns:
+        The reason why the model was not measured; empty on success.
     """
     from osimlite.schema.tree import lend_tree
 

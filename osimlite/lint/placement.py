@@ -58,11 +58,19 @@ class FramePose(NamedTuple):
     position: Vector = ZERO
 
     def rotate(self, vector: Vector) -> Vector:
-        """Rotate a vector of the inner frame into the outer frame."""
+        """Rotate a vector of the inner frame into the outer frame.
+
+        Returns:
+            The vector in the outer frame.
+        """
         return combine_axes(self.axes, vector)
 
     def transform_point(self, point: Vector) -> Vector:
-        """Transform a point of the inner frame to the outer frame."""
+        """Transform a point of the inner frame to the outer frame.
+
+        Returns:
+            The point in the outer frame.
+        """
         return plus(combine_axes(self.axes, point), self.position)
 
     def compose(self, inner: FramePose) -> FramePose:

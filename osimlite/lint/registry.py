@@ -227,6 +227,9 @@ def rule(
 
     With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples
     that stand in `frames`.
+
+    Returns:
+        A decorator, which leaves the function as it is.
     """
 
     def register(check: Check) -> Check:

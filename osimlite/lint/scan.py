@@ -134,7 +134,11 @@ class RowScanner:
     _frame: int = 0
 
     def scan(self, data: bytes, start: int, line: int) -> TableRows:
-        """Scan the rows from an offset on, which is in this line of the file."""
+        """Scan the rows from an offset on, which is in this line of the file.
+
+        Returns:
+            What was noted of the rows.
+        """
         self.rows.cells = self.cells
         if self.markers:
             self.rows.unseen = set(range((self.cells - 2) // 3))

@@ -36,7 +36,11 @@ P = ParamSpec("P")
 def cache_per_subject(
     make: Callable[Concatenate[S, P], Cached],
 ) -> Callable[Concatenate[S, P], Cached]:
-    """Cache a function per subject and per value of its other arguments."""
+    """Cache a function per subject and per value of its other arguments.
+
+    Returns:
+        A function that computes each result once.
+    """
 
     @wraps(make)
     def get_cached(subject: S, /, *args: P.args, **named: P.kwargs) -> Cached:
@@ -109,11 +113,19 @@ class Subject(CheckTarget):
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure paths and muscles, or recall the results; return why not, if that fails."""
+        """Measure paths and muscles, or recall the results; return why not, if that fails.
+
+        Returns:
+            The reason why nothing was measured; empty on success.
+        """
         return measure_subject(self, anew=anew)
 
     def find_obstacles(self, *, anew: bool = True) -> str:
-        """Build the model, or recall what stops that; return why it was not built, if it was not."""
+        """Build the model, or recall what stops that; return why it was not built, if it was not.
+
+        Returns:
+            The reason why the model was not built; empty on success.
+        """
         return find_obstacles(self, anew=anew)
 
     @cached_property
@@ -153,11 +165,19 @@ class Subject(CheckTarget):
         return result
 
     def find_instances(self, cls: type[T]) -> Iterator[T]:
-        """Yield every object of a class or of a derived one."""
+        """Yield every object of a class or of a derived one.
+
+        Returns:
+            An iterator over the objects.
+        """
         return cast("Iterator[T]", self.find_by_class(cls.__name__))
 
     def find_by_class(self, cls: str) -> Iterator[Any]:
-        """Yield every object of the class with this name or of a derived one; the class need not be imported."""
+        """Yield every object of the class with this name or of a derived one; the class need not be imported.
+
+        Returns:
+            An iterator over the objects.
+        """
         return chain.from_iterable(self._by_base.get(cls, ()))
 
     @cached_property

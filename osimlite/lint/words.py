@@ -26,6 +26,9 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
     Args:
         value: number or numbers.
         unit: unit; empty without one.
+
+    Returns:
+        The numbers with spaces between them, and the unit after them.
     """
     values = value if isinstance(value, tuple) else (value,)
     text = " ".join(
@@ -36,7 +39,11 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
 
 
 def format_value(value: object) -> str:
-    """Format a value as a file would contain it."""
+    """Format a value as a file would contain it.
+
+    Returns:
+        The text; ``nothing`` or ``an empty list`` for what a file would leave empty.
+    """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):

@@ -301,6 +301,9 @@ def _evaluate_accelerations(system: System, state: list[float]) -> int | None:
     """Evaluate the accelerations and return the status; None if a result is not finite.
 
     Kernels that run as Python raise an exception where machine code computes NaN.
+
+    Returns:
+        The status of the evaluation, see `OUTCOME`.
     """
     try:
         return system.realize(0.0, state, STAGE.ACCELERATION)

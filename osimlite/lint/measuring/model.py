@@ -66,6 +66,9 @@ def measure_model(
             are still valid.
         mechanism: mechanism of the model; built by default.
 
+    Returns:
+        What was measured now, with what was known and is still valid.
+
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
         ModelError: something makes no sense.

@@ -155,6 +155,9 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
     Args:
         fibers: the muscle.
         length: length of its path, m.
+
+    Returns:
+        Fiber lengths and tensions in both states.
     """
     if not fibers.is_elastic:
         return None
@@ -177,6 +180,9 @@ def compute_reach(
         length: length of its path, m.
         is_active: full activation; otherwise that at rest.
         pose: pose with this length, for messages.
+
+    Returns:
+        The fiber length, and whether it is at the limit of the muscle.
     """
     known = fibers.evaluate_law(
         length,

@@ -44,13 +44,21 @@ def _format_command(finding: Finding) -> str:
 
 
 def _escape_data(text: str) -> str:
-    """Escape a message as GitHub's runner unescapes it."""
+    """Escape a message as GitHub's runner unescapes it.
+
+    Returns:
+        The text with escapes for per cent signs, line ends and unprintable characters.
+    """
     # The per cent sign first, since the other escapes contain it.
     return escape_unprintable(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
 
 
 def _escape_property(text: str) -> str:
-    """Escape the value of a property, which commas and colons would end."""
+    """Escape the value of a property, which commas and colons would end.
+
+    Returns:
+        The text with escapes for commas and colons too.
+    """
     return _escape_data(text).replace(":", "%3A").replace(",", "%2C")
 
 

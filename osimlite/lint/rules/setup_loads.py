@@ -246,7 +246,11 @@ class _LoadSample(NamedTuple):
 
 
 def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -> list[_LoadSample]:
-    """Sample a measured force at times at which it is large."""
+    """Sample a measured force at times at which it is large.
+
+    Returns:
+        The samples; none if the force is incomplete or does not act during the motion.
+    """
     if setup.tree is None or table is None or table.span is None or motion.span is None:
         return []
     bodies = setup.tree.list_members("/bodyset", "Body")

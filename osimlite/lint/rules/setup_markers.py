@@ -16,7 +16,11 @@ from osimlite.lint.words import find_nearest_name
 
 
 def find_marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
-    """Yield every part of a tool that fits markers, with its data."""
+    """Yield every part of a tool that fits markers, with its data.
+
+    Returns:
+        Pairs of a part and its table.
+    """
     return setup.iterate_with_tables(setup.find_having("ik_task_set", "marker_file"), "marker_file")
 
 
