@@ -57,6 +57,7 @@ def scale(
     Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place
         -o subject.osim
     """
+    # Numpy and the fitting package are imported only when the command runs, so that help is fast.
     from osimlite.base.files import make_folder_of
     from osimlite.cli._console import say
     from osimlite.errors import SettingError
@@ -64,6 +65,7 @@ def scale(
     from osimlite.io.document.printer import write
     from osimlite.io.document.reader import read
 
+    # BODY=A:B,C:D gives several pairs; "BODY.XZ" restricts the factor to these axes.
     measurements = {
         body: (
             [_parse_pair(pair, body) for pair in pairs.split(",")],
@@ -77,6 +79,7 @@ def scale(
         body: _parse_factors(text, body)
         for body, text in options.parse_named_words(factor, "--factor").items()
     }
+    # Without any of these the model would be written unchanged.
     if not (measurements or factors or place or mass > 0.0):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
     result = scaled(
@@ -127,7 +130,9 @@ def _parse_factors(text: str, body: str) -> tuple[float, ...]:
     try:
         numbers = [float(word) for word in text.split(",")]
     except ValueError:
+        # A word that is no number leads to the same message as a wrong count.
         numbers = []
+    # One number holds for all three axes.
     if len(numbers) not in (1, 3):
         raise SettingError(
             f"'{text}' is not a factor for '{body}'; write one number, or three with commas"

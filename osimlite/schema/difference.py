@@ -43,6 +43,7 @@ def find_differences(old: Object, new: Object) -> list[Difference]:
         new: second document.
     """
     if isinstance(old, Model) and isinstance(new, Model):
+        # Only models have a tree of components with paths.
         return list(_Comparison(old.tree(), new.tree()).run())
     return list(_Comparison(None, None)._object(new.name or new.tag, "", old, new))
 
@@ -56,10 +57,14 @@ class _Comparison:
 
     def run(self) -> Iterator[Difference]:
         assert self.old is not None and self.new is not None
+        # What only the old model has comes first, then the differences of what both have, then
+        # what only the new one has.
         for path in _find_missing_paths(self.old, self.new):
             yield Difference(path, "", _describe_type(self.old.by_path[path]), None)
         for path, component in self.new.by_path.items():
             before = self.old.by_path.get(path)
+            # A component that only the new model has is reported below, once for its whole
+            # subtree.
             if before is not None:
                 yield from self._object(path, "", before, component)
         for path in _find_missing_paths(self.new, self.old):
@@ -73,10 +78,14 @@ class _Comparison:
         """
         if _describe_type(old) != _describe_type(new):
             yield Difference(path, way or "class", _describe_type(old), _describe_type(new))
+            # An owned object of another class is reported as a whole. Of a component at its path
+            # the properties that both classes have are compared as well.
             if way:
                 return
         if isinstance(old, Unknown) or isinstance(new, Unknown):
             if isinstance(old, Unknown) and isinstance(new, Unknown) and old.content != new.content:
+                # The properties of an unknown class are only text. If one class is known, the
+                # difference of the classes has been reported.
                 yield from _compare_contents(path, way, old.content, new.content)
             return
         # If the classes differ, compare the properties that both have.
@@ -92,6 +101,8 @@ class _Comparison:
                     path, place, spec.kind.form == "list", _list_objects(one), _list_objects(other)
                 )
             elif isinstance(spec.kind, Reference):
+                # References are compared by the components that they lead to: a path and a name
+                # can mean the same one.
                 names = (
                     self._names(self.old, old, spec, one),
                     self._names(self.new, new, spec, other),
@@ -125,6 +136,8 @@ class _Comparison:
                     path, f"{way}[{name}]", old_names.get(name), new_names.get(name)
                 )
             return
+        # A single object needs no number in its place; positions decide where names are missing
+        # or repeated.
         many = max(len(before), len(after)) > 1
         for number, (one, other) in enumerate(zip_longest(before, after)):
             place = f"{way}[{number}]" if many else way
@@ -152,13 +165,16 @@ class _Comparison:
         if value is None:
             return None
         assert isinstance(spec.kind, Reference)
+        # Without a tree nothing can be looked up, so the text itself counts.
         if tree is None:
             return value if isinstance(value, str) else value.path
         owner = tree.owner_of(holder)
+        # References by these rules do not lead to a component of their own; their text counts.
         if spec.kind.rule not in ("input", "file", "column", "positional", "point-index"):
             target = tree.resolve(Use(holder, owner, spec, value)).target
             if target is not None:
                 return tree.path_of(target)
+        # A reference that leads nowhere keeps its text.
         return value if isinstance(value, str) else value.name
 
 
@@ -190,21 +206,28 @@ def _flatten_content(content: str) -> dict[str, str]:
     levels: list[_Level] = []
     end = 0
     for match in _MARKUP.finditer(content):
+        # Text between two tags belongs to the element that is open; white space is removed at its
+        # end.
         if levels:
             levels[-1].text += content[end : match.start()] + (match["section"] or "")
         end = match.end()
+        # Comments, CDATA sections and instructions are no elements.
         if match["tag"] is None:
             continue
         if not match["close"]:
             attributes = {
                 name: value[1:-1] for name, value in _ATTRIBUTE.findall(match["attributes"])
             }
+            # A name identifies an element among its siblings, so that it is part of the place and
+            # no value.
             name = attributes.pop("name", "")
             place = ""
             if levels:
                 word = f"{match['tag']}[{name}]" if name else match["tag"]
                 above = levels[-1]
                 above.has_children = True
+                # Elements with equal tags and names are counted, so that each keeps a place of
+                # its own.
                 number = above.counts.get(word, 0)
                 above.counts[word] = number + 1
                 word += f"({number + 1})" if number else ""
@@ -214,6 +237,8 @@ def _flatten_content(content: str) -> dict[str, str]:
             levels.append(_Level(place))
         if (match["close"] or match["empty"]) and levels:
             level = levels.pop()
+            # White space between child elements is no value. An empty element without children is
+            # one.
             if level.place and (level.text.strip() or not level.has_children):
                 result[level.place] = level.text.strip()
     return result
@@ -239,6 +264,7 @@ def _are_same_word(one: str, other: str) -> bool:
     if one == other:
         return True
     try:
+        # 1 and 1.0 are the same number.
         return float(one) == float(other)
     except ValueError:
         return False
@@ -250,6 +276,7 @@ def _list_objects(value: Any) -> list[Object]:
 
 def _index_by_name(items: list[Object]) -> dict[str, Object]:
     """Return objects by name; empty if a name is missing or occurs twice."""
+    # A dictionary with fewer entries than items shows that a name occurs twice.
     result = {item.name: item for item in items}
     return result if len(result) == len(items) and "" not in result else {}
 
@@ -259,11 +286,13 @@ def _describe_type(item: Object) -> str:
 
 
 def _are_equal(one: Any, other: Any) -> bool:
+    # NaN differs from itself, but its text does not.
     return bool(one == other) or repr(one) == repr(other)
 
 
 def _find_missing_paths(tree: Tree, other: Tree) -> Iterator[str]:
     """Yield the topmost paths of a tree that another tree lacks, without internal parts."""
+    # If a component is missing, all below it is too; only the topmost is reported.
     missing = {path for path in tree.by_path if path not in other.by_path}
     for path, component in tree.by_path.items():
         if (

@@ -348,7 +348,7 @@ class _Compiler:
 
         Raises:
             PatternError: the digits of a code are no hexadecimal number.
-            UnsupportedPatternError: the escape is none that this matcher knows.
+            UnsupportedPatternError: this matcher does not know the escape.
         """
         letter = self._take()
         if letter.lower() in _ESCAPED_CLASSES:

@@ -221,12 +221,16 @@ def cache_by_tags(function: Callable[..., T]) -> Callable[..., T]:
 def find_class(tag: str) -> type[Object] | None:
     """Return the class of an XML tag; None if no class has it."""
     further = _further.get(tag)
+    # Classes of plug-ins are in no table of modules.
     if further is not None:
+        # Objects of an abstract class cannot stand in a file.
         return None if further.abstract else further
     module = MODULES.get(_TAGS.get(tag, tag))
     if module is None:
         return None
+    # Importing the module declares its classes; only the areas that a document uses are imported.
     result = getattr(import_module(module), _TAGS.get(tag, tag))
+    # A class whose tag differs from its name is found under the tag alone.
     return None if result.abstract or result.tag != tag else result
 
 
@@ -252,6 +256,7 @@ def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
     Returns:
         The classes.
     """
+    # The word is looked for in the source text, which costs less than importing a module.
     modules = {module for module in MODULES.values() if _mentions(module, word)}
     own = [
         getattr(import_module(module), name)
@@ -271,6 +276,7 @@ def _mentions(module: str, word: str) -> bool:
 def _read_source(module: str) -> str | None:
     spec = find_spec(module)
     loader = None if spec is None else spec.loader
+    # Not every loader can give a source; `_mentions` then assumes that it contains the word.
     read_source: Callable[[str], str | None] | None = getattr(loader, "get_source", None)
     return read_source(module) if read_source is not None else None
 

@@ -144,7 +144,7 @@ def _resolve_variable(tree: Tree, text: str, owner: Component, target: str) -> R
     """Resolve the name of a state, a control or a generalized force.
 
     Returns:
-        The component with the variable, or the reason why there is none: ``missing`` or ``empty``.
+        The component with the variable, or the reason for the failure: ``missing`` or ``empty``.
     """
     result = find_variables(tree, target).get(text)
     return Resolution(result, None if result is not None else "missing" if text else "empty")
@@ -154,7 +154,7 @@ def _resolve_pattern(tree: Tree, text: str, owner: Component, target: str) -> Re
     """Resolve a regular expression, which must match the complete name of at least one variable.
 
     Returns:
-        The component of the first variable that matches, or the reason why there is none. A pattern with
+        The component of the first variable that matches, or the reason for the failure. A pattern with
         syntax that only OpenSim reads counts as resolved.
     """
     try:

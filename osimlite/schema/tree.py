@@ -220,7 +220,7 @@ class Tree:
         """Resolve one reference by OpenSim's rule for its property.
 
         Returns:
-            The component that is named, or the reason why there is none.
+            The component that is named, or the reason for the failure.
         """
         if isinstance(use.value, str):
             return self.lookup(use.reference, use.value, use.owner)
@@ -236,7 +236,7 @@ class Tree:
             owner: component that has the property.
 
         Returns:
-            The component that is named, or the reason why there is none.
+            The component that is named, or the reason for the failure.
         """
         # Only ASCII white space is removed: for OpenSim a no-break space is a letter.
         text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target
