@@ -99,7 +99,7 @@ def draw_tables(
     from osimlite.view.table_plots import ColumnNames, plot_tables
 
     with progress_bar("drawing", len(tables)) as progress:
-        names = ColumnNames.of_model(model, mechanism)
+        names = ColumnNames.from_model(model, mechanism)
         steps = _find_steps(loads, mechanism)
         written = plot_tables(tables, folder, names, steps=steps, report=progress)
     say(describe_pictures(written), err=err)

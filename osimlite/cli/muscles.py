@@ -135,7 +135,7 @@ def muscles(
         # Pictures go beside the table, if there is one.
         folder = output.parent / output.stem if output is not None else Path(f"{file.stem}-muscles")
         with progress_bar("drawing", None):
-            regions = ColumnNames.of_model(model, mechanism).regions
+            regions = ColumnNames.from_model(model, mechanism).regions
             beside = second if others else None
             written = plot_muscles(first, mechanism, folder, beside, regions=regions)
         say(f"wrote {len(written)} pictures into {folder}")

@@ -40,9 +40,9 @@ from osimlite.view.panels import (
     Column,
     Panel,
     draw_pages,
-    figure_of,
     group_columns,
     has_cycles,
+    make_figure,
     merge_panels,
 )
 from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
@@ -276,7 +276,7 @@ def collect_actuators(
     for number, trial in enumerate(trials):
         evidence = trial.evidence
         assert evidence is not None
-        names = ColumnNames.of_model(evidence.model, build_mechanism(evidence.model))
+        names = ColumnNames.from_model(evidence.model, build_mechanism(evidence.model))
         for outcome in trial.outcomes:
             for table in outcome.tables.values():
                 for section, columns in _divide_actuators(table, names).items():
@@ -532,7 +532,7 @@ def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[
     )
     columns = 3
     rows = -(-len(panels) // 3)
-    figure = figure_of("", (11.0, 0.4 + 2.1 * rows))
+    figure = make_figure("", (11.0, 0.4 + 2.1 * rows))
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel, (label, group) in zip(axes, panels.items(), strict=False):
         for line in group:
@@ -595,7 +595,7 @@ def _render_residuals(trial: TrialOutcomes, name: str) -> Iterator[str]:
             }
             if not any(kinds.values()):
                 continue
-            figure = figure_of("", (11.0, 3.0))
+            figure = make_figure("", (11.0, 3.0))
             for panel, (unit, labels) in zip(figure.subplots(1, 2), kinds.items(), strict=True):
                 for color, label in zip(COLORS, labels, strict=False):
                     panel.plot(
@@ -657,7 +657,7 @@ def _draw_errors(
     filled = np.where(seen, errors, 0.0)
     # A frame without any measured marker divides by 1, not by 0.
     rms = np.sqrt((filled**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1))
-    figure = figure_of("", (11.0, 3.4))
+    figure = make_figure("", (11.0, 3.4))
     over, beside = figure.subplots(1, 2, width_ratios=(2, 1))
     over.plot(times, rms, color=COLORS[0], lw=1.6, label="root mean square")
     over.plot(times, filled.max(axis=1), color=COLORS[1], lw=1.2, label="largest")

@@ -21,13 +21,13 @@ from osimlite.view.collect import build_scene
 from osimlite.view.motion import (
     ShownMotion,
     activity_color,
-    at_times,
     find_moving_bodies,
+    get_values,
+    interpolate_columns,
     read_activations,
-    values_of,
 )
 from osimlite.view.picture import FORCE, INK, SKY, Camera, ForceArrow, Style, draw_scene
-from osimlite.view.pushes import Pushes
+from osimlite.view.pushes import DrawnForces
 from osimlite.view.scene import STEEPEST, Scene
 
 Plane = Literal["xy", "yz", "xz"]
@@ -106,7 +106,7 @@ def animate(
     painter = _Painter(film, size)
     frames = []
     for number in range(len(film.times)):
-        frames.append(painter.picture(number))
+        frames.append(painter.draw_frame(number))
         if progress is not None:
             progress(number + 1, len(film.times))
     target = Path(path)
@@ -148,23 +148,23 @@ class Film:
         # 1e-9: the last frame counts if it differs by rounding only.
         count = int(np.floor((recorded[-1] - recorded[0]) * fps / speed + 1e-9)) + 1
         self.times = recorded[0] + np.arange(count) * speed / fps
-        values = values_of(motion, self.mechanism)
-        self.q = at_times(motion, values, self.times)
-        self.poses = [self.scene.at(row) for row in self.q]
+        values = get_values(motion, self.mechanism)
+        self.q = interpolate_columns(motion, values, self.times)
+        self.poses = [self.scene.compute_poses(row) for row in self.q]
         self.moving = find_moving_bodies(self.poses)
-        self.pushes = Pushes.of(self.scene, motion, self.times)
+        self.pushes = DrawnForces.from_motion(self.scene, motion, self.times)
         self.activity = {
             path: np.interp(self.times, recorded, levels)
             for path, levels in read_activations(self.scene, motion).items()
         }
-        self.focus = self._focus()
-        self.reach = self._reach()
+        self.focus = self._compute_focus()
+        self.reach = self._compute_reach()
 
-    def flat(self, points: Array) -> Array:
+    def project_points(self, points: Array) -> Array:
         """Points (k, 3) in ground as they appear in the plane (k, 2)."""
         return np.column_stack((points @ self.right, points @ self.up))
 
-    def _focus(self) -> Array:
+    def _compute_focus(self) -> Array:
         """Return the point (m, 3) that the camera follows: the mass centre of the moving bodies.
 
         Without a moving mass it is the mean of the body origins in the first pose.
@@ -183,15 +183,15 @@ class Film:
         ]
         return np.array(path)
 
-    def _reach(self) -> Array:
+    def _compute_reach(self) -> Array:
         """Return the largest distances (2,) from the focus in the picture, sideways and vertical, m.
 
         Static objects count only if they are not much larger than the moving ones: a walker's
         floor would make the walker tiny.
         """
         moving = still = np.full(2, 0.05)
-        for number, focus in enumerate(self.flat(self.focus)):
-            for moves, corners in self._corners(number):
+        for number, focus in enumerate(self.project_points(self.focus)):
+            for moves, corners in self._iterate_corners(number):
                 away = np.abs(corners - focus).max(axis=0)
                 if moves:
                     moving = np.maximum(moving, away)
@@ -200,18 +200,18 @@ class Film:
                     still = np.maximum(still, away)
         return np.maximum(moving, still) if (still <= SCENERY * moving.max()).all() else moving
 
-    def _corners(self, number: int) -> Iterator[tuple[bool, Array]]:
+    def _iterate_corners(self, number: int) -> Iterator[tuple[bool, Array]]:
         """Yield for each drawn object whether it moves and its points (k, 2) in the picture.
 
         A half space yields only its point below the focus, because it has no extent of its own.
         """
         pose, focus = self.poses[number], self.focus[number]
-        for body, points in self.scene.extent(pose):
+        for body, points in self.scene.iterate_extents(pose):
             if len(points):
-                yield body < -1 or bool(self.moving[body]), self.flat(points)
-        for item in self.scene.drawn():
+                yield body < -1 or bool(self.moving[body]), self.project_points(points)
+        for item in self.scene.iterate_visible_items():
             if item.path in self.scene.half_spaces:
-                placed = pose.matrix(item.body, item.matrix)
+                placed = pose.transform_frame(item.body, item.matrix)
                 # The direction into a half space is its X axis.
                 inward = placed[:3, 0]
                 # A steep plane crosses the line below the focus far away.
@@ -219,7 +219,7 @@ class Film:
                     below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (
                         inward @ self.up
                     )
-                    yield False, self.flat(below[None])
+                    yield False, self.project_points(below[None])
 
 
 class _Painter:
@@ -239,11 +239,11 @@ class _Painter:
         largest = film.pushes.largest
         self.meters_per_newton = LONGEST_ARROW * self.half[1] / largest if largest > 0.0 else 0.0
 
-    def picture(self, number: int) -> Any:
+    def draw_frame(self, number: int) -> Any:
         """Frame `number` as a pillow image."""
         film, pose = self.film, self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)
-        pushes = film.pushes.at(number, pose)
+        pushes = film.pushes.locate_forces(number, pose)
         arrows = [ForceArrow(point, force * self.meters_per_newton) for _, point, force in pushes]
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
         colors = {
@@ -252,10 +252,10 @@ class _Painter:
         frame = draw_scene(
             film.scene, film.q[number], camera, self.size, arrows, Style(None, loaded, colors)
         )
-        self._words(self.pen.Draw(frame), number)
+        self._draw_labels(self.pen.Draw(frame), number)
         return frame
 
-    def _words(self, pen: Any, number: int) -> None:
+    def _draw_labels(self, pen: Any, number: int) -> None:
         width, height = self.size
         ink, force, sky = (to_hex(color) for color in (INK, FORCE, SKY))
         style = {"font": self.font, "fill": ink, "stroke_width": 3, "stroke_fill": sky}
@@ -264,13 +264,13 @@ class _Painter:
         # Pixels per metre.
         pixels = 0.5 * width / self.half[0]
         length = round_down(0.4 * self.half[0])
-        self._bar(pen, 0.03 * width, length * pixels, f"{length:g} m", ink)
+        self._draw_scale_bar(pen, 0.03 * width, length * pixels, f"{length:g} m", ink)
         if self.meters_per_newton > 0.0:
             newtons = round_down(0.4 * self.half[0] / self.meters_per_newton)
             long = newtons * self.meters_per_newton * pixels
-            self._bar(pen, 0.97 * width - long, long, f"{newtons:g} N", force)
+            self._draw_scale_bar(pen, 0.97 * width - long, long, f"{newtons:g} N", force)
 
-    def _bar(self, pen: Any, x: float, length: float, text: str, color: str) -> None:
+    def _draw_scale_bar(self, pen: Any, x: float, length: float, text: str, color: str) -> None:
         y = 0.95 * self.size[1]
         pen.line((x, y, x + length, y), fill=color, width=max(3, round(self.size[1] / 120)))
         middle = x + 0.5 * length, y - 0.015 * self.size[1]

@@ -30,15 +30,15 @@ class Canvas:
         self._depths = np.full(width * height, -np.inf)
 
     # Nothing is drawn: infinitely far away.
-    def solid(self, places: Array, colors: Array) -> None:
+    def draw_opaque(self, places: Array, colors: Array) -> None:
         """Draw triangles.
 
         Args:
             places: position and depth of their corners (t, 3, 3).
             colors: of their corners (t, 3, 3), 0 to 1.
         """
-        for spans in self._spans(places):
-            pixels, which, steps = spans.pixels()
+        for spans in self._iterate_spans(places):
+            pixels, which, steps = spans.to_pixels()
             # 1. The depth of each pixel becomes the largest of all triangles.
             depths = spans.values(places[:, :, 2], which, steps)
             np.maximum.at(self._depths, pixels, depths)
@@ -46,17 +46,17 @@ class Canvas:
             seen = np.flatnonzero(depths == self._depths[pixels])
             self._colors[pixels[seen]] = spans.values(colors, which[seen], steps[seen, None])
 
-    def glassy(self, places: Array, colors: Array, opacities: Array) -> None:
+    def draw_translucent(self, places: Array, colors: Array, opacities: Array) -> None:
         """Draw triangles that let shine through what is behind them; to be called once, after all solid ones.
 
         Args:
-            places: as in :meth:`solid`.
-            colors: as in :meth:`solid`.
+            places: as in :meth:`draw_opaque`.
+            colors: as in :meth:`draw_opaque`.
             opacities: of the triangles (t,), 0 to 1.
         """
         parts: list[tuple[Indices, Array, Array, Array]] = []
-        for spans in self._spans(places):
-            pixels, which, steps = spans.pixels()
+        for spans in self._iterate_spans(places):
+            pixels, which, steps = spans.to_pixels()
             depths = spans.values(places[:, :, 2], which, steps)
             # Only what is in front of the opaque triangles shows.
             seen = np.flatnonzero(depths > self._depths[pixels])
@@ -86,7 +86,7 @@ class Canvas:
                 now
             ]
 
-    def pixels(self, fine: int = 1) -> NDArray[np.uint8]:
+    def to_pixels(self, fine: int = 1) -> NDArray[np.uint8]:
         """Return the picture (height, width, 3), every `fine` times `fine` pixels made one."""
         fields = self._colors.reshape(self.height // fine, fine, self.width // fine, fine, 3)
         # One after the other: numpy takes several times as long for the mean over axes that short.
@@ -98,7 +98,7 @@ class Canvas:
         )
         return result
 
-    def _spans(self, places: Array) -> Iterator[_Spans]:
+    def _iterate_spans(self, places: Array) -> Iterator[_Spans]:
         """Yield the pixels whose centres triangles cover, in portions: row by row, from edge to edge."""
         flat = places[:, :, :2]
         # Degenerate corners give NaN, which the next lines leave out.
@@ -112,7 +112,7 @@ class Canvas:
         bottom = np.floor(high[chosen, 1] - 0.5).clip(-1, self.height - 1).astype(np.int64)
         which, rows = _enumerate_ranges(top, bottom - top + 1)
         triangles = chosen[which]
-        starts, ends = self._ends(flat[triangles], _pixel_centres(rows))
+        starts, ends = self._find_row_ends(flat[triangles], _pixel_centres(rows))
         some = np.flatnonzero(starts <= ends)
         triangles, rows, starts, lengths = (
             triangles[some],
@@ -128,7 +128,7 @@ class Canvas:
             weights = _compute_weights(flat[triangle], _pixel_centres(start), _pixel_centres(row))
             yield _Spans(triangle, row * self.width + start, lengths[part], *weights)
 
-    def _ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
+    def _find_row_ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
         """Return the first and the last pixel of a row that triangles cover, given corners (r, 3, 2) and heights (r,)."""
         left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
         # Each edge that crosses the height of the row limits the span.
@@ -155,7 +155,7 @@ class _Spans(NamedTuple):
     weights: Array  # of the triangle's corners at the first pixel's centre (s, 3)
     changes: Array  # of the weights from one pixel to the next (s, 3)
 
-    def pixels(self) -> tuple[Indices, Indices, Indices]:
+    def to_pixels(self) -> tuple[Indices, Indices, Indices]:
         """Return all pixels of the spans.
 
         Returns:

@@ -35,11 +35,11 @@ from osimlite.simulation.robot.visuals import frame_of
 from osimlite.view.scene import (
     Axes,
     Color,
+    ForceAnchor,
     Item,
     Layer,
     Line,
     LinePoint,
-    Pushed,
     Scene,
     draw_sticks,
 )
@@ -96,7 +96,7 @@ def build_scene(
     Raises:
         SettingError: there is no such wrapping.
     """
-    return _SceneCollector(model, mechanism, folders or MeshFolders(), wrapping).scene()
+    return _SceneCollector(model, mechanism, folders or MeshFolders(), wrapping).collect_scene()
 
 
 class _SceneCollector:
@@ -112,18 +112,18 @@ class _SceneCollector:
         self.items: list[Item] = []
         self.lines: list[Line] = []
         self.axes: list[Axes] = []
-        self.pushed: list[Pushed] = []
+        self.force_anchors: list[ForceAnchor] = []
         self.remarks: list[tuple[str, str]] = []
         # Bodies with a visible shape need no stick.
         self.drawn: set[int] = set()
         self.half_spaces: list[int] = []
 
-    def scene(self) -> Scene:
+    def collect_scene(self) -> Scene:
         for component in self.tree.components:
             path = self.tree.path_of(component) or ""
             with self._remark_failure(path):
                 # One component that cannot be drawn is no reason to draw none.
-                self._component(component, path)
+                self._add_component(component, path)
         # A body without any shape is a stick to what it carries.
         bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
         for body, ends in draw_sticks(self.mechanism, bare):
@@ -146,7 +146,7 @@ class _SceneCollector:
             self.items,
             self.lines,
             self.axes,
-            self.pushed,
+            self.force_anchors,
             frozenset(layer for layer, shown in wanted.items() if shown),
             frozenset(self.items[place].path for place in self.half_spaces),
             self.remarks,
@@ -155,21 +155,21 @@ class _SceneCollector:
         return self._widen_half_spaces(scene)
 
     # ------------------------------------------------------------------------------------- kinds of components
-    def _component(self, component: Component, path: str) -> None:
+    def _add_component(self, component: Component, path: str) -> None:
         match component:
             # Axes of frames are shown as frames, by their own switch.
             case geometry.FrameGeometry():
                 pass
             case geometry.Geometry():
-                self._geometry(component, path)
+                self._add_geometry(component, path)
             case contact.ContactGeometry():
-                self._contact(component, path)
+                self._add_contact(component, path)
             case wrapping.WrapObject():
-                self._wrap(component, path)
+                self._add_wrap(component, path)
             case Marker():
                 body, point = self.mechanism.stations[path]
                 color = self.model.model_visual_preferences.model_display_hints.marker_color
-                self._add(
+                self._add_item(
                     path,
                     "markers",
                     body,
@@ -178,14 +178,14 @@ class _SceneCollector:
                     color,
                 )
             case AbstractGeometryPath():
-                self._path(component, path)
+                self._add_path(component, path)
             case Force():
-                self._force(component, path)
+                self._add_force(component, path)
             # Only frames that are fixed to a body have a place in the mechanism.
             case PhysicalFrame() if path in self.mechanism.frames:
                 self.axes.append(Axes(path, *self.mechanism.frames[path]))
 
-    def _geometry(self, shape: geometry.Geometry, path: str) -> None:
+    def _add_geometry(self, shape: geometry.Geometry, path: str) -> None:
         frame = frame_of(self.tree, shape)
         if frame is None or frame not in self.mechanism.frames:
             raise UnsupportedError("is in a frame that is not fixed to a body")
@@ -195,10 +195,10 @@ class _SceneCollector:
         body, placed = self.mechanism.frames[frame]
         if isinstance(shape, geometry.LineGeometry):
             ends = np.array((shape.start_point, shape.end_point), dtype=float) * scale
-            self._line(path, "geometry", body, placed, ends, look.color, visible)
+            self._add_line(path, "geometry", body, placed, ends, look.color, visible)
             return
-        own, size = self._shape(shape)
-        self._add(
+        own, size = self._make_shape(shape)
+        self._add_item(
             path,
             "geometry",
             body,
@@ -209,8 +209,8 @@ class _SceneCollector:
             visible,
         )
 
-    def _contact(self, surface: contact.ContactGeometry, path: str) -> None:
-        body, placed = self._place(surface, "socket_frame")
+    def _add_contact(self, surface: contact.ContactGeometry, path: str) -> None:
+        body, placed = self._find_placement(surface, "socket_frame")
         here = placed @ make_offset(surface.location, surface.orientation)
         look = surface.appearance
         opacity = CONTACT_OPACITY * look.opacity
@@ -218,10 +218,10 @@ class _SceneCollector:
         if isinstance(surface, contact.ContactHalfSpace):
             self.half_spaces.append(len(self.items))
             opacity = HALF_SPACE_OPACITY * look.opacity
-        own, size = self._shape(surface)
-        self._add(path, "contact", body, own, here @ size, look.color, opacity, visible)
+        own, size = self._make_shape(surface)
+        self._add_item(path, "contact", body, own, here @ size, look.color, opacity, visible)
 
-    def _wrap(self, surface: wrapping.WrapObject, path: str) -> None:
+    def _add_wrap(self, surface: wrapping.WrapObject, path: str) -> None:
         # A wrap object stands in a set of its body.
         frame = self.tree.parent_of(surface)
         while frame is not None and not isinstance(frame, PhysicalFrame):
@@ -230,14 +230,14 @@ class _SceneCollector:
             raise UnsupportedError("is in no frame")
         body, placed = self.mechanism.frames[self.tree.path_of(frame) or ""]
         here = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
-        own, size = self._shape(surface)
+        own, size = self._make_shape(surface)
         look = surface.appearance
         visible = look.visible and look.surface_properties.representation != 0 and surface.active
-        self._add(
+        self._add_item(
             path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible
         )
 
-    def _shape(self, shape: Component) -> tuple[Surface, Array]:
+    def _make_shape(self, shape: Component) -> tuple[Surface, Array]:
         """Return a unit shape, and the matrix (4, 4) that turns it into the shape."""
         match shape:
             case geometry.Brick():
@@ -269,14 +269,14 @@ class _SceneCollector:
                     shape.inner_radius / shape.outer_radius
                 ), _make_stretch((shape.outer_radius,) * 3)
             case geometry.Mesh() | contact.ContactMesh():
-                return self._mesh(
+                return self._read_mesh(
                     shape.mesh_file if isinstance(shape, geometry.Mesh) else shape.filename
                 ), np.eye(4)
             case contact.ContactHalfSpace():
                 return unit_shapes.make_square(), np.eye(4)
         raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
 
-    def _path(self, path: AbstractGeometryPath, name: str) -> None:
+    def _add_path(self, path: AbstractGeometryPath, name: str) -> None:
         owner = self.tree.parent_of(path)
         course = PATH.read(self.builder, owner)
         if not isinstance(course, TraceablePath):
@@ -298,7 +298,7 @@ class _SceneCollector:
             Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon)
         )
 
-    def _force(self, force: Force, path: str) -> None:
+    def _add_force(self, force: Force, path: str) -> None:
         """Add the line of a force between two points, and where the force of a contact is shown."""
         match force:
             case springs.PointToPointSpring():
@@ -323,16 +323,16 @@ class _SceneCollector:
                     for index, word in enumerate(parameters.geometry):
                         # A HuntCrossleyForce names several surfaces.
                         result = self.tree.resolve(Use(parameters, force, spec, word, index)).target
-                        self._push(force.name, path, result, None)
+                        self._add_force_anchor(force.name, path, result, None)
             case contact_forces.SmoothSphereHalfSpaceForce():
                 sphere = self.tree.target(force, "socket_sphere", force.socket_sphere)
                 # Only the load on the sphere is shown; the half space has its opposite.
-                self._push(force.name, path, sphere, "Sphere")
+                self._add_force_anchor(force.name, path, sphere, "Sphere")
 
     def _add_line_between(self, path: str, force: Any, *ends: tuple[str, Any]) -> None:
         points = []
         for name, point in ends:
-            body, placed = self._place(force, name)
+            body, placed = self._find_placement(force, name)
             points.append(
                 LinePoint(body, placed[:3, :3] @ np.array(point, dtype=float) + placed[:3, 3])
             )
@@ -340,7 +340,9 @@ class _SceneCollector:
             Line(path, "springs", tuple(points), SPRING, 0.005, bool(force.appliesForce))
         )
 
-    def _push(self, element: str, path: str, surface: Component | None, label: str | None) -> None:
+    def _add_force_anchor(
+        self, element: str, path: str, surface: Component | None, label: str | None
+    ) -> None:
         if not isinstance(surface, contact.ContactGeometry) or isinstance(
             surface, contact.ContactHalfSpace
         ):
@@ -351,8 +353,8 @@ class _SceneCollector:
         base = self.mechanism.bodies[body].name if body >= 0 else "ground"
         labels = (label,) if label else (frame.name, base, surface.name)
         near = (placed @ make_offset(surface.location, surface.orientation))[:3, 3]
-        self.pushed.append(
-            Pushed(element, path, body, labels, near, self.tree.path_of(surface) or "")
+        self.force_anchors.append(
+            ForceAnchor(element, path, body, labels, near, self.tree.path_of(surface) or "")
         )
 
     # ----------------------------------------------------------------------------------------------- helpers
@@ -364,7 +366,7 @@ class _SceneCollector:
         except OsimliteError as error:
             self.remarks.append((path, error.message))
 
-    def _add(
+    def _add_item(
         self,
         path: str,
         layer: Layer,
@@ -389,7 +391,7 @@ class _SceneCollector:
         if layer == "geometry" and visible:
             self.drawn.add(body)
 
-    def _line(
+    def _add_line(
         self,
         path: str,
         layer: Layer,
@@ -402,7 +404,7 @@ class _SceneCollector:
         points = tuple(LinePoint(body, placed[:3, :3] @ end + placed[:3, 3]) for end in ends)
         self.lines.append(Line(path, layer, points, color, 0.003, visible))
 
-    def _mesh(self, name: str) -> Surface:
+    def _read_mesh(self, name: str) -> Surface:
         """Return the mesh in a file; one object for each file."""
         result = self.folders.find(name)
         if result is None:
@@ -413,21 +415,21 @@ class _SceneCollector:
             self.meshes[result] = read_surface(result)
         return self.meshes[result]
 
-    def _place(self, owner: Component, socket: str) -> tuple[int, Array]:
+    def _find_placement(self, owner: Component, socket: str) -> tuple[int, Array]:
         value = getattr(owner, socket)
         if not value:
             raise ModelError(f"names no frame as {socket}")
         frame = self.tree.target(owner, socket, value)
         return self.mechanism.placement(self.tree.path_of(frame) or "")
 
-    def _coordinate(self, owner: Component, socket: str) -> int:
+    def _find_coordinate(self, owner: Component, socket: str) -> int:
         result = self.tree.target(owner, socket, getattr(owner, socket))
         return self.mechanism.coordinate_index(self.tree.path_of(result) or "")
 
     def _widen_half_spaces(self, scene: Scene) -> Scene:
         """Scale the half spaces of a scene to the size of the model, in place, and return the scene."""
         if self.half_spaces:
-            low, high = scene.box(scene.mechanism.values({}))
+            low, high = scene.compute_box(scene.mechanism.values({}))
             width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(high - low)))
             for place in self.half_spaces:
                 matrix = self.items[place].matrix

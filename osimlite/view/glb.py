@@ -18,9 +18,9 @@ from osimlite import __version__
 from osimlite.base.files import write_atomically
 from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
-from osimlite.view.motion import ShownMotion, at_times, values_of
+from osimlite.view.motion import ShownMotion, get_values, interpolate_columns
 from osimlite.view.picture import FORCE
-from osimlite.view.pushes import LONGEST_ARROW, Pushes
+from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Bodies, Color, Scene
 
 RATE = 60.0
@@ -49,16 +49,16 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         times = (
             recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
         )
-        values = values_of(motion, scene.mechanism)
-        rows = at_times(motion, values, times)
-    poses = [scene.at(row) for row in rows]
+        values = get_values(motion, scene.mechanism)
+        rows = interpolate_columns(motion, values, times)
+    poses = [scene.compute_poses(row) for row in rows]
     # glTF has Y up; the root turns the vertical of the model to it.
     written = _GlbWriter(
         times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
     )
     names = [*(body.name for body in scene.mechanism.bodies), "ground"]
     bodies = [
-        written.node(
+        written.add_node(
             name,
             _Track(
                 [p.origins[k] for p in poses],
@@ -70,14 +70,14 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         )
         for k, name in enumerate(names)
     ]
-    for item in scene.drawn():
+    for item in scene.iterate_visible_items():
         if item.layer != "frames":
             surface = scene.surfaces[item.surface]
-            mesh = written.mesh(surface, item.color, item.opacity)
-            written.shape(bodies[item.body], item.path, mesh, item.matrix)
+            mesh = written.add_mesh(surface, item.color, item.opacity)
+            written.add_shape(bodies[item.body], item.path, mesh, item.matrix)
     for name, color, radius, ends in _list_segments(scene, motion, times, rows, poses):
-        written.node(name, _lay_tubes(ends, radius), written.mesh(_ROUND, color, 1.0))
-    write_atomically(path, written.data(scene.mechanism.name))
+        written.add_node(name, _lay_tubes(ends, radius), written.add_mesh(_ROUND, color, 1.0))
+    write_atomically(path, written.to_bytes(scene.mechanism.name))
     return Path(path)
 
 
@@ -110,13 +110,15 @@ def _list_segments(
             if len(full) == len(poses):
                 for k in range(most - 1):
                     yield line.path, line.color, line.radius, np.array(full)[:, k : k + 2]
-    pushes = Pushes(()) if motion is None else Pushes.of(scene, motion, times)
-    low, high = scene.box(rows[0])
+    pushes = DrawnForces(()) if motion is None else DrawnForces.from_motion(scene, motion, times)
+    low, high = scene.compute_box(rows[0])
     size = float(np.linalg.norm(high - low))
-    for push in pushes.pushes:
-        starts = np.array([push.point(number, bodies) for number, bodies in enumerate(poses)])
+    for push in pushes.forces:
+        starts = np.array(
+            [push.locate_point(number, bodies) for number, bodies in enumerate(poses)]
+        )
         arrows = push.forces * (LONGEST_ARROW * size / max(pushes.largest, 1e-300))
-        yield push.on.path, FORCE, 0.006 * size, np.stack((starts, starts + arrows), axis=1)
+        yield push.anchor.path, FORCE, 0.006 * size, np.stack((starts, starts + arrows), axis=1)
 
 
 def _lay_tubes(ends: Array, radius: float) -> _Track:
@@ -167,9 +169,9 @@ class _GlbWriter:
         self.samplers: list[dict[str, Any]] = []
         self._known: dict[Any, int] = {}
         self._moves = len(times) > 1
-        self._times = self._accessor(times[:, None], bounds=True) if self._moves else 0
+        self._times = self._add_accessor(times[:, None], bounds=True) if self._moves else 0
 
-    def _accessor(
+    def _add_accessor(
         self, array: Array, kind: int = _FLOAT, *, bounds: bool = False, target: int | None = None
     ) -> int:
         data = np.ascontiguousarray(array, dtype="<f4" if kind == _FLOAT else "<u4")
@@ -188,14 +190,14 @@ class _GlbWriter:
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
-    def _once(self, key: Any, into: list[dict[str, Any]], entry: dict[str, Any]) -> int:
+    def _add_once(self, key: Any, into: list[dict[str, Any]], entry: dict[str, Any]) -> int:
         """Return the index of an entry, which is written at its first use."""
         if key not in self._known:
             self._known[key] = len(into)
             into.append(entry)
         return self._known[key]
 
-    def mesh(self, surface: Any, color: Color, opacity: float) -> int:
+    def add_mesh(self, surface: Any, color: Color, opacity: float) -> int:
         """Return the index of a surface in a colour (sRGB)."""
         key = (id(surface), color, opacity)
         if key in self._known:
@@ -214,18 +216,20 @@ class _GlbWriter:
         # Geometry is stored once, whatever the number of its colours.
         geometry = ("geometry", id(surface))
         if geometry not in self._known:
-            self._known[geometry] = self._accessor(surface.points, bounds=True, target=_VERTICES)
-            self._accessor(compute_normals(surface), target=_VERTICES)
-            self._accessor(surface.triangles.reshape(-1, 1), _UINT32, target=_CORNERS)
+            self._known[geometry] = self._add_accessor(
+                surface.points, bounds=True, target=_VERTICES
+            )
+            self._add_accessor(compute_normals(surface), target=_VERTICES)
+            self._add_accessor(surface.triangles.reshape(-1, 1), _UINT32, target=_CORNERS)
         first = self._known[geometry]
         primitive = {
             "attributes": {"POSITION": first, "NORMAL": first + 1},
             "indices": first + 2,
-            "material": self._once((color, opacity), self.materials, material),
+            "material": self._add_once((color, opacity), self.materials, material),
         }
-        return self._once(key, self.meshes, {"primitives": [primitive]})
+        return self._add_once(key, self.meshes, {"primitives": [primitive]})
 
-    def node(self, name: str, track: _Track, mesh: int | None = None) -> int:
+    def add_node(self, name: str, track: _Track, mesh: int | None = None) -> int:
         """Add a node in ground, which moves if it is not the same all the time."""
         place = len(self.nodes)
         node: dict[str, Any] = {"name": name} | ({} if mesh is None else {"mesh": mesh})
@@ -236,20 +240,20 @@ class _GlbWriter:
             node[what] = array[0].tolist()
             # A node that never moves needs no channel.
             if self._moves and np.ptp(array, axis=0).max() > 0.0:
-                self.samplers.append({"input": self._times, "output": self._accessor(array)})
+                self.samplers.append({"input": self._times, "output": self._add_accessor(array)})
                 target = {"node": place, "path": what}
                 self.channels.append({"sampler": len(self.samplers) - 1, "target": target})
         self.nodes.append(node)
         self.nodes[0]["children"].append(place)
         return place
 
-    def shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
+    def add_shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
         """Add a node that is fixed to another: `matrix` (4, 4) in its frame."""
         self.nodes[parent].setdefault("children", []).append(len(self.nodes))
         # Matrices are stored by columns.
         self.nodes.append({"name": name, "mesh": mesh, "matrix": matrix.T.ravel().tolist()})
 
-    def data(self, name: str) -> bytes:
+    def to_bytes(self, name: str) -> bytes:
         """Return the bytes of the complete GLB file."""
         self.nodes[0]["name"] = name
         parts = {

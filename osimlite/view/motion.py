@@ -114,19 +114,19 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
     return result
 
 
-def at_times(motion: ShownMotion, columns: Array, times: Array) -> Array:
+def interpolate_columns(motion: ShownMotion, columns: Array, times: Array) -> Array:
     """Interpolate columns (n, k) of the motion linearly at other times (m,)."""
     recorded = np.asarray(motion.times, dtype=float)
     rows = [np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])]
     return np.array(rows).reshape(len(rows), len(times)).T
 
 
-def values_of(motion: ShownMotion, mechanism: Mechanism) -> Array:
+def get_values(motion: ShownMotion, mechanism: Mechanism) -> Array:
     """Return the coordinate values (n, c) of the motion in the order of the mechanism's coordinates."""
-    return in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
+    return order_columns(motion, mechanism, np.asarray(motion.values, dtype=float))
 
 
-def in_mechanism_order(motion: ShownMotion, mechanism: Mechanism, columns: Array) -> Array:
+def order_columns(motion: ShownMotion, mechanism: Mechanism, columns: Array) -> Array:
     """Return columns (n, k) of the motion in the order of the mechanism's coordinates (n, c), defaults elsewhere."""
     result = np.tile(mechanism.default_state()[0], (len(columns), 1))
     for k, name in enumerate(motion.coordinates):

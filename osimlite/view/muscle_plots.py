@@ -13,7 +13,7 @@ from osimlite.base.files import make_folder
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
-from osimlite.view.panels import COLORS, figure_of, split_sides, style_axes, write_pages
+from osimlite.view.panels import COLORS, make_figure, split_sides, style_axes, write_pages
 from osimlite.view.plots import divide_among_panels
 
 _TITLES = {
@@ -127,7 +127,7 @@ def _draw_lines(
         count = f" ({number} of {pages})" if pages > 1 else ""
         across_page = min(2, len(page))
         down = ceil(len(page) / across_page)
-        figure = figure_of(f"{title}{count}", (6.5 * across_page, 0.6 + 2.9 * down))
+        figure = make_figure(f"{title}{count}", (6.5 * across_page, 0.6 + 2.9 * down))
         axes = figure.subplots(down, across_page, squeeze=False).ravel()
         # Panels that are not needed leave the page.
         for place in axes[len(page) :]:
@@ -187,7 +187,7 @@ def _draw_maps(
         across = min(MAPS_ACROSS, len(indices))
         down = ceil(len(indices) / across)
         count = f" ({number + 1} of {pages})" if pages > 1 else ""
-        figure = figure_of(f"{title}{count}", (1.0 + 2.9 * across, 0.9 + 2.4 * down))
+        figure = make_figure(f"{title}{count}", (1.0 + 2.9 * across, 0.9 + 2.4 * down))
         places = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
         for place in places[len(indices) :]:
             place.remove()

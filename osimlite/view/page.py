@@ -25,8 +25,8 @@ from osimlite.schema.model import Model
 from osimlite.translate.sidecar import replace_non_finite
 from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
-from osimlite.view.motion import ShownMotion, find_moving_bodies, read_activations, values_of
-from osimlite.view.pushes import Pushes
+from osimlite.view.motion import ShownMotion, find_moving_bodies, get_values, read_activations
+from osimlite.view.pushes import DrawnForces
 from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
 
@@ -102,8 +102,8 @@ def page_data(
     mechanism = scene.mechanism
     recorded = None if motion is None else _describe_motion(scene, motion)
     # With a motion the page starts at its first moment.
-    start = q if motion is None else values_of(motion, mechanism)[0]
-    low, high = np.array(scene.box(q) if recorded is None else recorded["box"])
+    start = q if motion is None else get_values(motion, mechanism)[0]
+    low, high = np.array(scene.compute_box(q) if recorded is None else recorded["box"])
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
     # Couplers are solved in the page; others are listed.
@@ -129,7 +129,7 @@ def page_data(
             "floor": _place_floor(scene, start),
             "center": (0.5 * (low + high)).tolist(),
             "size": float(np.linalg.norm(high - low)),
-            "directions": _directions(scene.up),
+            "directions": _list_directions(scene.up),
             "coordinates": _describe_coordinates(
                 mechanism, {item.dependent for item in couplers}, q, recorded
             ),
@@ -233,17 +233,17 @@ def _describe_coordinates(
 def _describe_motion(scene: Scene, motion: ShownMotion) -> dict[str, Any]:
     mechanism = scene.mechanism
     times = np.asarray(motion.times, dtype=float)
-    values = values_of(motion, mechanism)
-    pushes = Pushes.of(scene, motion, times).pushes
+    values = get_values(motion, mechanism)
+    pushes = DrawnForces.from_motion(scene, motion, times).forces
     forces = []
     for push in pushes:
         torques = np.zeros_like(push.forces) if push.torques is None else push.torques
         forces.append(
             {
-                "path": push.on.path,
-                "surface": push.on.surface,
-                "body": push.on.body,
-                "near": push.on.near.tolist(),
+                "path": push.anchor.path,
+                "surface": push.anchor.surface,
+                "body": push.anchor.body,
+                "near": push.anchor.near.tolist(),
                 "values": text_of(np.hstack((push.forces, torques)).astype("<f4")),
             }
         )
@@ -281,10 +281,10 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
     """
     # A few moments suffice to find the extent.
     rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
-    poses = [scene.at(row) for row in rows]
+    poses = [scene.compute_poses(row) for row in rows]
     moves = find_moving_bodies(poses)[:-1]
     middles = np.array([pose.origins[:-1][moves].mean(axis=0) for pose in poses])
-    boxes = np.array([scene.box_of(pose) for pose in poses])
+    boxes = np.array([scene.compute_box_of(pose) for pose in poses])
     travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(
         boxes[0, 1] - boxes[0, 0]
     )
@@ -312,9 +312,9 @@ def _choose_directions(up: Array) -> tuple[Array, Array]:
 
 def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
     """Return the frame whose X-Z plane is the grid: the model's contact half space, or a level floor."""
-    bodies = scene.at(q)
-    for item in scene.drawn():
-        outward = -bodies.matrix(item.body, item.matrix)[:3, 0]
+    bodies = scene.compute_poses(q)
+    for item in scene.iterate_visible_items():
+        outward = -bodies.transform_frame(item.body, item.matrix)[:3, 0]
         size = float(np.linalg.norm(outward))
         # A steep half space is a wall.
         if item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
@@ -324,11 +324,11 @@ def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
             return {"body": item.body, "matrix": _flatten_rows(matrix)}
     front, side = _choose_directions(scene.up)
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack((front, scene.up, side, scene.floor(q) * scene.up))
+    matrix[:3] = np.column_stack((front, scene.up, side, scene.find_floor_height(q) * scene.up))
     return {"body": -1, "matrix": _flatten_rows(matrix)}
 
 
-def _directions(up: Array) -> dict[str, list[float]]:
+def _list_directions(up: Array) -> dict[str, list[float]]:
     """Return the named view directions, from the model towards the viewer, in ground."""
     front, side = _choose_directions(up)
     home = front + 0.35 * up + 1.3 * side

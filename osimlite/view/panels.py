@@ -319,7 +319,7 @@ def _draw_page(
     """Draw the rows of one page."""
     columns = max(len(row) for row in rows)
     width = 11.0 if columns == MAX_COLUMNS else 4.5 + 4.0 * (columns - 1)
-    figure = figure_of(title, (width, 0.75 + 2.35 * len(rows) + (0.25 if note else 0.0)))
+    figure = make_figure(title, (width, 0.75 + 2.35 * len(rows) + (0.25 if note else 0.0)))
     axes = figure.subplots(len(rows), columns, squeeze=False)
     for row, places in zip(rows, axes, strict=True):
         for panel, place in zip(row, places, strict=False):
@@ -430,7 +430,7 @@ def find_title_height(place: Any) -> float | None:
     return 1.0 if 10.0 ** (low + 2) <= largest < 10.0**high else None
 
 
-def figure_of(title: str, size: tuple[float, float]) -> Any:
+def make_figure(title: str, size: tuple[float, float]) -> Any:
     """Return an empty figure of matplotlib.
 
     Args:

@@ -64,7 +64,7 @@ class Camera(NamedTuple):
         """Unit vector (3,) towards the viewer."""
         return np.cross(self.right, self.up)
 
-    def places(self, points: Array, width: int, height: int) -> Array:
+    def project_points(self, points: Array, width: int, height: int) -> Array:
         """Return pixels to the right and down, and depth (m), of points (..., 3) in a picture of that size."""
         away = points - self.center
         x = (away @ self.right / self.half[0] + 1.0) * (0.5 * width)
@@ -72,7 +72,7 @@ class Camera(NamedTuple):
         return np.stack((x, y, away @ self.towards), axis=-1)
 
     @classmethod
-    def around(
+    def from_points(
         cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12
     ) -> Camera:
         """Return the camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
@@ -140,9 +140,9 @@ def draw_scene(
     width, height = _FINE * size[0], _FINE * size[1]
     canvas = Canvas(width, height, np.array(SKY))
     heap = _Heap(camera, width, height)
-    _fill_background(heap, scene, scene.at(q), arrows, style or Style())
-    heap.onto(canvas)
-    return image.fromarray(canvas.pixels(_FINE))
+    _fill_background(heap, scene, scene.compute_poses(q), arrows, style or Style())
+    heap.draw_on(canvas)
+    return image.fromarray(canvas.to_pixels(_FINE))
 
 
 def _fill_background(
@@ -150,32 +150,37 @@ def _fill_background(
 ) -> None:
     if style.floor is not None:
         _lay_floor(heap, scene, style.floor)
-    for item in scene.drawn():
+    for item in scene.iterate_visible_items():
         if item.path in scene.half_spaces:
-            _cut_half_space(heap, bodies.matrix(item.body, item.matrix))
+            _cut_half_space(heap, bodies.transform_frame(item.body, item.matrix))
         loaded = item.path in style.loaded
         color, opacity = (
             (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
         )
-        heap.put(
-            scene.surfaces[item.surface], bodies.matrix(item.body, item.matrix), color, opacity
+        heap.add_surface(
+            scene.surfaces[item.surface],
+            bodies.transform_frame(item.body, item.matrix),
+            color,
+            opacity,
         )
     for line, corners in zip(scene.lines, bodies.lines, strict=True):
         if line.visible and line.layer in scene.shown:
             color = style.colors.get(line.path, line.color)
             # Corners of a line are balls, which close the gaps between cylinders.
             for start, end in pairwise(corners):
-                heap.put(
+                heap.add_surface(
                     unit_shapes.make_cylinder(8), _make_cylinder(start, end, line.radius), color
                 )
             for corner in corners:
-                heap.put(unit_shapes.make_ball(8, 4), _scale_shape(corner, line.radius), color)
+                heap.add_surface(
+                    unit_shapes.make_ball(8, 4), _scale_shape(corner, line.radius), color
+                )
     if "frames" in scene.shown:
         for axes in scene.axes:
-            placed = bodies.matrix(axes.body, axes.matrix)
+            placed = bodies.transform_frame(axes.body, axes.matrix)
             for axis in range(3):
                 end = placed[:3, 3] + axes.length * placed[:3, axis]
-                heap.put(
+                heap.add_surface(
                     unit_shapes.make_cylinder(8),
                     _make_cylinder(placed[:3, 3], end, 0.002),
                     tuple(np.eye(3)[axis].tolist()),
@@ -190,12 +195,12 @@ def _fill_background(
             arrow.point + arrow.vector,
             arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length),
         )
-        heap.put(
+        heap.add_surface(
             unit_shapes.make_cylinder(), _make_cylinder(arrow.point, end, thick), FORCE, front=True
         )
         head = _make_cylinder(end, tip, 2.6 * thick)
         head[:3, 3] = end
-        heap.put(unit_shapes.make_cone(), head, FORCE, front=True)
+        heap.add_surface(unit_shapes.make_cone(), head, FORCE, front=True)
 
 
 def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
@@ -215,7 +220,7 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
         other = (first + k, second - reach), (first + k, second + reach)
         for ends in (one, other):
             start, end = (x * across + z * along + height * up for x, z in ends)
-            heap.put(
+            heap.add_surface(
                 unit_shapes.make_cylinder(4),
                 _make_cylinder(start, end, 0.0012 * half),
                 FLOOR,
@@ -233,7 +238,7 @@ def _cut_half_space(heap: _Heap, placed: Array) -> None:
     along /= np.linalg.norm(along)
     far = 4.0 * max(camera.half)
     start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
-    heap.put(
+    heap.add_surface(
         unit_shapes.make_cylinder(4),
         _make_cylinder(start - far * along, start + far * along, 0.004 * camera.half[1]),
         INK,
@@ -242,7 +247,7 @@ def _cut_half_space(heap: _Heap, placed: Array) -> None:
     below = np.eye(4)
     below[:3, :3] = np.column_stack((camera.towards, far * inward, 2.0 * far * along))
     below[:3, 3] = start + 0.5 * far * inward - 1e3 * camera.towards
-    heap.put(unit_shapes.make_square(), below, EARTH, lit=False)
+    heap.add_surface(unit_shapes.make_square(), below, EARTH, lit=False)
 
 
 class _Heap:
@@ -254,7 +259,7 @@ class _Heap:
         self._glassy: list[tuple[Array, Array, Array]] = []
         self._axes = np.array((camera.right, camera.up, camera.towards))
 
-    def put(
+    def add_surface(
         self,
         surface: Surface,
         matrix: Array,
@@ -266,7 +271,7 @@ class _Heap:
     ) -> None:
         """Add a surface placed in ground by `matrix` (4, 4); `front`: in front of all that is further than 1 km."""
         points = surface.points @ matrix[:3, :3].T + matrix[:3, 3]
-        places = self.camera.places(points, self.width, self.height)
+        places = self.camera.project_points(points, self.width, self.height)
         if front:
             # 1 km towards the viewer.
             places[:, 2] += 1e3
@@ -300,12 +305,16 @@ class _Heap:
         elif opacity > 0.0:
             self._glassy.append((corners, colors, np.full(len(corners), opacity)))
 
-    def onto(self, canvas: Canvas) -> None:
+    def draw_on(self, canvas: Canvas) -> None:
         """Draw all triangles on a canvas: the translucent ones last, over the opaque ones."""
         if self._solid:
-            canvas.solid(*(np.concatenate(column) for column in zip(*self._solid, strict=True)))
+            canvas.draw_opaque(
+                *(np.concatenate(column) for column in zip(*self._solid, strict=True))
+            )
         if self._glassy:
-            canvas.glassy(*(np.concatenate(column) for column in zip(*self._glassy, strict=True)))
+            canvas.draw_translucent(
+                *(np.concatenate(column) for column in zip(*self._glassy, strict=True))
+            )
 
 
 def _make_cylinder(start: Array, end: Array, radius: float) -> Array:

@@ -17,13 +17,13 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.motion import ContactForce, ShownMotion, contact_forces, in_mechanism_order
+from osimlite.view.motion import ContactForce, ShownMotion, contact_forces, order_columns
 from osimlite.view.panels import (
     COLORS,
     STYLES,
     draw_pages,
-    figure_of,
     group_columns,
+    make_figure,
     name_pages,
     render_png,
 )
@@ -93,8 +93,8 @@ def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, 
         parts = {"kinetic": kinetic, "potential of gravity": height}
         return times, {**parts, STORED: np.asarray(known["stored"])}
     places = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_ENERGIES)).astype(int))
-    q = in_mechanism_order(motion, mechanism, np.asarray(motion.values)[places])
-    u = in_mechanism_order(motion, mechanism, np.asarray(motion.speeds)[places])
+    q = order_columns(motion, mechanism, np.asarray(motion.values)[places])
+    u = order_columns(motion, mechanism, np.asarray(motion.speeds)[places])
     kinetic = np.array([mechanism.kinetic_energy(*state) for state in zip(q, u, strict=True)])
     height = np.array([mechanism.potential_energy(row) for row in q])
     return times[places], {"kinetic": kinetic, "potential of gravity": height}
@@ -103,7 +103,7 @@ def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, 
 def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of each page of the plots of a motion."""
     times = np.asarray(motion.times, dtype=float)
-    names = ColumnNames.of_model(getattr(motion, "model", None), mechanism)
+    names = ColumnNames.from_model(getattr(motion, "model", None), mechanism)
     values = np.asarray(motion.values, dtype=float)
     yield from _draw_table(
         "Coordinates", times, dict(zip(motion.coordinates, values.T, strict=True)), names
@@ -157,7 +157,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
     acting = {label: size for label, size in sizes.items() if size.max() > threshold}
     figure, (above, below) = make_sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
-    lines_in(above, times, acting)
+    draw_lines(above, times, acting)
     above.set_ylabel("force (N)")
     above.set_ylim(bottom=0.0)
     for row, size in enumerate(acting.values()):
@@ -177,7 +177,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
 
 def _plot_energy(times: Array, parts: Mapping[str, Array]) -> Any:
     figure, (panel,) = make_sheet("Energy", [3.6])
-    lines_in(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
+    draw_lines(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
     panel.set_ylabel("energy (J)")
     note = "gravity: zero at the origin of the ground"
     if STORED not in parts:
@@ -196,7 +196,7 @@ def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
     Returns:
         The figure and the array of its panels.
     """
-    figure = figure_of(title, (9.0, 0.7 + sum(heights)))
+    figure = make_figure(title, (9.0, 0.7 + sum(heights)))
     grid = {"height_ratios": list(heights)}
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]
     return figure, panels
@@ -215,7 +215,7 @@ def _choose_style(number: int) -> dict[str, Any]:
     return {"color": COLORS[number % len(COLORS)], "ls": style, "lw": 1.6}
 
 
-def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any) -> None:
+def draw_lines(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any) -> None:
     """Draw lines over times, or whatever is across; with a style of their own they are not in the legend."""
     drawn: list[Array] = []
     for number, (label, column) in enumerate(lines.items()):

@@ -72,14 +72,14 @@ def plot_movement(item: Movement) -> Pages:
     from osimlite.io.tables.storage import StoTable
 
     table = StoTable("Coordinates", item.times, item.coordinates, item.in_degrees, in_degrees=True)
-    names = ColumnNames.of_model(getattr(item, "model", None), item.mechanism)
+    names = ColumnNames.from_model(getattr(item, "model", None), item.mechanism)
     return _plot_columns(table, names)
 
 
 def plot_table(item: StoTable) -> Pages:
     """Return the pages of a table over time."""
     motion = getattr(item, "motion", None)
-    return _plot_columns(item, ColumnNames.of_model(None, getattr(motion, "mechanism", None)))
+    return _plot_columns(item, ColumnNames.from_model(None, getattr(motion, "mechanism", None)))
 
 
 def _plot_columns(table: StoTable, names: ColumnNames) -> Pages:

@@ -8,77 +8,86 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import ShownMotion, at_times, contact_forces
-from osimlite.view.scene import Bodies, Pushed, Scene
+from osimlite.view.motion import ShownMotion, contact_forces, interpolate_columns
+from osimlite.view.scene import Bodies, ForceAnchor, Scene
 
 LONGEST_ARROW = 0.4
 """Length of the largest force's arrow as a part of the model's size."""
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
+class DrawnForce:
     """A contact force at n moments, on a body of the scene."""
 
-    on: Pushed  # the element, and the body
+    anchor: ForceAnchor  # the element, and the body
     forces: Array  # (n, 3) in ground, N
     # (n, 3) in ground about the body's origin, N·m, or None if they are not on record
     torques: Array | None
 
-    def point(self, number: int, bodies: Bodies) -> Array:
+    def locate_point(self, number: int, bodies: Bodies) -> Array:
         """Return the point (3,) in ground where the force is drawn.
 
         It is the point of the line of action that is nearest to the middle of the contact surface.
 
         A force F with the moment M about the origin acts along the line through F × M / F².
         """
-        near: Array = bodies.points(self.on.body, self.on.near[None, :])[0]
+        near: Array = bodies.transform_points(self.anchor.body, self.anchor.near[None, :])[0]
         force = self.forces[number]
         square = float(force @ force)
         if self.torques is None or square == 0.0:
             return near
         on_line: Array = (
-            bodies.origins[self.on.body] + np.cross(force, self.torques[number]) / square
+            bodies.origins[self.anchor.body] + np.cross(force, self.torques[number]) / square
         )
         result: Array = on_line + force * (float(force @ (near - on_line)) / square)
         return result
 
 
 @dataclass(frozen=True, eq=False)
-class Pushes:
+class DrawnForces:
     """All contact forces of a motion."""
 
-    pushes: Sequence[Push]
+    forces: Sequence[DrawnForce]
 
     @classmethod
-    def of(cls, scene: Scene, motion: ShownMotion, times: Array) -> Pushes:
+    def from_motion(cls, scene: Scene, motion: ShownMotion, times: Array) -> DrawnForces:
         """Return the recorded forces of a motion at other times (n,).
 
         Surfaces of one element on one body share a record, and are shown once.
         """
         forces = {(force.element, force.frame): force for force in contact_forces(motion)}
-        result: dict[tuple[str, str], Push] = {}
-        for pushed in scene.pushed:
+        result: dict[tuple[str, str], DrawnForce] = {}
+        for anchor in scene.force_anchors:
             key = next(
                 (
                     key
-                    for key in ((pushed.element, label) for label in pushed.labels)
+                    for key in ((anchor.element, label) for label in anchor.labels)
                     if key in forces
                 ),
                 None,
             )
             if key is not None and key not in result:
                 force = forces[key]
-                torques = None if force.torques is None else at_times(motion, force.torques, times)
-                result[key] = Push(pushed, at_times(motion, force.vectors, times), torques)
+                torques = (
+                    None
+                    if force.torques is None
+                    else interpolate_columns(motion, force.torques, times)
+                )
+                result[key] = DrawnForce(
+                    anchor, interpolate_columns(motion, force.vectors, times), torques
+                )
         return cls(list(result.values()))
 
     @property
     def largest(self) -> float:
         """The largest component of any force, N."""
         return max(
-            (float(np.abs(push.forces).max(initial=0.0)) for push in self.pushes), default=0.0
+            (float(np.abs(push.forces).max(initial=0.0)) for push in self.forces), default=0.0
         )
 
-    def at(self, number: int, bodies: Bodies) -> list[tuple[Pushed, Array, Array]]:
+    def locate_forces(self, number: int, bodies: Bodies) -> list[tuple[ForceAnchor, Array, Array]]:
         """Return for each force at a moment where it acts, its point (3,) in ground and the force (3,), N."""
-        return [(push.on, push.point(number, bodies), push.forces[number]) for push in self.pushes]
+        return [
+            (push.anchor, push.locate_point(number, bodies), push.forces[number])
+            for push in self.forces
+        ]

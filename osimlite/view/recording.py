@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.recorded_motion import RecordedMotion
-from osimlite.view.motion import at_times
+from osimlite.view.motion import interpolate_columns
 
 
 class MeasuredMarkers(NamedTuple):
@@ -163,5 +163,7 @@ def _read_speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
 def _find_columns(table: StoTable, times: Array) -> dict[str, Array]:
     if not len(table.times):
         return {}
-    rows = at_times(Recording(table.times, (), table.rows, table.rows), table.rows, times)
+    rows = interpolate_columns(
+        Recording(table.times, (), table.rows, table.rows), table.rows, times
+    )
     return {label: rows[:, index] for index, label in enumerate(table.columns)}

@@ -15,9 +15,9 @@ import numpy as np
 from osimlite.base.files import write_atomically
 from osimlite.base.require import require
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import ShownMotion, activity_color, read_activations, values_of
+from osimlite.view.motion import ShownMotion, activity_color, get_values, read_activations
 from osimlite.view.picture import FORCE
-from osimlite.view.pushes import LONGEST_ARROW, Pushes
+from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Color, Scene
 
 
@@ -39,30 +39,30 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     times, rows = np.zeros(1), q[None, :]
     if motion is not None:
         times = np.asarray(motion.times, dtype=float)
-        rows = values_of(motion, scene.mechanism)
-    poses = [scene.at(row) for row in rows]
+        rows = get_values(motion, scene.mechanism)
+    poses = [scene.compute_poses(row) for row in rows]
     recording = rr.RecordingStream(scene.mechanism.name or "osimlite")
     stream = recording.binary_stream()
 
-    def entity(*parts: str) -> str:
+    def make_entity(*parts: str) -> str:
         # Paths of components begin with a slash, which would make an empty part.
         return str(rr.new_entity_path([word for part in parts for word in part.split("/") if word]))
 
-    def still(name: str, *what: Any) -> None:
+    def log_static(name: str, *what: Any) -> None:
         recording.log(name, *what, static=True)
 
-    def moving(name: str, columns: Any) -> None:
+    def log_columns(name: str, columns: Any) -> None:
         recording.send_columns(name, [rr.TimeColumn("time", duration=times)], columns)
 
-    def strength(name: str, scalars: Array) -> None:
-        moving(name, rr.Scalars.columns(scalars=scalars))
+    def log_scalars(name: str, scalars: Array) -> None:
+        log_columns(name, rr.Scalars.columns(scalars=scalars))
 
     axis = int(np.argmax(np.abs(scene.up)))
     # Rerun knows only axes of the coordinate system as vertical.
     upright = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if scene.up[axis] > 0.0 else 'DOWN'}"
-    still("model", getattr(rr.ViewCoordinates, upright))
+    log_static("model", getattr(rr.ViewCoordinates, upright))
     bodies = [
-        entity("model", path)
+        make_entity("model", path)
         for path in (*(body.path for body in scene.mechanism.bodies), "ground")
     ]
     for k, name in enumerate(bodies):
@@ -70,8 +70,8 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
             [pose.rotations[k] for pose in poses],
             [pose.origins[k] for pose in poses],
         )
-        moving(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
-    for item in scene.drawn():
+        log_columns(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
+    for item in scene.iterate_visible_items():
         surface = scene.surfaces[item.surface]
         points, corners, color = (
             surface.points,
@@ -80,42 +80,42 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         )
         shape = rr.Mesh3D(vertex_positions=points, triangle_indices=corners, albedo_factor=color)
         placed = rr.Transform3D(translation=item.matrix[:3, 3], mat3x3=item.matrix[:3, :3])
-        still(bodies[item.body] + entity(item.path), placed, shape)
+        log_static(bodies[item.body] + make_entity(item.path), placed, shape)
 
     levels = {} if motion is None else read_activations(scene, motion)
     for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
             name, strips = (
-                entity("model", line.layer, line.path),
+                make_entity("model", line.layer, line.path),
                 [pose.lines[index] for pose in poses],
             )
-            still(name, rr.LineStrips3D.from_fields(radii=line.radius))
+            log_static(name, rr.LineStrips3D.from_fields(radii=line.radius))
             level = levels.get(line.path)
             colors = [line.color] * len(poses) if level is None else map(activity_color, level)
-            moving(
+            log_columns(
                 name, rr.LineStrips3D.columns(strips=strips, colors=list(map(_make_colour, colors)))
             )
     if motion is not None:
         for path_of, level in levels.items():
-            strength(entity("activations", path_of), level)
+            log_scalars(make_entity("activations", path_of), level)
         for info, column in zip(scene.mechanism.coordinates, rows.T, strict=True):
-            strength(entity("coordinates", info.name), column)
-        pushes = Pushes.of(scene, motion, times)
-        low, high = scene.box(rows[0])
+            log_scalars(make_entity("coordinates", info.name), column)
+        pushes = DrawnForces.from_motion(scene, motion, times)
+        low, high = scene.compute_box(rows[0])
         size = float(np.linalg.norm(high - low))
         # 1e-300 prevents a division by zero.
         scale = LONGEST_ARROW * size / max(pushes.largest, 1e-300)
-        for push in pushes.pushes:
-            name = entity("forces", push.on.path, push.on.labels[0])
-            starts = [push.point(number, pose) for number, pose in enumerate(poses)]
-            still(
+        for push in pushes.forces:
+            name = make_entity("forces", push.anchor.path, push.anchor.labels[0])
+            starts = [push.locate_point(number, pose) for number, pose in enumerate(poses)]
+            log_static(
                 f"/model{name}",
                 rr.Arrows3D.from_fields(radii=0.006 * size, colors=_make_colour(FORCE)),
             )
-            moving(
+            log_columns(
                 f"/model{name}", rr.Arrows3D.columns(vectors=scale * push.forces, origins=starts)
             )
-            strength(name, np.linalg.norm(push.forces, axis=1))
+            log_scalars(name, np.linalg.norm(push.forces, axis=1))
     layout = require("rerun.blueprint", extra="rerun", purpose="a recording for Rerun")
     curves = [
         layout.TimeSeriesView(origin=kind, name=kind)

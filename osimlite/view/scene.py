@@ -94,7 +94,7 @@ class Axes:
 
 
 @dataclass(frozen=True, eq=False)
-class Pushed:
+class ForceAnchor:
     """Where the force of a contact element is shown: its name, the body and the label in its record, and a point.
 
     `near` (3,) is a point of the body near which the force acts, in the body's frame.
@@ -123,22 +123,24 @@ class Bodies:
         # Paths are traced together, in the order of the lines.
         paths = iter(self.scene.polylines.trace(self.q, self.rotations[:-1], self.origins[:-1]))
         return [
-            np.concatenate([self.points(point.body, point.location[None]) for point in line.course])
+            np.concatenate(
+                [self.transform_points(point.body, point.location[None]) for point in line.course]
+            )
             if isinstance(line.course, tuple)
             else next(paths)
             for line in self.scene.lines
         ]
 
-    def points(self, body: int, points: Array) -> Array:
+    def transform_points(self, body: int, points: Array) -> Array:
         """Points (k, 3) of a body's frame, in ground."""
         return cast("Array", points @ self.rotations[body].T + self.origins[body])
 
-    def matrix(self, body: int, placed: Array) -> Array:
+    def transform_frame(self, body: int, placed: Array) -> Array:
         """Return a transform (4, 4) from a body's frame to ground; it may contain a scale."""
         result = placed.copy()
         # The scale in the upper part is kept.
         result[:3, :3] = self.rotations[body] @ placed[:3, :3]
-        result[:3, 3] = self.points(body, placed[None, :3, 3])[0]
+        result[:3, 3] = self.transform_points(body, placed[None, :3, 3])[0]
         return result
 
 
@@ -151,14 +153,14 @@ class Scene:
     items: Sequence[Item]  # all surfaces in their places
     lines: Sequence[Line]  # all paths, springs and sticks
     axes: Sequence[Axes]  # all frames
-    pushed: Sequence[Pushed] = ()  # where contact forces are shown
+    force_anchors: Sequence[ForceAnchor] = ()  # where contact forces are shown
     # the layers that the model wants to be shown at first
     shown: frozenset[Layer] = frozenset(LAYERS)
     # paths of the half spaces, whose items show a part of them
     half_spaces: frozenset[str] = frozenset()
     remarks: Sequence[tuple[str, str]] = ()  # what cannot be shown, as (component's path, sentence)
 
-    def at(self, q: Array) -> Bodies:
+    def compute_poses(self, q: Array) -> Bodies:
         """Return the poses of all bodies at coordinate values q (n,)."""
         state = self.mechanism.at(q)
         return Bodies(self, state.q, state.rotations, state.origins)
@@ -178,7 +180,7 @@ class Scene:
         size = float(np.linalg.norm(g))
         return -g / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
 
-    def drawn(self) -> Iterator[Item]:
+    def iterate_visible_items(self) -> Iterator[Item]:
         """Return the items that the model does not hide."""
         return (item for item in self.items if item.visible and item.layer in self.shown)
 
@@ -188,7 +190,7 @@ class Scene:
         sizes = np.array(
             [
                 float(np.linalg.norm(np.ptp(corners, axis=0)))
-                for corners in map(self.corners, self.items)
+                for corners in map(self.compute_corners, self.items)
             ]
         )
         usual = np.array(
@@ -202,7 +204,7 @@ class Scene:
             if item.path in self.half_spaces or sizes[k] > limit
         )
 
-    def corners(self, item: Item) -> Array:
+    def compute_corners(self, item: Item) -> Array:
         """Points (k, 3) around an item, in the body's frame: its own if they are few, else corners of a box."""
         points = self.surfaces[item.surface].points
         # Eight corners of a box instead of all points: an outline is enough here.
@@ -211,31 +213,31 @@ class Scene:
         placed: Array = points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
         return placed
 
-    def extent(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
+    def iterate_extents(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
         """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
         # -2 is no body: lines go from body to body.
         for index, item in enumerate(self.items):
             if item.visible and item.layer in self.shown and index not in self.large:
-                yield item.body, bodies.points(item.body, self.corners(item))
+                yield item.body, bodies.transform_points(item.body, self.compute_corners(item))
         for line, corners in zip(self.lines, bodies.lines, strict=True):
             if line.visible and line.layer in self.shown:
                 yield -2 if line.body is None else line.body, corners
 
-    def box(self, q: Array) -> tuple[Array, Array]:
+    def compute_box(self, q: Array) -> tuple[Array, Array]:
         """Compute the bounding box in ground of the drawn objects without scenery.
 
         Returns:
             Least and greatest coordinates (3,), m, widened if the box is a point.
         """
-        return self.box_of(self.at(q))
+        return self.compute_box_of(self.compute_poses(q))
 
-    def box_of(self, bodies: Bodies) -> tuple[Array, Array]:
-        """Compute the bounding box of known poses of the bodies, as `box` does.
+    def compute_box_of(self, bodies: Bodies) -> tuple[Array, Array]:
+        """Compute the bounding box of known poses of the bodies, as `compute_box` does.
 
         Returns:
             Least and greatest coordinates (3,), m, widened if the box is a point.
         """
-        result: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
+        result: list[Array] = [points for _, points in self.iterate_extents(bodies) if len(points)]
         points = np.concatenate(result or [bodies.origins])
         low, high = points.min(axis=0), points.max(axis=0)
         little = (
@@ -246,9 +248,9 @@ class Scene:
         )
         return low - little, high + little
 
-    def floor(self, q: Array) -> float:
+    def find_floor_height(self, q: Array) -> float:
         """Height of the floor over ground's origin: 0, or under what is drawn if that reaches lower."""
-        low, high = self.box(q)
+        low, high = self.compute_box(q)
         lowest, size = (
             float((_box_corners(low, high) @ self.up).min()),
             float(np.linalg.norm(high - low)),
@@ -273,12 +275,12 @@ def draw_sticks(
     """
     everyone = mechanism.bodies
 
-    def joint(index: int) -> LinePoint:
+    def find_joint(index: int) -> LinePoint:
         own = everyone[index].mobilizer
         return LinePoint(index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3])
 
     # Sticks go to the joints of all bodies that it carries.
     for index in bodies:
-        ends = [joint(place) for place, other in enumerate(everyone) if other.parent == index]
+        ends = [find_joint(place) for place, other in enumerate(everyone) if other.parent == index]
         for end in ends or [LinePoint(index, everyone[index].mass_properties.center)]:
-            yield index, (joint(index), end)
+            yield index, (find_joint(index), end)

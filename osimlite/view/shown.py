@@ -20,10 +20,16 @@ from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
 from osimlite.view.incomplete import build_showable, describe_left_out
-from osimlite.view.motion import ShownMotion, activity_color, at_times, read_activations, values_of
+from osimlite.view.motion import (
+    ShownMotion,
+    activity_color,
+    get_values,
+    interpolate_columns,
+    read_activations,
+)
 from osimlite.view.page import Story, page_data, page_text
 from osimlite.view.picture import Camera, ForceArrow, Style, draw_scene
-from osimlite.view.pushes import LONGEST_ARROW, Pushes
+from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.recording import Recording, read_recording
 from osimlite.view.rrd import write_rrd
 from osimlite.view.scene import Color, Scene
@@ -149,16 +155,21 @@ class Shown:
             MissingDependency: pillow is not installed.
         """
         scene, up = self.scene, self.scene.up
-        q, arrows, loaded, colors = self._moment(time)
-        bodies = scene.at(q)
-        seen = [*(p for _, p in scene.extent(bodies) if len(p)), *(a.point[None] for a in arrows)]
+        q, arrows, loaded, colors = self._describe_moment(time)
+        bodies = scene.compute_poses(q)
+        seen = [
+            *(p for _, p in scene.iterate_extents(bodies) if len(p)),
+            *(a.point[None] for a in arrows),
+        ]
         # Of a model without bodies there is ground to see.
-        points = np.concatenate(seen or [np.array(scene.box(q))])
+        points = np.concatenate(seen or [np.array(scene.compute_box(q))])
         # Any direction across the vertical will do if it is the X axis.
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
-        camera = Camera.around(points, up, direction, size[0] / size[1])
-        picture = draw_scene(scene, q, camera, size, arrows, Style(scene.floor(q), loaded, colors))
+        camera = Camera.from_points(points, up, direction, size[0] / size[1])
+        picture = draw_scene(
+            scene, q, camera, size, arrows, Style(scene.find_floor_height(q), loaded, colors)
+        )
         out = io.BytesIO()
         try:
             picture.save(out, Path(path).suffix[1:].upper() or "PNG")
@@ -167,7 +178,7 @@ class Shown:
         write_atomically(path, out.getvalue())
         return Path(path)
 
-    def _moment(
+    def _describe_moment(
         self, time: float | None
     ) -> tuple[Array, list[ForceArrow], frozenset[str], dict[str, Color]]:
         """Coordinate values (n,), arrows, surfaces under load, and colours of muscles, at a time of the motion."""
@@ -182,16 +193,20 @@ class Shown:
                 f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}"
             )
         moment = np.array([first if time is None else time])
-        values = values_of(motion, self.scene.mechanism)
-        q = at_times(motion, values, moment)[0]
+        values = get_values(motion, self.scene.mechanism)
+        q = interpolate_columns(motion, values, moment)[0]
         # The scale of arrows follows the largest force of the whole motion, so that pictures
         # compare.
-        largest = Pushes.of(self.scene, motion, np.asarray(motion.times, dtype=float)).largest
-        low, high = self.scene.box(q)
+        largest = DrawnForces.from_motion(
+            self.scene, motion, np.asarray(motion.times, dtype=float)
+        ).largest
+        low, high = self.scene.compute_box(q)
         scale = (
             LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
         )
-        pushes = Pushes.of(self.scene, motion, moment).at(0, self.scene.at(q))
+        pushes = DrawnForces.from_motion(self.scene, motion, moment).locate_forces(
+            0, self.scene.compute_poses(q)
+        )
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
         levels = read_activations(self.scene, motion).items()
         colors = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from osimlite.base.files import make_folder
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.panels import COLORS, MAX_COLUMNS, MAX_PANELS, figure_of, write_pages
+from osimlite.view.panels import COLORS, MAX_COLUMNS, MAX_PANELS, make_figure, write_pages
 
 MAX_VARIABLES = 12
 """Variables over which a measure is drawn: those with the largest correlation."""
@@ -89,7 +89,7 @@ def _draw_pages(
         down = ceil(len(page) / across)
         count = f" ({number + 1} of {pages})" if pages > 1 else ""
         size = (1.0 + 3.6 * across, 0.7 + 2.8 * down)
-        figure = figure_of(f"{len(known[page[0][0]])} runs{count}", size)
+        figure = make_figure(f"{len(known[page[0][0]])} runs{count}", size)
         places = figure.subplots(down, across, squeeze=False).ravel()
         for place in places[len(page) :]:
             place.remove()

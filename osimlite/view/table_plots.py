@@ -109,7 +109,7 @@ class ColumnNames(NamedTuple):
     regions: Mapping[str, str]  # bodies between which muscles run, by name
 
     @classmethod
-    def of_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> ColumnNames:
+    def from_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> ColumnNames:
         """Return the names of a model; without a model or a mechanism theirs are missing.
 
         Args:

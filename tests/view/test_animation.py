@@ -94,10 +94,15 @@ def test_the_camera_follows_the_mass_centre_of_what_moves():
 def test_all_that_moves_is_in_the_picture():
     film = Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
     seen = 0
-    for pose, focus in zip(film.poses, film.flat(film.focus), strict=True):
-        for item in film.scene.drawn():
+    for pose, focus in zip(film.poses, film.project_points(film.focus), strict=True):
+        for item in film.scene.iterate_visible_items():
             if film.moving[item.body]:
-                away = np.abs(film.flat(pose.points(item.body, film.scene.corners(item))) - focus)
+                away = np.abs(
+                    film.project_points(
+                        pose.transform_points(item.body, film.scene.compute_corners(item))
+                    )
+                    - focus
+                )
                 assert (away <= film.reach + 1e-12).all()
                 seen += 1
     assert seen >= 5 * len(film.poses)
@@ -118,8 +123,8 @@ def test_what_stands_still_is_shown_if_it_is_not_too_large():
     assert [name for name, moves in zip(names, film.moving, strict=False) if moves] == [
         "RightShank"
     ]
-    pelvis = film.flat(film.poses[0].origins[[names.index("Pelvis")]])[0]
-    assert (np.abs(pelvis - film.flat(film.focus)[0]) < film.reach).all()
+    pelvis = film.project_points(film.poses[0].origins[[names.index("Pelvis")]])[0]
+    assert (np.abs(pelvis - film.project_points(film.focus)[0]) < film.reach).all()
 
 
 def test_ground_stays_in_the_picture_of_a_jump():
@@ -137,7 +142,7 @@ def test_ground_stays_in_the_picture_of_a_jump():
         )
         for speed in (1.0, 40.0)
     )
-    highest = jump.flat(jump.focus)[-1, 1]
+    highest = jump.project_points(jump.focus)[-1, 1]
     assert jump.reach[1] == pytest.approx(highest - 0.025, abs=0.01)
     assert drop.reach[1] < 0.8 < jump.reach[1]
 

@@ -100,7 +100,7 @@ def test_lines_go_where_the_scene_says(file_of, open_page, tmp_path):
     # Bent knees: points that come and go, and points that move along with the knee.
     q = mechanism.values({"knee_angle_r": -1.8, "hip_flexion_r": 0.9, "ankle_angle_l": 0.3})
     page.run("v.show(x)", q.tolist())
-    bodies, moved = scene.at(q), 0
+    bodies, moved = scene.compute_poses(q), 0
     for index, expected in enumerate(bodies.lines):
         corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(
             -1, 3
@@ -120,7 +120,7 @@ def test_paths_run_along_geodesics_on_request(shared, open_page, tmp_path):
         wrapping: shown(rajagopal(shared), wrapping=wrapping)
         for wrapping in ("opensim", "geodesic")
     }
-    lines = {wrapping: view.scene.at(view.q).lines for wrapping, view in pages.items()}
+    lines = {wrapping: view.scene.compute_poses(view.q).lines for wrapping, view in pages.items()}
     page = open_page(pages["geodesic"].write_page(tmp_path / "page.html"))
     differing = 0
     for index, (usual, expected) in enumerate(zip(*lines.values(), strict=True)):
@@ -367,12 +367,12 @@ def test_the_camera_has_all_of_a_motion_in_sight_and_follows_what_travels(open_p
 def test_an_arrow_starts_where_the_force_acts(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
     view = Shown.of(model, build_mechanism(model), motion=motion)
-    from osimlite.view.pushes import Pushes
+    from osimlite.view.pushes import DrawnForces
 
     row = 20
-    pushes = Pushes.of(view.scene, motion, motion.times)
-    bodies = view.scene.at(motion.values[row])
-    expected = [point for _, point, force in pushes.at(row, bodies) if force.any()]
+    pushes = DrawnForces.from_motion(view.scene, motion, motion.times)
+    bodies = view.scene.compute_poses(motion.values[row])
+    expected = [point for _, point, force in pushes.locate_forces(row, bodies) if force.any()]
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.run("v.setTime(x)", float(motion.times[row]))
     assert np.array([arrow["at"] for arrow in page.run("v.arrows")]) == pytest.approx(

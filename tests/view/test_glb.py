@@ -14,8 +14,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import RATE, write_glb
-from osimlite.view.motion import in_mechanism_order
-from osimlite.view.pushes import Pushes
+from osimlite.view.motion import order_columns
+from osimlite.view.pushes import DrawnForces
 from tests.view.motions import Recorded, stroll
 
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
@@ -87,18 +87,22 @@ def test_bodies_and_shapes_move(tmp_path):
     times = read.array(read.parts["animations"][0]["samplers"][0]["input"])[:, 0]
     assert len(times) == round(0.5 * RATE) + 1
     assert (times[0], times[-1]) == (0.0, 0.5)
-    values = in_mechanism_order(motion, scene.mechanism, motion.values)
+    values = order_columns(motion, scene.mechanism, motion.values)
     for moment in (0, 11, 30):
         q = [np.interp(times[moment], motion.times, column) for column in values.T]
-        bodies = scene.at(np.array(q))
+        bodies = scene.compute_poses(np.array(q))
         for index, body in enumerate(scene.mechanism.bodies):
             (node,) = read.nodes(body.name)
-            assert np.abs(read.placed(node, moment) - bodies.matrix(index, np.eye(4))).max() < 1e-5
-        for item in scene.drawn():
+            assert (
+                np.abs(read.placed(node, moment) - bodies.transform_frame(index, np.eye(4))).max()
+                < 1e-5
+            )
+        for item in scene.iterate_visible_items():
             shown = [read.placed(node, moment) for node in read.nodes(item.path)]
             assert (
                 min(
-                    np.abs(result - bodies.matrix(item.body, item.matrix)).max() for result in shown
+                    np.abs(result - bodies.transform_frame(item.body, item.matrix)).max()
+                    for result in shown
                 )
                 < 1e-4
             )
@@ -115,11 +119,11 @@ def test_bodies_and_shapes_move(tmp_path):
 def test_forces_are_arrows(tmp_path):
     motion = stroll()
     scene, read = written(dynamic_walker(), tmp_path, motion)
-    pushes = Pushes.of(scene, motion, np.array([0.2]))
-    bodies = scene.at(in_mechanism_order(motion, scene.mechanism, motion.values)[20])
-    tips = [read.placed(place, 12) @ (0.0, 0.0, z, 1.0) for on, _, _ in pushes.at(0, bodies)
+    pushes = DrawnForces.from_motion(scene, motion, np.array([0.2]))
+    bodies = scene.compute_poses(order_columns(motion, scene.mechanism, motion.values)[20])
+    tips = [read.placed(place, 12) @ (0.0, 0.0, z, 1.0) for on, _, _ in pushes.locate_forces(0, bodies)
             for place in read.nodes(on.path) for z in (-0.5, 0.5)]  # fmt: skip
-    for _, point, force in pushes.at(0, bodies):
+    for _, point, force in pushes.locate_forces(0, bodies):
         assert min(np.linalg.norm(tip[:3] - point) for tip in tips) < 1e-5
         if force.any():
             ways = [b - a for a, b in zip(tips[::2], tips[1::2], strict=True) if (a != b).any()]
@@ -141,7 +145,7 @@ def test_paths_have_as_many_pieces_as_corners(corpus, tmp_path):
     scene, read = written(model, tmp_path, motion)
     for place, line in ((k, line) for k, line in enumerate(scene.lines) if line.layer == "paths"):
         for moment, row in enumerate(rows):
-            corners = scene.at(row).lines[place]
+            corners = scene.compute_poses(row).lines[place]
             pieces = [read.placed(place, moment) for place in read.nodes(line.path)]
             ends = [
                 [piece @ (0.0, 0.0, z, 1.0) for z in (-0.5, 0.5)]

@@ -206,13 +206,13 @@ def table(name, columns, **options):
     ],
 )
 def test_columns_have_the_units_of_their_tables(name, label, unit, words):
-    names = ColumnNames.of_model(None, build_mechanism(dynamic_walker()))
+    names = ColumnNames.from_model(None, build_mechanism(dynamic_walker()))
     (column,) = describe_columns(table(name, {label: wave()}), names)
     assert (column.unit, column.name) == (unit, words)
 
 
 def test_angles_are_in_degrees_whatever_the_table_has():
-    names = ColumnNames.of_model(None, build_mechanism(dynamic_walker()))
+    names = ColumnNames.from_model(None, build_mechanism(dynamic_walker()))
     for in_degrees, factor in ((True, 1.0), (False, np.degrees(1.0))):
         item = table("Coordinates", {"RHip_rz": wave()}, in_degrees=in_degrees)
         (column,) = describe_columns(item, names)
@@ -222,7 +222,7 @@ def test_angles_are_in_degrees_whatever_the_table_has():
 def test_muscles_are_grouped_by_the_bodies_that_they_join():
     from osimlite.models.source import make_model
 
-    names = ColumnNames.of_model(make_model("jumper"))
+    names = ColumnNames.from_model(make_model("jumper"))
     assert names.regions["soleus_r"] == "tibia – foot" == names.regions["soleus_l"]
     assert names.units["soleus_r"] == "N"
 
@@ -254,9 +254,9 @@ def test_results_draw_themselves(tmp_path):
 
 def test_rounding_errors_of_a_constant_moment_arm_do_not_show():
     from osimlite.view.muscle_plots import _widen_constant
-    from osimlite.view.panels import figure_of
+    from osimlite.view.panels import make_figure
 
-    place = figure_of("", (4.0, 3.0)).subplots()
+    place = make_figure("", (4.0, 3.0)).subplots()
     place.plot(TIMES, 0.042 + 1e-17 * wave())
     _widen_constant(place)
     low, high = place.get_ylim()

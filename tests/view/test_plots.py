@@ -11,8 +11,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
-from osimlite.view.panels import figure_of
-from osimlite.view.plots import STORED, compute_energies, draw_figures, lines_in
+from osimlite.view.panels import make_figure
+from osimlite.view.plots import STORED, compute_energies, draw_figures, draw_lines
 from tests.view.motions import Recorded, stroll
 
 pytest.importorskip("matplotlib")
@@ -97,9 +97,9 @@ def test_many_coordinates_are_shared_out_to_pages():
 
 
 def test_a_line_that_lies_on_another_lets_it_through():
-    panel, across = figure_of("", (4.0, 3.0)).subplots(), np.linspace(0.0, 1.0, 5)
+    panel, across = make_figure("", (4.0, 3.0)).subplots(), np.linspace(0.0, 1.0, 5)
     gone = np.full(5, np.nan)
-    lines_in(
+    draw_lines(
         panel,
         across,
         {"one": across, "same": across + 1e-5, "other": across**2, "gone": gone, "too": gone},

@@ -12,7 +12,7 @@ import pytest
 from osimlite.errors import MissingDependency
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.view import Shown
-from osimlite.view.pushes import Pushes
+from osimlite.view.pushes import DrawnForces
 from tests.view.motions import stroll
 
 
@@ -30,7 +30,7 @@ def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
     shown = Shown.of(dynamic_walker(), motion=motion)
     scene = shown.scene
     result = read(shown.write_rrd(tmp_path / "walk.rrd"))
-    poses = [scene.at(row) for row in motion.values]
+    poses = [scene.compute_poses(row) for row in motion.values]
     for index, body in enumerate(scene.mechanism.bodies):
         moves = result[f"/model{body.path}"]
         for moment, pose in enumerate(poses):
@@ -43,13 +43,13 @@ def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
     assert [time.total_seconds() for time in moves["time"]] == pytest.approx(motion.times)
     (push,) = [
         item
-        for item in Pushes.of(scene, motion, motion.times).pushes
-        if item.on.element == "RFootForce"
+        for item in DrawnForces.from_motion(scene, motion, motion.times).forces
+        if item.anchor.element == "RFootForce"
     ]
     arrows = result["/model/forces/forceset/RFootForce/RightShank"]
     assert np.allclose(
         arrows["Arrows3D:origins"],
-        [[push.point(k, pose)] for k, pose in enumerate(poses)],
+        [[push.locate_point(k, pose)] for k, pose in enumerate(poses)],
         atol=1e-6,
     )
     size = result["/forces/forceset/RFootForce/RightShank"]["Scalars:scalars"]
@@ -57,7 +57,7 @@ def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
     assert np.allclose(
         np.ravel(result["/coordinates/Pelvis_tx"]["Scalars:scalars"]), motion.values[:, 2]
     )
-    items = [item for item in scene.drawn() if item.body >= 0]
+    items = [item for item in scene.iterate_visible_items() if item.body >= 0]
     meshes = {name for name, parts in result.items() if "Mesh3D:vertex_positions" in parts}
     assert {
         f"/model{scene.mechanism.bodies[item.body].path}{item.path}" for item in items

@@ -119,7 +119,7 @@ def test_a_hidden_shape_is_kept_but_not_drawn():
     shape.appearance.visible = False
     scene, _ = with_shape(shape)
     assert [item.visible for item in scene.items if "Pelvis_geom" in item.path] == [False]
-    assert not [item for item in scene.drawn() if "Pelvis_geom" in item.path]
+    assert not [item for item in scene.iterate_visible_items() if "Pelvis_geom" in item.path]
 
 
 def test_a_line_is_a_line():
@@ -135,8 +135,8 @@ def test_contact_surfaces_are_where_the_forces_find_them():
         for item in scene.items
         if item.layer == "contact" and item.path not in scene.half_spaces
     ]
-    assert len(spheres) == 6 and len(scene.half_spaces) == 1 and len(scene.pushed) == 6
-    foot = next(push for push in scene.pushed if push.element == "LFootForce")
+    assert len(spheres) == 6 and len(scene.half_spaces) == 1 and len(scene.force_anchors) == 6
+    foot = next(push for push in scene.force_anchors if push.element == "LFootForce")
     assert foot.labels[:2] == ("LeftShank", "LeftShank") and foot.near.tolist() == [
         0.0,
         -0.2175,
@@ -166,7 +166,7 @@ def test_a_torus_to_wrap_around_is_where_paths_touch_it():
 
 def test_scenery_does_not_count_for_the_size_of_a_model():
     scene, mechanism = scene_of(dynamic_walker())
-    low, high = scene.box(mechanism.default_state()[0])
+    low, high = scene.compute_box(mechanism.default_state()[0])
     assert {scene.items[place].path.rsplit("/", 1)[1] for place in scene.large} >= {
         "PlatformContact"
     }
@@ -179,7 +179,7 @@ def test_sticks_join_the_joints():
         del body.attached_geometry[:]
     scene, mechanism = scene_of(model)
     q = mechanism.values({})
-    pose = scene.at(q)
+    pose = scene.compute_poses(q)
     lines = {
         line.path.rsplit("/", 1)[1]: corners
         for line, corners in zip(scene.lines, pose.lines, strict=True)
@@ -205,4 +205,6 @@ def test_sticks_go_where_a_joint_moves_what_it_carries():
     scene, mechanism = scene_of(model)
     q = mechanism.values({"femur": 0.5, "tibia": -0.4})
     (femur,) = (k for k, line in enumerate(scene.lines) if line.path == "/bodyset/femur")
-    assert scene.at(q).lines[femur] == pytest.approx(np.array([(0.5, 0.0, 0.0), (0.1, 0.0, 0.0)]))
+    assert scene.compute_poses(q).lines[femur] == pytest.approx(
+        np.array([(0.5, 0.0, 0.0), (0.1, 0.0, 0.0)])
+    )

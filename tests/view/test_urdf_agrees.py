@@ -33,15 +33,15 @@ def test_every_shape_is_where_the_scene_has_it(fixtures, tmp_path):
         place, name = robot.scene.graph[node]
         points = robot.scene.geometry[name].vertices @ place[:3, :3].T + place[:3, 3]
         theirs.append((points.min(axis=0), points.max(axis=0)))
-    bodies = view.scene.at(view.q)
+    bodies = view.scene.compute_poses(view.q)
     ours = []
-    for item in view.scene.drawn():
+    for item in view.scene.iterate_visible_items():
         if item.layer == "geometry":
             points = (
                 view.scene.surfaces[item.surface].points @ item.matrix[:3, :3].T
                 + item.matrix[:3, 3]
             )
-            points = bodies.points(item.body, points)
+            points = bodies.transform_points(item.body, points)
             ours.append((points.min(axis=0), points.max(axis=0)))
     assert len(ours) == len(theirs) == 9
     # Round shapes are cut into triangles differently, by up to 1 % of their size.

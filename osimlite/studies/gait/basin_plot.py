@@ -9,7 +9,7 @@ import numpy as np
 from osimlite.base.files import write_atomically
 from osimlite.studies.gait.basin import Basin
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.panels import figure_of, render_png
+from osimlite.view.panels import make_figure, render_png
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
@@ -33,7 +33,7 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
 
 def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
     """Draw the numbers of steps over the initial states, and return the path of the file."""
-    figure = figure_of("", (6.4, 5.2))
+    figure = make_figure("", (6.4, 5.2))
     axes = figure.subplots()
     half = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
     x, y = basin.x.values, basin.y.values

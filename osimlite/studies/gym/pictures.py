@@ -36,5 +36,7 @@ def draw_pose(simulation: Simulation, q: Array, size: tuple[int, int] = IMAGE_SI
     pose = simulation.mechanism.at(q)
     points = pose.origins[0] + VIEW_BOX_M
     # Almost from the side, a little from above and in front, so that both legs are visible.
-    camera = Camera.around(points, scene.up, np.array([0.15, 0.1, 1.0]), size[0] / size[1])
-    return np.asarray(draw_scene(scene, q, camera, size, (), Style(scene.floor(q))).convert("RGB"))
+    camera = Camera.from_points(points, scene.up, np.array([0.15, 0.1, 1.0]), size[0] / size[1])
+    return np.asarray(
+        draw_scene(scene, q, camera, size, (), Style(scene.find_floor_height(q))).convert("RGB")
+    )
