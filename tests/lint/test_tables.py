@@ -143,6 +143,20 @@ def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
+    ("times", "line"),
+    [("0 0.1 0.2 1e308", 11), ("0 0.1 1e25 1e26", 10), ("-1e308 0 0.1 0.2", 8), ("-1e300 0 1 1e300", 8)],
+)  # fmt: skip
+def test_a_time_that_no_reader_takes_is_an_error(tmp_path, times, line):
+    rows = "".join(f"{time} 0.5\n" for time in times.split())
+    file = tmp_path / "states.sto"
+    file.write_text(
+        f"states\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime knee\n{rows}"
+    )
+    (finding,) = run_rules(load_subject(str(file))).errors
+    assert (finding.code, finding.line) == ("OSIM808", line)
+
+
+@pytest.mark.parametrize(
     ("times", "severity"), [("0 0.1 0.2 0.2", "info"), ("0 0.1 0.1 0.2", "warning")]
 )
 def test_the_last_row_twice_is_how_opensim_ends_some_results(tmp_path, times, severity):

@@ -800,6 +800,14 @@ def magnitudes() -> list[Case]:
             "OSIM207",
             FAILS,
         ),
+        ("short fibers", muscle(millard, optimal_fiber_length="1e-8"), "OSIM207", FAILS),
+        ("shorter fibers", muscle(millard, optimal_fiber_length="1e-30"), "OSIM207", FAILS),
+        (
+            "short fibers of an undamped muscle",
+            muscle(millard, optimal_fiber_length="1e-8", fiber_damping="0"),
+            "",
+            RUNS,
+        ),
         ("a tendon without end", muscle(degroote, tendon_slack_length="1e308"), "OSIM207", FAILS),
         ("fibers that are too stiff", muscle(degroote, fiber_damping="1e308"), "OSIM207", FAILS),
     ]

@@ -26,6 +26,8 @@ MAX_HEADER_BYTES = 1_000_000
 """Number of bytes that are searched for the end of a storage file's header."""
 MAX_LINE_BYTES = 4_000_000
 """Number of bytes of a line that are read."""
+MAX_TIME_S = 1e25
+"""Time beyond which no motion lasts: the fifth power of a step, which splines need, is still finite."""
 
 SUFFIXES = {
     "double": ("",),

@@ -15,13 +15,10 @@ from osimlite.base.lazy import make_plot
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
 from osimlite.errors import DocumentError, OsimliteError, SettingError, SimulationError
-from osimlite.io.tables.headers import list_suffixes
+from osimlite.io.tables.headers import MAX_TIME_S, list_suffixes
 from osimlite.io.tables.table_stream import TableStream
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
-
-MAX_TIME_S = 1e25
-"""Time beyond which no motion lasts: the fifth power of a step, which splines need, is still finite."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from itertools import pairwise
 
 from osimlite.base.text import format_count
 from osimlite.io.document.source import Position
+from osimlite.io.tables.headers import MAX_TIME_S
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
@@ -182,7 +184,7 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
 def report_time_order(table: Table, report: FindingCollector) -> None:
     """A time of a table is not after the one before it.
 
-    Reports rows with the time of the row before, and rows that go back in time.
+    Reports rows with the time of the row before, rows that go back in time, and times beyond 1e25 s.
 
     Of two rows with one time OpenSim keeps the second, without a message; where time goes back the
     rows before are lost, or the tool stops. OpenSim rejects a marker file with either. A repeated
@@ -220,6 +222,16 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
         )
         at = Position(fault.line, fault.column, fault.length)
         report(f"the time {what}{fault.describe_rest()}", at=at, severity=severity)
+    times = table.rows.times
+    # Times grow: what is too large is at the ends. A time that goes back is reported above.
+    far = [row for row in (0, len(times) - 1) if times and abs(times[row]) >= MAX_TIME_S]
+    if far:
+        row = far[0] if len(far) > 1 or far[0] == 0 else bisect_left(times, MAX_TIME_S)
+        report(
+            f"the time {times[row]:g} s is no time of a motion: splines through the table overflow, "
+            "and osimlite does not read it",
+            at=Position(table.rows.line_of(row), 1),
+        )
 
 
 @rule("OSIM809", "time-gap", severity=WARNING, about="table")
