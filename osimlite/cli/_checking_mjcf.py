@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.cli._console import add_row, create_console, create_table, say
+from osimlite.cli._console import add_row, create_table, print_table, say
 
 
 def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
@@ -22,7 +22,7 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
     from osimlite.translate.mjcf.check import check_mjcf
 
     result = check_mjcf(read(file), mjcf)
-    create_console().print(_make_table(result, mjcf.name))
+    print_table(_make_table(result, mjcf.name))
     if result.missing:
         say(f"not in it: {join_words(list(result.missing), most=6)}")
     if result.coordinates:

@@ -249,6 +249,121 @@ def add_row(table: Table, *cells: str) -> None:
     table.add_row(*map(escape_unprintable, cells))
 
 
+TEXT_COLUMN_GAP = 2
+"""Blanks between the columns of a table."""
+CELL_COLOURS = {"good": "\033[32m", "okay": "\033[33m", "bad": "\033[31m"}
+"""Colours of cells that are one of these words, where output is coloured."""
+
+
+def print_table(table: Table) -> None:
+    """Print a table made by :func:`create_table` without breaking any word or path.
+
+    Cells are wrapped between words. Where even the longest words do not fit beside each other, each
+    row becomes a block: its first cell, and below it the others with their headings.
+
+    Args:
+        table: the table.
+    """
+    columns = table.columns
+    heads = [str(column.header) for column in columns]
+    rows = [*zip(*([str(cell) for cell in column.cells] for column in columns), strict=True)]
+    # Letters of other scripts may be twice as wide, which only rich knows.
+    if not all(text.isascii() or text.isprintable() for row in [heads, *rows] for text in row):
+        create_console().print(table)
+        return
+    if table.title:
+        italic, end = ("\033[3m", "\033[0m") if wants_colour() else ("", "")
+        show(f"{italic}{table.title}{end}\n")
+    widths = _choose_widths([heads, *rows], count_columns())
+    has_gaps = table.padding[2] > 0
+    for number, row in enumerate([heads, *rows] if any(heads) else rows):
+        is_heading = number == 0 and any(heads)
+        if widths is None:
+            lines = [] if is_heading else _list_block_lines(heads, row)
+        else:
+            lines = _list_row_lines(
+                row, widths, [column.justify == "right" for column in columns], bold=is_heading
+            )
+        for line in lines:
+            show(f"{line.rstrip()}\n")
+        if has_gaps and lines:
+            show("\n")
+
+
+def _choose_widths(rows: Sequence[Sequence[str]], width: int) -> list[int] | None:
+    """Return the widths of columns; None if their longest words do not fit beside each other.
+
+    Args:
+        rows: cells of all rows.
+        width: width of the terminal.
+    """
+    cells = [*zip(*rows, strict=True)]
+    longest = [max(len(cell) for cell in column) for column in cells]
+    least = [
+        max((len(word) for cell in column for word in cell.split()), default=0) for column in cells
+    ]
+    left = width - TEXT_COLUMN_GAP * (len(cells) - 1)
+    if sum(longest) <= left:
+        return longest
+    left -= sum(least)
+    if left < 0:
+        return None
+    # Equal parts of the width that is left, of which columns that need less leave the rest to others.
+    widths = [*least]
+    order = sorted(range(len(cells)), key=lambda index: longest[index] - least[index])
+    for number, index in enumerate(order):
+        part = min(longest[index] - least[index], left // (len(order) - number))
+        widths[index] += part
+        left -= part
+    return widths
+
+
+def _list_row_lines(
+    row: Sequence[str], widths: Sequence[int], is_right: Sequence[bool], *, bold: bool
+) -> list[str]:
+    """Return the lines of a row whose cells are wrapped between words.
+
+    Args:
+        row: its cells.
+        widths: widths of the columns.
+        is_right: whether each column is aligned to the right.
+        bold: whether the row is bold where output is coloured.
+    """
+    from itertools import zip_longest
+
+    is_coloured = wants_colour()
+    cells = []
+    for text, width in zip(row, widths, strict=True):
+        cells.append(_wrap_words(text, max(width, 1)))
+    lines = []
+    for parts in zip_longest(*cells, fillvalue=""):
+        words = []
+        for part, width, right in zip(parts, widths, is_right, strict=True):
+            padded = f"{part:>{width}}" if right else f"{part:{width}}"
+            colour = "\033[1m" if bold else CELL_COLOURS.get(part, "")
+            words.append(f"{colour}{padded}\033[0m" if is_coloured and colour else padded)
+        lines.append((" " * TEXT_COLUMN_GAP).join(words))
+    return lines
+
+
+def _list_block_lines(heads: Sequence[str], row: Sequence[str]) -> list[str]:
+    """Return the lines of a row that does not fit beside each other."""
+    width = max(count_columns() - 4, 10)
+    lines = _wrap_words(row[0], max(count_columns() - 1, 10))
+    for head, text in zip(heads[1:], row[1:], strict=True):
+        if text:
+            words = f"{head}: {text}" if head else text
+            lines += [f"    {line}" for line in _wrap_words(words, width)]
+    return lines
+
+
+def _wrap_words(text: str, width: int) -> list[str]:
+    """Return the lines of a text, broken between words only."""
+    from textwrap import wrap
+
+    return wrap(text, width, break_on_hyphens=False, break_long_words=False)
+
+
 class FactTable:
     """Table of two columns: names, and what is stated about each."""
 

@@ -12,7 +12,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_json, join_words, suggest_name
 from osimlite.base.writing import write_into
 from osimlite.cli import _options as options
-from osimlite.cli._console import add_row, create_console, create_table, say
+from osimlite.cli._console import add_row, create_table, print_table, say
 from osimlite.cli._fidelity_table import tabulate
 from osimlite.errors import SettingError
 from osimlite.translate.exporters import EXPORTERS, Exporter
@@ -402,7 +402,7 @@ def _get_relative(path: Path, folder: Path) -> str:
 def report(request: Request, result: Conversion) -> None:
     """Print what was lost, and which files were written."""
     if len(result.fidelity):
-        create_console().print(tabulate(result.fidelity, request.target))
+        print_table(tabulate(result.fidelity, request.target))
     same, changed, dropped = result.fidelity.counts()
     say(f"parts: {same} exact, {changed} approximated or converted, {dropped} left out")
     say("wrote " + join_words([str(path) for path in result.files], most=4))
@@ -435,4 +435,4 @@ def print_formats() -> None:
         if name not in importers:
             title = exporter.title or name.upper()
             add_row(table, name, exporter.suffix, "out", f"{title}: {exporter.carries}")
-    create_console().print(table)
+    print_table(table)

@@ -185,6 +185,16 @@ Plot = Annotated[
         help="Draw the results as PNG: left and right in one panel, at most 12 panels a page.",
     ),
 ]
+Band = Annotated[
+    Path | None,
+    Option(
+        "--band",
+        metavar="FILE.csv",
+        help="With --plot: draw mean and standard deviation over the gait cycle behind the curves; columns are per "
+        "cent, NAME_mean and NAME_sd.",
+        show_default=False,
+    ),
+]
 Geometry = Annotated[
     list[Path] | None,
     Option(

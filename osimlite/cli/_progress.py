@@ -16,18 +16,23 @@ from osimlite.cli._console import before_output, complain, count_columns, get_ra
 
 SILENT_S = 0.5
 """Time without any output after which the line appears, s."""
+FIRST_SILENT_S = 0.25
+"""The same for the first line of a command, s: starting Python and its packages took the rest."""
 REDRAW_S = 0.1
 """Time between two states of the line, s."""
 ESTIMATE_S = 1.0
 """Work that took less than this says nothing about the time left, s."""
-LONG_S = 30.0
+LONG_S = 10.0
 """Work of this duration says in logs and pipes, once, how far it is, and when it ends, s."""
 
 INTERACTIVE = ("demo", "lsp", "view")
 """Commands that wait for people or editors."""
 
 ACTIVITIES = {
+    "build": "building",
     "check-trial": "checking",
+    "convert": "converting",
+    "diff": "comparing",
     "find-gait": "searching",
     "fit": "fitting",
     "format": "formatting",
@@ -36,6 +41,7 @@ ACTIVITIES = {
     "info": "reading",
     "inverse-dynamics": "computing moments",
     "kinematics": "computing positions",
+    "modify": "modifying",
     "muscles": "computing muscles",
     "optimize": "searching",
     "run": "running",
@@ -45,6 +51,7 @@ ACTIVITIES = {
     "static-optimization": "computing muscle forces",
     "sweep": "sweeping",
     "translate": "translating",
+    "upgrade": "upgrading",
     "validate": "checking",
 }
 """What commands do until they say more, in words."""
@@ -59,6 +66,7 @@ class _Task:
         unit: unit of the amounts, with a blank before it.
         done: how much is done.
         details: more about the state, in words.
+        part: the piece of work that the library reports on now; None without.
     """
 
     def __init__(self, title: str, total: float | None, unit: str = "") -> None:
@@ -67,22 +75,34 @@ class _Task:
         self.done = 0.0
         self.details = ""
         self.is_told = False
+        self.part: _Task | None = None
 
     def receive(self, title: str, done: float, total: float, unit: str) -> None:
-        """Take over what the library reports."""
-        # A new stage starts its own clock, from which the time left is computed.
-        if title != self.title:
-            self.title, self.started, self.details = title, time.monotonic(), ""
-        self.done, self.total, self.unit = float(done), total, unit
+        """Take over what the library reports about a part of the task."""
+        if self.part is None or title != self.part.title or done < self.part.done:
+            self.part = _Task(title, total, unit)
+        self.part.done, self.part.total, self.part.unit = float(done), total, unit
+        # Finished parts say nothing about what follows.
+        if 0.0 < total <= done:
+            self.part = None
 
     def describe(self, now: float) -> str:
         """Return the task, how far it is, and the time left."""
+        if self.part is not None:
+            words = self.part.describe(now)
+            is_one_of_many = self.total is not None and self.total > 1.0
+            return escape_unprintable(
+                f"{self.title}, {_format(self.done)} of {_format(self.total or 0.0)} done; {words}"
+                if is_one_of_many
+                else words
+            )
         elapsed = now - self.started
         parts = []
         if self.total and self.done:
             part = min(1.0, self.done / self.total)
-            amount = f"{_format(self.done)} of {_format(self.total)}{self.unit}"
-            parts += [f"{100.0 * part:.0f} % ({amount})"]
+            amount = f" ({_format(self.done)} of {_format(self.total)}{self.unit})"
+            # A total of 1 is a part of the work, which has no unit.
+            parts += [f"{100.0 * part:.0f} %{amount if self.total != 1.0 else ''}"]
             if self.details:
                 parts.append(self.details)
             if elapsed > ESTIMATE_S and 0.0 < part < 1.0:
@@ -118,6 +138,22 @@ class _Line:
         self._lock = threading.RLock()
         self._thread: threading.Thread | None = None
 
+    def receive(self, title: str, done: float, total: float, unit: str) -> None:
+        """Take over what the library reports about the current task."""
+        if self.tasks:
+            self.tasks[-1].receive(title, done, total, unit)
+            self.update(self.tasks[-1])
+
+    def update(self, task: _Task) -> None:
+        """Show a task that has changed; in a log or a pipe, once and only if it takes long."""
+        if self.is_terminal():
+            self.draw()
+            return
+        now = time.monotonic()
+        if not task.is_told and now - task.started > LONG_S:
+            task.is_told = True
+            complain(task.describe(now))
+
     def is_terminal(self) -> bool:
         """Return whether standard error is a terminal that can erase a line."""
         # A "dumb" terminal has no carriage return that overwrites.
@@ -126,7 +162,7 @@ class _Line:
     def start(self) -> None:
         """Redraw the line in the background, while the program computes."""
         if self._thread is None and self.is_terminal():
-            before_output(self.erase)
+            before_output(self.make_room)
             if hasattr(os, "register_at_fork"):
                 # A child has the line of its parent, but not the thread.
                 os.register_at_fork(after_in_child=self.abandon)
@@ -164,12 +200,22 @@ class _Line:
         finally:
             self._lock.release()
 
-    def erase(self) -> None:
+    def hasten(self) -> None:
+        """Show the line of a command that has just started earlier than other lines."""
+        self._last_output = time.monotonic() - (SILENT_S - FIRST_SILENT_S)
+
+    def make_room(self) -> None:
         """Remove the line, since something else is printed."""
+        self._last_output = time.monotonic()
+        self.erase()
+
+    def erase(self) -> None:
+        """Remove the line."""
         with self._lock:
-            self._last_output = time.monotonic()
             if self._shown:
-                self._write(f"\r{'':{self._shown}}\r")
+                # Terminals write ^C for Ctrl-C behind the line.
+                width = min(self._shown + len("^C"), count_columns())
+                self._write(f"\r{'':{width}}\r")
                 self._shown = 0
 
     def _write(self, text: str) -> None:
@@ -183,17 +229,34 @@ class _Line:
 _line = _Line()
 _stack = ExitStack()
 """Listeners of the command."""
+_is_listening = False
+"""Whether what the library reports is passed on."""
 
 
 def watch_command(name: str) -> None:
     """Show what a command does while it prints nothing, at a terminal only."""
     if name not in INTERACTIVE:
-        from osimlite.base.progress import listen_to_progress
-
-        task = _Task(ACTIVITIES.get(name, "working"), None)
-        _line.tasks.append(task)
-        _stack.enter_context(listen_to_progress(task.receive))
+        _line.tasks.append(_Task(ACTIVITIES.get(name, "working"), None))
+        _line.hasten()
+        _stack.enter_context(_listen())
         _line.start()
+
+
+@contextmanager
+def _listen() -> Iterator[None]:
+    """Pass what the library reports to the current task, once even if contexts are nested."""
+    global _is_listening
+    if _is_listening:
+        yield
+        return
+    from osimlite.base.progress import listen_to_progress
+
+    _is_listening = True
+    try:
+        with listen_to_progress(_line.receive):
+            yield
+    finally:
+        _is_listening = False
 
 
 def finish_command() -> None:
@@ -231,15 +294,13 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
             elapsed = max(now - task.started, 1e-9)
             # A function of the rate is called here, where the rate is known.
             task.details = more(task.done / elapsed) if callable(more) else str(more)
-        if _line.is_terminal():
-            _line.draw()
-        # Logs get one line when work turns out to be long, not one for each step.
-        elif not task.is_told and now - task.started > LONG_S:
-            task.is_told = True
-            complain(task.describe(now))
+        # What the library reported about the item that is done says nothing about the next.
+        task.part = None
+        _line.update(task)
 
     try:
-        yield advance
+        with _listen():
+            yield advance
     finally:
         # `watch_command` may have removed all tasks at the end of the program.
         if task in _line.tasks:

@@ -65,8 +65,25 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
     say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
 
 
-def require_plots(*, plot: bool) -> None:
-    """Raise MissingDependency if pictures are requested, but matplotlib is not installed."""
+def require_plots(*, plot: bool, band: Path | None = None) -> None:
+    """Raise an error if requested pictures cannot be drawn.
+
+    Args:
+        plot: whether pictures are requested.
+        band: file of reference bands, which is read to find errors early; None without.
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+        SettingError: there are bands, but no pictures.
+        DocumentError: the file has no bands.
+    """
+    if band is not None:
+        from osimlite.errors import SettingError
+        from osimlite.view.bands import read_bands
+
+        if not plot:
+            raise SettingError("--band is drawn into the pictures of --plot; add --plot")
+        read_bands(band)
     if plot:
         from osimlite.base.require import require
 
@@ -81,6 +98,7 @@ def draw_tables(
     loads: Any = None,
     *,
     err: bool = False,
+    band: Path | None = None,
 ) -> list[Path]:
     """Draw tables into a folder, and say how many pictures there are.
 
@@ -91,17 +109,20 @@ def draw_tables(
         mechanism: mechanism of the model, for units of coordinates.
         loads: file of measured loads, in which steps are searched; None without.
         err: whether to report on standard error.
+        band: file of reference bands; None without.
 
     Returns:
         The PNG files.
     """
     from osimlite.cli._progress import progress_bar
+    from osimlite.view.bands import read_bands
     from osimlite.view.table_plots import ColumnNames, plot_tables
 
     with progress_bar("drawing", len(tables)) as progress:
         names = ColumnNames.from_model(model, mechanism)
         steps = _find_steps(loads, mechanism)
-        written = plot_tables(tables, folder, names, steps=steps, report=progress)
+        bands = None if band is None else read_bands(band)
+        written = plot_tables(tables, folder, names, steps=steps, report=progress, bands=bands)
     say(describe_pictures(written), err=err)
     return written
 

@@ -78,7 +78,7 @@ def _show_verdicts(report: TrialReport) -> None:
     """Print the worst value of each quantity, grouped by file."""
     from itertools import groupby
 
-    from osimlite.cli._console import add_row, create_console, create_table, show
+    from osimlite.cli._console import add_row, create_table, print_table, show
 
     for file, verdicts in groupby(report.worst, key=lambda verdict: verdict.file):
         table = create_table()
@@ -89,5 +89,5 @@ def _show_verdicts(report: TrialReport) -> None:
         for verdict in verdicts:
             add_row(table, verdict.verdict, verdict.shown, verdict.limits, verdict.words)
         show(f"{file}\n")
-        create_console().print(table)
+        print_table(table)
         show("\n")

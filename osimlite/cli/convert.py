@@ -87,6 +87,7 @@ def convert(
     Example: osimlite convert gait.osim -o robot/gait.urdf
     """
     from osimlite.cli import _converting as converting
+    from osimlite.cli._progress import progress_bar
     from osimlite.errors import SettingError
 
     if formats:
@@ -96,4 +97,6 @@ def convert(
         raise SettingError("name a file to convert; --formats lists the formats")
     given = {name: value for name, value in chosen.items() if value is not None}
     request = converting.Request.create(file, output, source, target)
-    converting.report(request, request.carry_out(motion, geometry, given, overwrite=overwrite))
+    with progress_bar("converting", None):
+        result = request.carry_out(motion, geometry, given, overwrite=overwrite)
+    converting.report(request, result)

@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple
 from osimlite.base.cores import count_cores
 from osimlite.base.require import SAFE_PATH
 from osimlite.cli._command import Argument, command
-from osimlite.cli._console import add_row, create_console, create_table, say
+from osimlite.cli._console import add_row, create_table, print_table, say
 from osimlite.cli._kernels import explain_kernels
 from osimlite.cli._progress import progress_bar
 
@@ -163,7 +163,7 @@ def doctor(
         add_row(table, extra or "(none)", ", ".join(uses[extra]), words)
         if extra and missing:
             table.add_row("", "", Text(f"pip install 'osimlite[{extra}]'", style="bold"))
-    create_console().print(table)
+    print_table(table)
 
     say()
     _print_mesh_folders(model)

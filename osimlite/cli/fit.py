@@ -51,21 +51,23 @@ def fit(
     """
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.cli._console import say
+    from osimlite.cli._progress import progress_bar
     from osimlite.fitting.person import fit as fitted
     from osimlite.fitting.person_files import create_person_files
     from osimlite.io.document.reader import read
 
-    person = fitted(
-        read(file),
-        {str(path): path for path in trials},
-        static,
-        weights=options.parse_named_numbers(weight, "--weight"),
-        held=held,
-        by_axis=by_axis,
-        symmetric=not sides,
-        frames=frames,
-        mass=mass,
-    )
+    with progress_bar("fitting", None):
+        person = fitted(
+            read(file),
+            {str(path): path for path in trials},
+            static,
+            weights=options.parse_named_numbers(weight, "--weight"),
+            held=held,
+            by_axis=by_axis,
+            symmetric=not sides,
+            frames=frames,
+            mass=mass,
+        )
     folder = options.choose_output_folder(file, output)
     texts = create_person_files(person, file, folder, mass)
     make_folder(folder)

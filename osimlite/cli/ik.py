@@ -48,6 +48,7 @@ def ik(
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
+    from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import draw_tables, require_plots
     from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
     from osimlite.fitting.ik_tool import create_motion_table
@@ -66,16 +67,17 @@ def ik(
     )
     of_sensors = holds_orientations(trial)
     model, data = read(file), None if of_sensors else MarkerData.from_source(trial)
-    motion = inverse_kinematics(
-        model,
-        data,
-        orientations=trial if of_sensors else None,
-        weights=weights,
-        coordinates=kept,
-        constraints=not free,
-        start=first,
-        end=last,
-    )
+    with progress_bar("fitting the motion", None):
+        motion = inverse_kinematics(
+            model,
+            data,
+            orientations=trial if of_sensors else None,
+            weights=weights,
+            coordinates=kept,
+            constraints=not free,
+            start=first,
+            end=last,
+        )
     folder = options.choose_output_folder(file, output)
     make_folder(folder)
     table = create_motion_table(motion)

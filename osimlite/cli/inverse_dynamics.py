@@ -25,6 +25,7 @@ def inverse_dynamics(
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
     plot: options.Plot = False,
+    band: options.Band = None,
     output: options.Folder = None,
     **chosen: Any,
 ) -> None:
@@ -37,26 +38,28 @@ def inverse_dynamics(
 
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml
     """
+    from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import draw_tables, require_plots, write_results
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import inverse_dynamics as forces_of
 
-    require_plots(plot=plot)
+    require_plots(plot=plot, band=band)
     model = read(file)
-    table = forces_of(
-        model,
-        motion,
-        applied_to=options.parse_applied_loads(applied),
-        exclude=exclude or ["Muscles"],
-        lowpass=lowpass,
-        start=first,
-        end=last,
-        folder=file.parent,
-        **chosen,
-    )
+    with progress_bar("computing moments", None):
+        table = forces_of(
+            model,
+            motion,
+            applied_to=options.parse_applied_loads(applied),
+            exclude=exclude or ["Muscles"],
+            lowpass=lowpass,
+            start=first,
+            end=last,
+            folder=file.parent,
+            **chosen,
+        )
     assert table.motion is not None
     folder, tables = options.choose_output_folder(file, output), {"inverse_dynamics.sto": table}
     write_results(table.motion, tables, folder)
     if plot:
         loads = chosen.get("external_loads")
-        draw_tables(tables, folder, model, table.motion.mechanism, loads)
+        draw_tables(tables, folder, model, table.motion.mechanism, loads, band=band)

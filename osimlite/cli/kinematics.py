@@ -33,14 +33,18 @@ def kinematics(
 
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """
+    from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import draw_tables, require_plots, write_results
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import kinematics as followed
 
     require_plots(plot=plot)
     model = read(file)
-    recorded = followed(model, motion, assemble=assemble, lowpass=lowpass, start=first, end=last)
-    tables = {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}
+    with progress_bar("computing positions", None):
+        recorded = followed(
+            model, motion, assemble=assemble, lowpass=lowpass, start=first, end=last
+        )
+        tables = {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}
     folder = options.choose_output_folder(file, output)
     write_results(recorded, tables, folder, trc=trc)
     if plot:

@@ -59,7 +59,7 @@ def modify(
     """
     from osimlite.base.files import make_folder_of
     from osimlite.base.text import format_count
-    from osimlite.cli._console import add_row, create_console, create_table, say
+    from osimlite.cli._console import add_row, create_table, print_table, say
     from osimlite.errors import DocumentError, SettingError
     from osimlite.fitting.modifying.operators import process_model
     from osimlite.fitting.modifying.words import find_change
@@ -123,5 +123,5 @@ def modify(
                 str(item.order),
                 *(f"{1e3 * number:.3f}" for number in numbers),
             )
-        create_console().print(table)
+        print_table(table)
     say(f"{target}: {format_count(len(list(model.components())), 'component')}")

@@ -215,7 +215,7 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
     import numpy as np
 
     from osimlite.base.text import format_range
-    from osimlite.cli._console import add_row, create_console, create_table, say
+    from osimlite.cli._console import add_row, create_table, print_table, say
 
     first, *others = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
@@ -251,7 +251,7 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
         )
     for row in zip(*columns, strict=True):
         add_row(table, *row)
-    create_console().print(table)
+    print_table(table)
     # NaN marks poses without an equilibrium.
     unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
     if unsettled:

@@ -60,6 +60,7 @@ def scale(
     # Numpy and the fitting package are imported only when the command runs, so that help is fast.
     from osimlite.base.files import make_folder_of
     from osimlite.cli._console import say
+    from osimlite.cli._progress import progress_bar
     from osimlite.errors import SettingError
     from osimlite.fitting.scale_tool import scale as scaled
     from osimlite.io.document.printer import write
@@ -82,17 +83,18 @@ def scale(
     # Without any of these the model would be written unchanged.
     if not (measurements or factors or place or mass > 0.0):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
-    result = scaled(
-        read(file),
-        static,
-        measurements=measurements,
-        factors=factors,
-        mass=mass,
-        preserve_mass_distribution=preserve,
-        place=place,
-        start=first,
-        end=last,
-    )
+    with progress_bar("scaling", None):
+        result = scaled(
+            read(file),
+            static,
+            measurements=measurements,
+            factors=factors,
+            mass=mass,
+            preserve_mass_distribution=preserve,
+            place=place,
+            start=first,
+            end=last,
+        )
     assert result.measured is not None
     for name, ratio in result.measured.ratios.items():
         say(f"{name}: {ratio:.6g}")

@@ -42,6 +42,7 @@ def static_optimization(
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
     plot: options.Plot = False,
+    band: options.Band = None,
     output: options.Folder = None,
     **chosen: Any,
 ) -> None:
@@ -58,26 +59,28 @@ def static_optimization(
         --forces reserves.xml
     """
     from osimlite.cli._console import complain
+    from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import draw_tables, print_motion_summary, require_plots
     from osimlite.io.document.reader import read
     from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 
-    require_plots(plot=plot)
+    require_plots(plot=plot, band=band)
     model = read(file)
-    result = shared_forces(
-        model,
-        motion,
-        applied_to=options.parse_applied_loads(applied),
-        forces=forces or (),
-        replace_forces=replace,
-        exponent=exponent,
-        muscles=muscles,
-        lowpass=lowpass,
-        start=first,
-        end=last,
-        folder=file.parent,
-        **chosen,
-    )
+    with progress_bar("computing muscle forces", None):
+        result = shared_forces(
+            model,
+            motion,
+            applied_to=options.parse_applied_loads(applied),
+            forces=forces or (),
+            replace_forces=replace,
+            exponent=exponent,
+            muscles=muscles,
+            lowpass=lowpass,
+            start=first,
+            end=last,
+            folder=file.parent,
+            **chosen,
+        )
     assert result.motion is not None
     folder = options.choose_output_folder(file, output)
     files = result.write(folder)
@@ -87,7 +90,9 @@ def static_optimization(
 
         add_forces(model, forces or (), replace=replace)
         tables = {files[0].name: result, files[1].name: result.forces or result}
-        draw_tables(tables, folder, model, result.motion.mechanism, chosen.get("external_loads"))
+        draw_tables(
+            tables, folder, model, result.motion.mechanism, chosen.get("external_loads"), band=band
+        )
     if message := result.describe_unsolved():
         complain(message)
         raise SystemExit(1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.base.text import join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import create_console, say
+from osimlite.cli._console import print_table, say
 from osimlite.translate.exporters import list_exporters
 from osimlite.translate.importers import OSIM, find_format, list_importers
 
@@ -70,6 +70,7 @@ def translate(
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
     from osimlite.cli._converting import OutputGuard
+    from osimlite.cli._progress import progress_bar
     from osimlite.errors import OsimliteError, SettingError
     from osimlite.io.document.reader import read
 
@@ -108,16 +109,17 @@ def translate(
     # Formats have defaults of their own, which None must not replace.
     given = {name: value for name, value in chosen.items() if value is not None}
     made: Any
-    if importer is not None:
-        made = importer.read(file, name=file.stem, **given)
-    else:
-        made = formats[to].write(
-            read(file),
-            folder=file.parent,
-            name=file.stem,
-            geometry=options.list_mesh_folders(file, geometry),
-            **given,
-        )
+    with progress_bar("translating", None):
+        if importer is not None:
+            made = importer.read(file, name=file.stem, **given)
+        else:
+            made = formats[to].write(
+                read(file),
+                folder=file.parent,
+                name=file.stem,
+                geometry=options.list_mesh_folders(file, geometry),
+                **given,
+            )
     folder = options.choose_output_folder(file, output)
     suffix = OSIM if importer is not None else {"mjcf": "xml"}.get(to, to)
     guard = OutputGuard(folder, f"{file.stem}.{suffix}", file.name, overwrite=overwrite)
@@ -128,7 +130,7 @@ def translate(
     if len(made.fidelity):
         from osimlite.cli._fidelity_table import tabulate
 
-        create_console().print(tabulate(made.fidelity, to.upper()))
+        print_table(tabulate(made.fidelity, to.upper()))
     same, otherwise, lost = made.fidelity.counts()
     say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
     # URDF has a robot, whose links and joints are the summary.

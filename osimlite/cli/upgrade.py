@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from osimlite.base.text import format_count
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
-from osimlite.cli._console import add_row, create_console, create_table, say
+from osimlite.cli._console import add_row, create_table, print_table, say
 
 if TYPE_CHECKING:
     from osimlite.io.document.reader import Document
@@ -81,7 +81,7 @@ def _print_changes(document: Document) -> None:
         for what, changes in sorted(steps.items(), key=lambda item: item[1][0].below):
             line = document.source.locate_tag(changes[0].number).line
             add_row(table, what, str(len(changes)), str(line))
-        create_console().print(table)
+        print_table(table)
     for note in document.notes:
         if note.line is not None:
             meant = (

@@ -10,10 +10,11 @@ eliminated frame by frame.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from math import sqrt
+from math import log, sqrt
 
 import numpy as np
 
+from osimlite.base.progress import report_progress, report_stage
 from osimlite.base.records import dataclass
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
@@ -177,6 +178,7 @@ def fit(
         selected,
         [name in moving for name in selected.markers],
     )
+    report_stage("fitting the poses of the model as it is")
     result = search.start_from_model(mechanism)
     before = result.places
     # Excluding the worst positions changes the fit, which may reveal others.
@@ -302,6 +304,7 @@ class _PersonFit:
         """
         here = self._evaluate(known.sizes, known.offsets, known.values)
         damping = 1e-6
+        first_change = 0.0
         for _ in range(MAX_STEPS):
             matrix, slope = self._compute_normal_equations(here)
             while True:
@@ -319,8 +322,17 @@ class _PersonFit:
             if there.cost <= here.cost:
                 here = there
                 damping = 0.1 * damping
-            if np.abs(step).max() < enough:
+            change = float(np.abs(step).max())
+            if change < enough:
                 break
+            # Steps shrink by about the same factor each, so their orders of magnitude tell how far
+            # the search is.
+            first_change = max(first_change, change)
+            report_progress(
+                "fitting sizes and markers",
+                min(0.99, max(0.01, log(first_change / change) / log(first_change / enough))),
+                1.0,
+            )
         return here
 
     def compute_deviations(self, estimate: _Estimate) -> Array:

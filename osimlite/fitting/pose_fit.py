@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.progress import divide_rows
 from osimlite.base.records import replace
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_layout import (
@@ -155,7 +156,9 @@ class PoseFit:
         self.fill_prescribed(
             frames, np.zeros(count) if times is None else np.asarray(times, dtype=float)
         )
-        self.bind_arrays(frames, result)(count)
+        for rows in divide_rows("fitting the motion", count):
+            # The workspace carries the last poses from call to call.
+            self.bind_arrays(frames[rows], result[rows])(rows.stop - rows.start)
         status = result[:, -1]
         if (status == APART).any():
             raise self.create_constraint_error(int(np.argmax(status == APART)))

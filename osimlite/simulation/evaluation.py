@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from osimlite.base.progress import divide_rows
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels import layout
 from osimlite.mechanics.kernels.layout import (
@@ -520,23 +521,19 @@ class StateEvaluator:
         given = np.ascontiguousarray(np.hstack([moments, moving]))
         result = np.empty((len(moments), len(places)))
         order = np.array(
-            [len(given), moving.shape[1], code.get_address(law), len(places), *places],
+            [0, moving.shape[1], code.get_address(law), len(places), *places],
             dtype=np.int64,
         )
-        parts = (
-            self.program.ints,
-            self.numbers,
-            self._w,
-            self._y,
-            self._f,
-            stage,
-            given,
-            order,
-            result,
-        )
-        status = self._run_kernel(code.get_entry("look"), *parts)
-        if status != OUTCOME.OK:
-            raise self.make_evaluation_error(status, float(self._w[WORK.TIME]), self._y.tolist())
+        parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage
+        entry = code.get_entry("look")
+        title = "evaluating the motion" if udot is None else "computing generalized forces"
+        for rows in divide_rows(title, len(given)):
+            order[0] = rows.stop - rows.start
+            status = self._run_kernel(entry, *parts, given[rows], order, result[rows])
+            if status != OUTCOME.OK:
+                raise self.make_evaluation_error(
+                    status, float(self._w[WORK.TIME]), self._y.tolist()
+                )
         return result
 
     def compute_unit_forces(
@@ -561,7 +558,7 @@ class StateEvaluator:
         code.make_ready(("push_each", "inverse"))
         items = {self.forces.elements[owner].path: place for place, owner in self._owners.items()}
         controls = dict(zip(self._controls.names, self.control_offsets, strict=True))
-        order = [len(moments), len(names)]
+        order = [0, len(names)]
         for name in names:
             item, path, strength = items[name], -1, -1
             # A muscle pulls along its path with its strength; the other actuators apply their
@@ -582,11 +579,14 @@ class StateEvaluator:
             self._f,
             code.get_address("inverse"),
         )
-        status = self._run_kernel(
-            code.get_entry("push_each"), *parts, given, np.array(order, dtype=np.int64), result
-        )
-        if status != OUTCOME.OK:
-            raise self.make_evaluation_error(status, float(self._w[WORK.TIME]), self._y.tolist())
+        entry, plan = code.get_entry("push_each"), np.array(order, dtype=np.int64)
+        for rows in divide_rows("computing the force of each muscle", len(moments)):
+            plan[0] = rows.stop - rows.start
+            status = self._run_kernel(entry, *parts, given[rows], plan, result[rows])
+            if status != OUTCOME.OK:
+                raise self.make_evaluation_error(
+                    status, float(self._w[WORK.TIME]), self._y.tolist()
+                )
         each = result[:, size:].reshape(len(moments), len(names), size + 1)
         return result[:, :size], each[:, :, :size], each[:, :, size]
 

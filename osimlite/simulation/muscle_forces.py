@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.base.files import make_folder, open_atomically
+from osimlite.base.progress import watch_items
 from osimlite.base.records import dataclass, field
 from osimlite.errors import DeprecatedWarning
 from osimlite.io.tables.storage import StoTable, write_sto
@@ -217,9 +218,14 @@ def _compute_states(
     if model.constraint_set.objects and not recorded.missing:
         # OpenSim uses the recorded speeds if all coordinates were recorded.
         return assembled, speeds, accelerations
-    moments = zip(recorded.times.tolist(), assembled, speeds, strict=True)
+    moments = [*zip(recorded.times.tolist(), assembled, speeds, strict=True)]
     return (
         assembled,
-        np.array([mechanism.project_speeds(q, u, t) for t, q, u in moments]),
+        np.array(
+            [
+                mechanism.project_speeds(q, u, t)
+                for t, q, u in watch_items("fulfilling the constraints", moments)
+            ]
+        ),
         accelerations,
     )

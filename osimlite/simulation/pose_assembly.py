@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from osimlite.base.progress import divide_rows
 from osimlite.mechanics.kernels import assembly
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
@@ -57,9 +58,9 @@ def assemble_motion(
     for name in program.laws:
         ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
     equations = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
-    frames = np.column_stack([times, values[:, order]])
+    frames = np.ascontiguousarray(np.column_stack([times, values[:, order]]))
     found = np.empty((len(times), size + 1))
-    code.get_entry(ASSEMBLY_KERNEL)(
+    parts = (
         ints,
         np.array(program.reals, dtype=np.float64),
         np.zeros(int(ints[MODEL.WORK_SIZE])),
@@ -68,10 +69,10 @@ def assemble_motion(
         np.array(_list_integers(mechanism, order), dtype=np.int64),
         np.array(_list_numbers(mechanism, order)),
         np.zeros(assembly.assembly_work_size(equations, size)),
-        np.ascontiguousarray(frames),
-        found,
-        len(times),
     )
+    entry = code.get_entry(ASSEMBLY_KERNEL)
+    for rows in divide_rows("fulfilling the constraints", len(times)):
+        entry(*parts, frames[rows], found[rows], rows.stop - rows.start)
     result: Array = np.empty_like(values)
     result[:, order] = found[:, :size]
     for row in np.flatnonzero(found[:, size] != assembly.POSE_STATUS.ASSEMBLED).tolist():

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.progress import watch_items
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import DocumentError, ModelError, SettingError
@@ -371,7 +372,8 @@ class RecordedMotion(Movement):
             for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
         ]
         rows = np.empty((len(self.times), len(columns) + 3))
-        for row, q in zip(rows, self.values, strict=True):
+        poses = watch_items("computing positions of bodies", self.values)
+        for row, q in zip(rows, poses, strict=True):
             state = mechanism.at(q)
             angles = np.degrees(angles_xyz(state.rotations[:-1]))
             centres = MassCentres.of(state).positions()
@@ -394,7 +396,8 @@ class RecordedMotion(Movement):
         }
         columns = [f"{path.rsplit('/', 1)[1]}_{axis}" for path in places for axis in "XYZ"]
         rows = np.empty((len(self.times), len(columns)))
-        for row, q in zip(rows, self.values, strict=True):
+        poses = watch_items("computing positions of markers", self.values)
+        for row, q in zip(rows, poses, strict=True):
             state = mechanism.at(q)
             row[:] = [number for place in places.values() for number in state.point(*place)]
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)

@@ -11,6 +11,7 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
+from osimlite.base.progress import report_progress
 from osimlite.base.quantity import warn_caller, warn_of_unit
 from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.multibody import build_mechanism
@@ -416,7 +417,11 @@ class Simulation:
             require_table_span(self.forces.controls, start, to)
             self._require_inertia(y)
             stepper = self._make_stepper(start, y, settings, note)
-            stepper.tabulate([to])
+
+            def report(t: float, _: float) -> None:
+                report_progress("integrating", t - start, to - start, " s")
+
+            stepper.tabulate([to], report)
             stepper.catch_up()
         if isinstance(stepper.ended, KeyboardInterrupt):
             raise stepper.ended

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.progress import divide_rows
 from osimlite.base.records import dataclass
 from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
@@ -612,13 +613,14 @@ def minimize_effort(
     frames, count, size = columns.shape
     code = select_code()
     code.make_ready(("least_effort",))
-    sizes = np.array([frames, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
+    sizes = np.array([0, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
     numbers = np.array([exponent, *bounds.ravel()])
     given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
     result = np.zeros((frames, count + size + 1))
-    code.get_entry("least_effort")(
-        sizes, numbers, given, result, np.zeros(effort_size(size, count))
-    )
+    entry, work = code.get_entry("least_effort"), np.zeros(effort_size(size, count))
+    for rows in divide_rows("sharing forces between muscles", frames):
+        sizes[0] = rows.stop - rows.start
+        entry(sizes, numbers, given[rows], result[rows], work)
     return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.progress import watch_items
 from osimlite.base.text import join_words
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.spatial import Array
@@ -106,7 +107,8 @@ def equilibrate_rows(
     assert isinstance(engine, System)
     unbalanced: dict[str, BoolArray] = {}
     reasons: dict[str, str] = {}
-    for row, (time, y) in enumerate(zip(times.tolist(), states.tolist(), strict=True)):
+    moments = [*zip(times.tolist(), states.tolist(), strict=True)]
+    for row, (time, y) in enumerate(watch_items("equilibrating the muscles", moments)):
         states[row], failed = engine.equilibrate_each(time, y)
         for path, reason in failed.items():
             reasons.setdefault(path, reason)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from osimlite.base.progress import watch_items
 from osimlite.base.text import join_words
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -204,8 +205,13 @@ def satisfy_constraints(
     recorded = recorded.assembled()
     if not model.constraint_set.objects:
         # OpenSim projects the speeds only in this case.
-        moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
-        speeds = np.array([recorded.mechanism.project_speeds(q, u, time) for time, q, u in moments])
+        moments = [*zip(recorded.times.tolist(), recorded.values, speeds, strict=True)]
+        speeds = np.array(
+            [
+                recorded.mechanism.project_speeds(q, u, time)
+                for time, q, u in watch_items("fulfilling the constraints", moments)
+            ]
+        )
     return recorded.values, speeds
 
 

@@ -196,9 +196,8 @@ def _render_messages(trial: TrialOutcomes) -> Iterator[str]:
         if index < len(trial.setups):
             setup = trial.setups[index]
             tool = f"{type(get_object(str(setup))).__name__}, {setup.name}"
-        for number, (name, words) in enumerate(outcome.told):
-            # The first row of a tool names it.
-            source = html.escape(tool) if number == 0 else ""
+        source = html.escape(tool)
+        for name, words in outcome.told:
             yield (
                 f'<tr><td class="source">{source}</td><th>{html.escape(name)}</th>'
                 f"<td>{html.escape(words)}</td></tr>"
@@ -289,11 +288,15 @@ def collect_actuators(
                     )
                     sections[section] += panels
     titles = {
-        "activation": ("Muscle activations", "0 is at rest, 1 is fully active."),
-        "muscle": ("Muscle forces", ""),
+        "activation": (
+            "Muscle activations",
+            "0 is at rest, 1 is fully active. Dashed red: the limits of the model.",
+        ),
+        "muscle": ("Muscle forces", "Dashed red: max_isometric_force."),
         "other": (
             "Reserves and residuals",
-            "Forces and moments that no muscle makes; ideally small. The last table has their limits.",
+            "Forces and moments that no muscle makes; ideally small. Dashed red: the limits of the "
+            "model; the last table has published ones.",
         ),
     }
     return [
@@ -306,21 +309,26 @@ def _divide_actuators(table: StoTable, names: ColumnNames) -> dict[str, list[Col
     result: dict[str, list[Column]] = {}
     if table.name == ACTIVATION_TITLE:
         columns = [item for item in describe_columns(table, names) if item.name in names.regions]
-        result["activation"] = columns
+        result["activation"] = [_limit(item, names.control_limits) for item in columns]
     elif table.name in ("ActuatorForces", "ModelForces"):
         for item in describe_columns(table, names):
             if item.name in names.regions:
-                result.setdefault("muscle", []).append(item)
+                result.setdefault("muscle", []).append(_limit(item, names.force_limits))
             elif item.name in names.units:
-                result.setdefault("other", []).append(item)
+                result.setdefault("other", []).append(_limit(item, names.force_limits))
     else:
         columns = [
-            item._replace(section="")
+            _limit(item._replace(section=""), names.control_limits)
             for item in describe_columns(table, names)
             if item.section == SECTIONS["activation"]
         ]
         result["activation"] = columns
     return result
+
+
+def _limit(column: Column, limits: Mapping[str, tuple[float, ...]]) -> Column:
+    """Return a column with the limits of its actuator."""
+    return column._replace(limits=limits.get(column.name, ()))
 
 
 def _render_panels(title: str, note: str, panels: Sequence[Panel]) -> Iterator[str]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from osimlite.base.files import get_relative_path
+from osimlite.base.progress import report_stage
 from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
@@ -117,6 +118,7 @@ def run(
     replaced = substitute_inputs(top, file.parent, substitutes or {})
     # Errors are cheaper to find before a tool that may run for hours.
     if check:
+        report_stage("checking the setup")
         away: dict[str, None] = {}
         report = merge_reports(_check_documents(str(file), away))
         # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
@@ -139,7 +141,9 @@ def run(
     writer = ResultWriter.for_document(file, output, overwrite=overwrite, outside=write_outside)
     try:
         folder = None if output is None else Path(output)
+        report_stage(f"{tag}: computing")
         run_tool(Job(top, file, folder, refine, simulates), outcome)
+        report_stage(f"{tag}: writing results")
         outcome.write(file, writer)
     except OsimliteError as error:
         # Importing the simulation here keeps setups that need none fast.

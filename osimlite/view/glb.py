@@ -16,6 +16,7 @@ import numpy as np
 
 from osimlite import __version__
 from osimlite.base.files import write_atomically
+from osimlite.base.progress import watch_items
 from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.view.motion import ShownMotion, get_values, interpolate_columns
@@ -51,7 +52,7 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         )
         values = get_values(motion, scene.mechanism)
         rows = interpolate_columns(motion, values, times)
-    poses = [scene.compute_poses(row) for row in rows]
+    poses = [scene.compute_poses(row) for row in watch_items("posing the model", rows)]
     # glTF has Y up; the root turns the vertical of the model to it.
     written = _GlbWriter(
         times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])

@@ -16,6 +16,7 @@ import numpy as np
 from osimlite.base.require import require
 from osimlite.base.writing import write_into
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.view.bands import Band
 from osimlite.view.lettering import plain_lettering
 
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -30,12 +31,16 @@ MAX_COLUMNS = 3
 """Panels side by side, each at least 3.5 inches wide."""
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Points of the gait cycle at which curves are drawn, %."""
+MAX_LIMIT_DISTANCE = 0.5
+"""Largest distance of a limit from the curves that is drawn, relative to their range with zero."""
 MAX_CONSTANTS = 12
 """Constant curves that the note of a page names."""
 RELATIVE_CHANGE = 1e-9
 """A curve whose range is below this part of its largest value is constant."""
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
 """Color and name of the curves of each side."""
+LIMIT_COLOR = "#b00020"
+"""Color of the lines of limits."""
 DASHES = (0.0, (4.0, 4.0))
 """Line style of a curve that lies on another."""
 EXPONENTS = (-4, 6)
@@ -76,6 +81,7 @@ class Column(NamedTuple):
     values: Array  # values (n,)
     group: str = ""  # body region, joint or coordinate to which it belongs
     section: str = ""  # title of the pages on which it is drawn, "" for none
+    limits: tuple[float, ...] = ()  # bounds of the values in their unit, drawn as lines
 
 
 class PanelCurve(NamedTuple):
@@ -97,6 +103,8 @@ class Panel(NamedTuple):
     curves: list[PanelCurve]
     group: str = ""
     section: str = ""
+    limits: tuple[float, ...] = ()
+    band: Band | None = None  # reference, drawn where the abscissa is the gait cycle
 
 
 def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -197,7 +205,7 @@ def group_columns(
         # A quantity without a curve on the other side keeps its name.
         panel = panels.setdefault(
             (stem, column.unit, column.section),
-            Panel(stem, column.unit, [], column.group, column.section),
+            Panel(stem, column.unit, [], column.group, column.section, column.limits),
         )
         panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
     # Panels of a group stay together.
@@ -340,6 +348,11 @@ def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False)
             # The curve below shows through, as in a symmetric motion.
             curve = curve._replace(style=DASHES)
         _draw_curve(place, curve, cyclic=cyclic)
+    _draw_limits(place, panel)
+    if cyclic and panel.band is not None:
+        percent, mean, deviation = panel.band
+        place.fill_between(percent, mean - deviation, mean + deviation, color="0.85", lw=0.0)
+        place.plot(percent, mean, color="0.6", lw=1.0, zorder=1.0)
     style_axes(place, abscissa)
     words = panel.title.replace("_", " ")
     unit = f" ({panel.unit})" if panel.unit else ""
@@ -348,6 +361,16 @@ def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False)
     group = panel.group.replace("_", " ")
     if group and group not in words and len(words + unit + group) < 40:
         place.set_title(group, fontsize=8, loc="right", color="0.5", y=height)
+
+
+def _draw_limits(place: Any, panel: Panel) -> None:
+    """Draw limits near the curves as lines; a distant limit would flatten the curves."""
+    known = np.concatenate([[0.0], *(curve.values for curve in panel.curves)])
+    low, high = float(np.nanmin(known)), float(np.nanmax(known))
+    room = MAX_LIMIT_DISTANCE * (high - low)
+    for limit in panel.limits:
+        if low - room <= limit <= high + room:
+            place.axhline(limit, color=LIMIT_COLOR, ls=DASHES, lw=1.0)
 
 
 def _coincide(curve: PanelCurve, other: PanelCurve) -> bool:

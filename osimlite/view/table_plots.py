@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from math import isfinite
 from pathlib import Path, PurePath
 from typing import NamedTuple
 
@@ -14,15 +15,22 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import Actuator, CoordinateActuator, TorqueActuator
+from osimlite.schema.actuators import (
+    Actuator,
+    CoordinateActuator,
+    ScalarActuator,
+    TorqueActuator,
+)
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath
+from osimlite.view.bands import Band, check_bands
 from osimlite.view.panels import (
     Column,
     StepTimes,
     draw_pages,
     group_columns,
+    has_cycles,
     split_sides,
     write_pages,
 )
@@ -107,6 +115,8 @@ class ColumnNames(NamedTuple):
     coordinates: Mapping[str, CoordinateInfo]  # coordinates by name
     units: Mapping[str, str]  # units of the forces of actuators by name
     regions: Mapping[str, str]  # bodies between which muscles run, by name
+    control_limits: Mapping[str, tuple[float, ...]] = {}  # least and largest control, by name
+    force_limits: Mapping[str, tuple[float, ...]] = {}  # forces at these controls, by name
 
     @classmethod
     def from_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> ColumnNames:
@@ -118,7 +128,19 @@ class ColumnNames(NamedTuple):
         """
         infos = {info.name: info for info in mechanism.coordinates} if mechanism else {}
         units, regions = dict[str, str](), dict[str, str]()
+        controls, forces = dict[str, tuple[float, ...]](), dict[str, tuple[float, ...]]()
         for item in model.components(Actuator) if model is not None else ():
+            if isinstance(item, ScalarActuator):
+                bounds = item.min_control, item.max_control
+                controls[item.name] = tuple(bound for bound in bounds if isfinite(bound))
+                # The force at full activation also depends on length and speed of the fibers.
+                strongest = getattr(item, "max_isometric_force", None)
+                scale = getattr(item, "optimal_force", 0.0)
+                forces[item.name] = (
+                    (strongest,)
+                    if strongest is not None
+                    else tuple(scale * bound for bound in controls[item.name] if scale * bound)
+                )
             if isinstance(item, PathActuator):
                 units[item.name] = FORCE
                 regions[item.name] = _describe_region(item)
@@ -129,7 +151,7 @@ class ColumnNames(NamedTuple):
                 units[item.name] = MOMENT if turns else FORCE
             else:
                 units[item.name] = MOMENT if isinstance(item, TorqueActuator) else FORCE
-        return cls(infos, units, regions)
+        return cls(infos, units, regions, controls, forces)
 
 
 def _describe_region(item: PathActuator) -> str:
@@ -292,6 +314,7 @@ def plot_tables(
     *,
     steps: Mapping[str, StepTimes] | None = None,
     report: Callable[[int, int], None] | None = None,
+    bands: Mapping[str, Band] | None = None,
 ) -> list[Path]:
     """Draw tables over time or over the gait cycle, each on pages of at most twelve panels.
 
@@ -301,6 +324,7 @@ def plot_tables(
         names: what the model says about the columns.
         steps: steps of the feet by side, if they are known.
         report: called with the number of finished tables and the number of all.
+        bands: reference bands by the title of their panel, drawn over the gait cycle.
 
     Returns:
         The PNG files; a table in which nothing changes has none.
@@ -308,17 +332,23 @@ def plot_tables(
     Raises:
         MissingDependency: matplotlib is not installed.
         OsimliteError: the folder or a file cannot be written.
+        SettingError: no panel has a band, or none is over the gait cycle.
     """
-    written = []
+    written, titles, is_cyclic = [], list[str](), False
     base = make_folder(Path(folder))
     for number, (name, table) in enumerate(tables.items(), 1):
         # A dot in the name of a tool is no ending.
         stem = re.sub(r"\.(sto|mot|xml|trc)$", "", PurePath(name).name)
         if len(table.times) > 1:
             panels, note = group_columns(describe_columns(table, names), table.times, steps=steps)
+            panels = [panel._replace(band=(bands or {}).get(panel.title)) for panel in panels]
+            titles += [panel.title for panel in panels]
+            is_cyclic = is_cyclic or has_cycles(panels)
             written += write_pages(draw_pages(make_title(stem), panels, note=note), base, stem)
         if report is not None:
             report(number, len(tables))
+    if bands:
+        check_bands(bands, titles, cyclic=is_cyclic)
     return written
 
 

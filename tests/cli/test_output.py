@@ -181,3 +181,45 @@ def test_tables_and_sentences_are_never_broken_inside_a_word(monkeypatch, capsys
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     say(message)
     assert path in capsys.readouterr().out.splitlines()
+
+
+@pytest.mark.parametrize("columns", [40, 80, 120])
+def test_tables_of_several_texts_are_never_broken_inside_a_word(monkeypatch, capsys, columns):
+    from osimlite.cli._console import add_row, create_table, print_table
+
+    monkeypatch.setenv("COLUMNS", str(columns))
+    path = "/bodyset/pelvis/a_geometry_of_the_pelvis"
+    table = create_table("Lost: a model")
+    for heading in ("what", "translation", "components"):
+        table.add_column(heading)
+    add_row(table, f"{path}: the mesh file is missing", "left out; its path is drawn", "glut_max_r")
+    add_row(table, "a force", "", "the model")
+    print_table(table)
+    out = capsys.readouterr().out
+    assert path in out
+    assert out.startswith("Lost: a model\n")
+    for words in ("missing", "translation", "glut_max_r", "drawn"):
+        assert words in out
+    assert all(len(line) <= max(columns, len(path) + 1) for line in out.splitlines())
+    # Where the words do not fit beside each other, each row is a block.
+    assert ("    components: glut_max_r" in out) is (columns == 40)
+
+
+@pytest.mark.parametrize(
+    ("variables", "is_coloured"),
+    [({}, False), ({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False)],
+)
+def test_tables_have_colours_by_meaning_only(monkeypatch, capsys, variables, is_coloured):
+    from osimlite.cli._console import add_row, create_table, print_table
+
+    for name in ("NO_COLOR", "FORCE_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    table = create_table()
+    for _ in range(2):
+        table.add_column("")
+    add_row(table, "bad", "12 N")
+    print_table(table)
+    red = "\033[31mbad\033[0m  12 N\n"
+    assert capsys.readouterr().out == (red if is_coloured else "bad  12 N\n")

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from osimlite.base.progress import report_progress
+from osimlite.base.progress import report_progress, report_stage
 from osimlite.cli import _console, _progress
 from osimlite.cli._progress import motion_bar, progress_bar
 
@@ -40,7 +40,7 @@ def clock(monkeypatch):
     line = _progress._Line()
     monkeypatch.setattr(_progress, "_line", line)
     monkeypatch.setattr(_progress, "_stack", _progress.ExitStack())
-    monkeypatch.setattr(line, "start", lambda: _console.before_output(line.erase))
+    monkeypatch.setattr(line, "start", lambda: _console.before_output(line.make_room))
     yield clock
     _console.before_output(None)
 
@@ -105,6 +105,36 @@ def test_output_removes_the_line_first(monkeypatch, clock):
     assert shown(sys.stderr) == ""
 
 
+def test_parts_of_a_task_have_their_own_progress(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress_bar("running", 3.0) as progress:
+        progress(1.0)
+        report_stage("writing results")
+        clock.now = 3.0
+        _progress._line.draw()
+        assert shown(sys.stderr) == "running, 1 of 3 done; writing results: 3 s"
+        report_progress("computing moments", 10.0, 40.0, " frames")
+        clock.now = 6.0
+        report_progress("computing moments", 20.0, 40.0, " frames")
+        words = "computing moments: 50 % (20 of 40 frames), 3 s left"
+        assert shown(sys.stderr) == f"running, 1 of 3 done; {words}"
+        # A finished part says nothing about the next.
+        clock.now = 7.0
+        report_progress("computing moments", 40.0, 40.0, " frames")
+        assert shown(sys.stderr) == "running: 33 % (1 of 3), 14 s left"
+
+
+def test_the_line_comes_back_at_once_after_another_task(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    _progress.watch_command("simulate")
+    clock.now = 2.0
+    with progress_bar("drawing", None):
+        _progress._line.draw()
+    clock.now = 2.2
+    _progress._line.draw()
+    assert shown(sys.stderr) == "simulating: 2 s"
+
+
 def test_commands_that_wait_for_people_have_no_line(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     _progress.watch_command("view")
@@ -114,13 +144,13 @@ def test_commands_that_wait_for_people_have_no_line(monkeypatch, clock):
 def test_a_log_has_two_lines_of_long_work_and_none_of_short(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     with progress_bar("walking", 4.0) as progress:
-        for clock.now in (1.0, 29.0):
+        for clock.now in (1.0, 9.0):
             progress(1.0)
         assert sys.stderr.getvalue() == ""
-        for clock.now in (31.0, 50.0, 60.0):
+        for clock.now in (11.0, 50.0, 60.0):
             progress(2.0)
     assert sys.stderr.getvalue().splitlines() == [
-        "osimlite: walking: 50 % (2 of 4), 31 s left",
+        "osimlite: walking: 50 % (2 of 4), 11 s left",
         "osimlite: walking: finished in 60 s",
     ]
 

@@ -12,6 +12,7 @@ from numpy.random import Generator, default_rng
 from osimlite.mechanics.kernels.effort import effort_size
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.engines.linking import PYTHON_CODE, Code, select_code
+from osimlite.simulation.static_optimization import minimize_effort
 
 optimize: Any = pytest.importorskip("scipy.optimize", reason="needs scipy (extra 'sweep')")
 
@@ -47,6 +48,19 @@ def problem(
     high[1::4] = 1.0
     within = random.uniform(np.maximum(low, -1.0), np.minimum(high, 1.0), size=(frames, n))
     return columns, np.einsum("tnm,tn->tm", columns, within), low, high
+
+
+def test_frames_in_several_calls_give_what_one_call_gives() -> None:
+    """Frames start from the previous one, also where a call of the kernel ended between them."""
+    columns, wanted, low, high = problem(default_rng(5), 4, 9, frames=40)
+    wanted[11] *= 100.0
+    for power in (2.0, 3.0):
+        x, missing, flags = minimize_effort(columns, wanted, power, np.array([low, high]))
+        alone, lacking, is_solved = solved(columns, wanted, low, high, power)
+        assert np.array_equal(x, alone)
+        assert np.array_equal(missing, lacking)
+        assert flags.tolist() == (is_solved == 1.0).tolist()
+        assert not flags[11]
 
 
 def test_weak_ones_give_what_full_ones_leave() -> None:

@@ -11,6 +11,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.tools.evidence import Steps
 from osimlite.view import panels
 from osimlite.view.panels import (
+    LIMIT_COLOR,
     MAX_PANELS,
     Column,
     draw_pages,
@@ -261,3 +262,19 @@ def test_rounding_errors_of_a_constant_moment_arm_do_not_show():
     _widen_constant(place)
     low, high = place.get_ylim()
     assert high - low > 0.008
+
+
+def test_limits_near_the_curves_are_lines() -> None:
+    times = np.linspace(0.0, 1.0, 11)
+    columns = [
+        Column("soleus_r", "", times, limits=(0.01, 1.0)),
+        Column("vastus_r", "N", 10.0 * times, limits=(5000.0,)),
+    ]
+    panels, _ = group_columns(columns, times)
+    (figure,) = draw_pages("", panels)
+    drawn = [
+        [line.get_ydata()[0] for line in axes.lines if line.get_color() == LIMIT_COLOR]
+        for axes in figure.axes
+    ]
+    # A distant limit would flatten the curve.
+    assert drawn == [[0.01, 1.0], []]

@@ -255,7 +255,8 @@ def _register_queries(server: Server) -> None:
     def show_hover(_: Server, params: types.HoverParams) -> types.Hover | None:
         return describe_cursor(*server.get_position(params))
 
-    triggers = types.CompletionOptions(trigger_characters=["<", "/", " "])
+    # A tag begins with <, its text after >, a name with a quote, and parts of paths with a slash.
+    triggers = types.CompletionOptions(trigger_characters=["<", "/", " ", ">", '"', "'"])
 
     @server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)
     def complete(_: Server, params: types.CompletionParams) -> types.CompletionList:

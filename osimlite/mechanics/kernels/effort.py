@@ -99,7 +99,8 @@ def least_effort(
         numbers: exponent and bounds, see `EFFORT_NUMBERS`.
         problems: per frame the columns of A (n, m) and the right side b (m,); scaled in place.
         solutions: filled per frame with x (n,), the residual b - A x (m,) and 1.0 if solved, else 0.0.
-        work: workspace of `effort_size` numbers.
+        work: workspace of `effort_size` numbers: zeros before the first frame; what it holds after a
+            call belongs to the frames that follow.
 
     Returns:
         `OUTCOME.OK`.
@@ -108,8 +109,6 @@ def least_effort(
     # Multipliers of the previous frame are stored for unscaled equations, since scales change.
     scales, previous, multipliers, inner_work = work, at(work, m), at(work, 2 * m), at(work, 3 * m)
     targets, compliances = inner_work, at(inner_work, n)
-    for k in range(m):
-        previous[k] = 0.0
     for frame in range(sizes[EFFORT_SIZES.FRAMES]):
         columns, x = at(problems, (n + 1) * m * frame), at(solutions, (n + m + 1) * frame)
         scale_equations(sizes, columns, scales)
@@ -125,7 +124,7 @@ def least_effort(
             <= CLOSE
         )
         # A start from a distant frame may stall; try again from zero.
-        if not is_solved and frame > 0:
+        if not is_solved:
             for k in range(m):
                 multipliers[k] = 0.0
             is_solved = (

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from osimlite.base.progress import report_stage, watch_items
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.kernels.paths import NODE_TYPE
 from osimlite.mechanics.multibody.mechanism import GROUND
@@ -61,6 +62,7 @@ def add_paths(draft: MjcfDraft) -> None:
     }
     if not owners:
         return
+    report_stage("measuring paths")
     exact = Paths(draft.model)
     fits = draft.options.fit != "none"
     poses, truth = draw_poses(exact, FIT_POSES if fits else SELECTION_POSES, 0)
@@ -69,7 +71,7 @@ def add_paths(draft: MjcfDraft) -> None:
     others, other_truth = draw_poses(exact, VALIDATION_POSES, 2) if fits else (poses, truth)
     default = exact.lengths(draft.default_state[0])
     writer = _TendonWriter(draft)
-    for path, given in owners.items():
+    for path, given in watch_items("fitting paths", owners.items(), " paths"):
         route = exact.routes[path]
         own = draft.tree.path_of(given) or ""
         # Function-based paths have no points for sites.

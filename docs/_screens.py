@@ -1,0 +1,251 @@
+"""Show what is on a terminal of 80 columns while each command works on something slow.
+
+    python docs/_screens.py [WORD ...]     all commands, or those whose names contain a WORD
+
+Each command runs at a terminal that this program emulates. The screen is read after 0.5, 2 and 5
+seconds, then Ctrl-C is sent. The table that is printed has one row for each command: the last line
+on the screen at these times, and the seconds until the command ended after Ctrl-C. A command that
+ended before has "finished" there. Run it after a change of what commands print while they work.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import gzip
+import os
+import pty
+import select
+import shutil
+import signal
+import struct
+import sys
+import termios
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pyte
+
+from osimlite.base.records import dataclass, field
+
+ROOT = Path(__file__).resolve().parents[1]
+COLUMNS = 80
+LINES = 24
+MOMENTS_S = (0.5, 2.0, 5.0)
+"""Times after the start of a command at which its screen is read, s."""
+MAX_END_S = 20.0
+"""Longest wait for the end of a command after Ctrl-C, s."""
+REPETITIONS = 60
+"""Number of times that a recorded motion is repeated, so that work on it takes seconds."""
+MODELS = 40
+"""Number of models in the folder of many models."""
+
+COMMANDS = {
+    "build": "build human -o built.osim",
+    "validate": "validate many",
+    "format": "format many --check",
+    "upgrade": "upgrade model.osim -o upgraded.osim",
+    "diff": "diff model.osim human.osim",
+    "info": "info model.osim",
+    "translate": "translate model.osim --to mjcf -o mjcf",
+    "translate --check": "translate model.osim --to mjcf --check -o checked",
+    "convert": "convert model.osim --motion long.mot -o film.glb",
+    "convert, screenshot": "convert model.osim --motion long.mot -o picture.png",
+    "view --film": "view model.osim --motion long.mot --film film.mp4",
+    "simulate": "simulate jumper.osim --to 60 -o simulated",
+    "simulate --plot": "simulate jumper.osim --to 1 --plot -o drawn",
+    "sweep": "sweep walker.osim --vary LHip_rz=-10deg:10deg --samples 4000 -o sweep.csv",
+    "optimize": "optimize walker.osim --objective distance --vary LHip_rz=-20deg:20deg",
+    "gait": "gait steady-walker --perturb 0.05 --basin -o gait",
+    "find-gait": "find-gait walker.osim --vary LHip_rz=-30deg:30deg --vary LHip_rz/speed=-4:4",
+    "muscles": "muscles model.osim --coordinate knee_angle_r --plot muscles",
+    "modify": "modify model.osim --replace-muscles DeGrooteFregly2016Muscle -o modified.osim",
+    "scale": "scale model.osim long.trc --mass 72 --place -o scaled.osim",
+    "fit": "fit model.osim long.trc -o fitted",
+    "ik": "ik model.osim long.trc -o ik",
+    "kinematics": "kinematics model.osim long.mot --trc -o kinematics",
+    "inverse-dynamics": "inverse-dynamics model.osim long.mot -o moments",
+    "static-optimization": "static-optimization model.osim long.mot --forces reserves.xml -o forces",
+    "run, scaling": "run scale.xml -o run",
+    "run, IK": "run ik_long.xml -o run",
+    "run, ID": "run id_long.xml -o run",
+    "run, static optimization": "run so_long.xml -o run",
+    "run, forward": "run forward_long.xml -o run",
+    "run, RRA": "run rra.xml -o run",
+    "run, CMC": "run cmc.xml -o run",
+    "run, Moco": "run human.omoco -o run",
+    "check-trial": "check-trial .",
+    "scone": "scone human-walks",
+    "doctor": "doctor",
+    "demo": "demo -o demo",
+}
+"""Arguments of the commands, by the name of the row."""
+
+
+@dataclass
+class Recording:
+    """What a terminal showed while a command worked.
+
+    Attributes:
+        screens: lines of the screen by the time at which it was read, s.
+        ended: time after the start at which the command ended by itself, s; None if it did not.
+        stopping: time between Ctrl-C and the end, s.
+        status: exit code.
+        last: lines of the screen at the end.
+    """
+
+    screens: dict[float, list[str]] = field(default_factory=dict)
+    ended: float | None = None
+    stopping: float = 0.0
+    status: int = 0
+    last: list[str] = field(default_factory=list)
+
+
+def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -> Recording:
+    """Run osimlite at an emulated terminal, and read its screen at `MOMENTS_S`.
+
+    Args:
+        arguments: arguments of osimlite.
+        folder: current folder of the command.
+        columns: width of the terminal.
+    """
+    started = time.monotonic()
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(folder)
+        environment = {**os.environ, "TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
+        environment.pop("COLUMNS", None)
+        os.execve(sys.executable, [sys.executable, "-m", "osimlite", *arguments], environment)
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", LINES, columns, 0, 0))
+    screen = pyte.Screen(columns, LINES)
+    stream = pyte.ByteStream(screen)
+    recording = Recording()
+    for moment in MOMENTS_S:
+        is_open = _feed_until(terminal, stream, started + moment)
+        if not is_open:
+            recording.ended = time.monotonic() - started
+            break
+        recording.screens[moment] = _read_lines(screen)
+    if recording.ended is None:
+        stopped = time.monotonic()
+        # The terminal interrupts all processes in its foreground, as when a key is pressed.
+        os.write(terminal, b"\x03")
+        if _feed_until(terminal, stream, stopped + MAX_END_S):
+            os.kill(child, signal.SIGKILL)
+        recording.stopping = time.monotonic() - stopped
+    _, status = os.waitpid(child, 0)
+    os.close(terminal)
+    recording.status = os.waitstatus_to_exitcode(status)
+    recording.last = _read_lines(screen)
+    return recording
+
+
+def _feed_until(terminal: int, stream: pyte.ByteStream, end: float) -> bool:
+    """Feed the output of a command to a screen; return whether it still runs at the end time."""
+    while (left := end - time.monotonic()) > 0.0:
+        if select.select([terminal], [], [], left)[0]:
+            try:
+                output = os.read(terminal, 65536)
+            except OSError:
+                # Linux reports the end of the last program at a terminal as an error.
+                return False
+            if not output:
+                return False
+            stream.feed(output)
+    return True
+
+
+def _read_lines(screen: pyte.Screen) -> list[str]:
+    """Return the lines of a screen without empty lines at the end."""
+    return "\n".join(line.rstrip() for line in screen.display).rstrip().split("\n")
+
+
+def make_inputs(folder: Path) -> None:
+    """Write models, setups and long recordings into a folder."""
+    for name in ("setups", "pipelines/walking"):
+        for path in (ROOT / "fixtures" / name).iterdir():
+            shutil.copy(path, folder)
+    model = gzip.decompress((folder / "model.osim.gz").read_bytes())
+    (folder / "model.osim").write_bytes(model)
+    repeat_rows(folder / "coords.mot", folder / "long.mot", 0)
+    repeat_rows(folder / "walk.trc", folder / "long.trc", 1)
+    for name in ("ik", "id", "so", "forward"):
+        text = (folder / f"{name}.xml").read_text(encoding="utf-8")
+        text = text.replace("coords.mot", "long.mot").replace("walk.trc", "long.trc")
+        text = text.replace("<time_range>0.5 1</time_range>", "<time_range>0 1000</time_range>")
+        text = text.replace("<final_time>", "<final_time>9")
+        (folder / f"{name}_long.xml").write_text(text, encoding="utf-8")
+    shutil.copy(ROOT / "fixtures/walker/DynamicWalkerModel.osim", folder / "walker.osim")
+    many = folder / "many"
+    many.mkdir()
+    for number in range(MODELS):
+        # Equal files would be checked once.
+        (many / f"model{number}.osim").write_bytes(model + b"<!-- %d -->\n" % number)
+    for name in ("human", "jumper"):
+        record_command(["build", name, "-o", f"{name}.osim"], folder)
+    record_command(["build", "human-walks", "-o", "human.omoco"], folder)
+
+
+def repeat_rows(source: Path, target: Path, time_column: int) -> None:
+    """Write a table with its rows repeated, each second time backwards, so that nothing jumps."""
+    lines = source.read_text(encoding="utf-8").splitlines()
+    first = next(
+        number
+        for number, line in enumerate(lines)
+        if len(line.split()) > 6 and all(_is_number(word) for word in line.split()[:6])
+    )
+    rows = [line.split("\t") for line in lines[first:] if line.strip()]
+    step = float(rows[1][time_column]) - float(rows[0][time_column])
+    written: list[str] = []
+    for turn in range(REPETITIONS):
+        for row in rows if turn % 2 == 0 else rows[::-1]:
+            cells = [*row]
+            cells[time_column] = f"{step * len(written):.8f}"
+            if time_column:
+                cells[0] = str(len(written) + 1)
+            written.append("\t".join(cells))
+    head = [
+        line.replace(f"nRows={len(rows)}", f"nRows={len(written)}").replace(
+            f"\t{len(rows)}\t", f"\t{len(written)}\t"
+        )
+        for line in lines[:first]
+    ]
+    if time_column:
+        head[2] = head[2].rsplit("\t", 1)[0] + f"\t{len(written)}"
+    target.write_text("\n".join([*head, *written]) + "\n", encoding="utf-8")
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def describe_row(name: str, recording: Recording) -> list[str]:
+    """Return the cells of the table for a command."""
+    cells = [name]
+    for moment in MOMENTS_S:
+        lines = recording.screens.get(moment)
+        cells.append("(finished)" if lines is None else lines[-1].strip() or "(nothing)")
+    cells.append("" if recording.ended is not None else f"{recording.stopping:.2f}")
+    cells.append(recording.last[-1].strip())
+    return cells
+
+
+def print_table(words: list[str]) -> None:
+    """Print the table for the commands whose names contain one of the words, or for all."""
+    print("| command | after 0.5 s | after 2 s | after 5 s | end after Ctrl-C, s | last line |")
+    print("|---|---|---|---|---|---|")
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        make_inputs(folder)
+        for row, arguments in COMMANDS.items():
+            if not words or any(word in row for word in words):
+                recording = record_command(arguments.split(), folder)
+                print(f"| {' | '.join(describe_row(row, recording))} |", flush=True)
+
+
+if __name__ == "__main__":
+    print_table(sys.argv[1:])

@@ -1,0 +1,97 @@
+"""Reference bands: mean and standard deviation of quantities over the gait cycle, from a user's file."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.base.files import read_file
+from osimlite.base.text import join_words
+from osimlite.errors import DocumentError, SettingError
+from osimlite.mechanics.multibody.spatial import Array
+
+MEAN = "_mean"
+"""End of the labels of means."""
+DEVIATION = "_sd"
+"""End of the labels of standard deviations."""
+
+
+class Band(NamedTuple):
+    """Mean and standard deviation of one quantity over the gait cycle, in the unit of its panel."""
+
+    percent: Array  # points of the gait cycle (n,), %
+    mean: Array  # mean (n,)
+    deviation: Array  # standard deviation (n,)
+
+
+def read_bands(path: str | Path) -> dict[str, Band]:
+    """Read bands from a CSV file.
+
+    The first column is the per cent of the gait cycle. The others are named after the titles of
+    panels, with ``_mean`` and ``_sd`` at the end.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Bands by the title of their panel.
+
+    Raises:
+        DocumentError: the file has no such columns, or a cell is not a number.
+    """
+    file = str(path)
+    rows = [
+        row
+        for row in csv.reader(io.StringIO(read_file(path).decode("utf-8-sig", "replace")))
+        if row
+    ]
+    labels = [label.strip() for label in rows[0]] if rows else []
+    names = [label.removesuffix(MEAN) for label in labels[1:] if label.endswith(MEAN)]
+    missing = [f"{name}{DEVIATION}" for name in names if f"{name}{DEVIATION}" not in labels]
+    if not names or missing or len(rows) < 3:
+        words = f"column '{missing[0]}' is missing" if missing else "there is no band"
+        raise DocumentError(
+            f"{words}; write per cent, NAME{MEAN} and NAME{DEVIATION} in the first line, and one row "
+            "for each point of the gait cycle",
+            file=file,
+        )
+    try:
+        numbers = np.array([[float(cell) for cell in row] for row in rows[1:]])
+    except ValueError as error:
+        raise DocumentError(f"expected numbers with equal columns: {error}", file=file) from None
+    if numbers.shape[1] != len(labels) or not (
+        np.isfinite(numbers).all() and (np.diff(numbers[:, 0]) > 0.0).all()
+    ):
+        raise DocumentError("expected finite numbers, and per cents that increase", file=file)
+    columns = dict(zip(labels, numbers.T, strict=True))
+    return {
+        name: Band(numbers[:, 0], columns[f"{name}{MEAN}"], columns[f"{name}{DEVIATION}"])
+        for name in names
+    }
+
+
+def check_bands(bands: Mapping[str, Band], titles: Sequence[str], *, cyclic: bool) -> None:
+    """Raise an error if no band can be drawn.
+
+    Args:
+        bands: bands by title.
+        titles: titles of all panels.
+        cyclic: whether any panel is over the gait cycle.
+
+    Raises:
+        SettingError: no panel has the name of a band, or no panel is over the gait cycle.
+    """
+    if not bands.keys() & {*titles}:
+        raise SettingError(
+            f"no panel is named {join_words([*bands], most=3)}, as the bands are; the panels are "
+            f"{join_words(list(dict.fromkeys(titles)), most=12)}"
+        )
+    if not cyclic:
+        raise SettingError(
+            "a band needs a complete gait cycle of each side; name the measured loads of the feet"
+        )
