@@ -28,6 +28,7 @@ MEANINGS = {
     "--budget": "runs, or models",
     "--forces": "shown in a picture or plot, or pushing besides",
     "--check": "of how text is laid out, or of a file of MuJoCo's",
+    "--overwrite": "results of tools, or of conversions",
     "--perturb": "once or often",
     "--samples": "of a sweep, or walkers",
     "--report-interval": "of the result files, or of what a measure looks at",
