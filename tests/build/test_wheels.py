@@ -5,9 +5,12 @@ from __future__ import annotations
 import importlib.util
 import json
 import struct
+import sys
 import zipfile
 
 import pytest
+
+from osimlite.mechanics.codegen import toolchain
 
 TABLE = json.dumps(
     {"version": "0", "laws": {"evaluate": "1", "merson~16": "2"}}, separators=(",", ":")
@@ -95,3 +98,42 @@ def test_a_wheel_has_a_library_for_each_level_of_processors(wheels, tmp_path):
     with zipfile.ZipFile(wheel, "a") as archive:
         archive.writestr("osimlite/native/kernels-x86-64-v3.so", elf())
     assert not wheels.check_wheel(wheel)
+
+
+SMALL = """extern "C" EXPORT long long evaluate() { return 1; }
+extern "C" EXPORT long long merson_along_16() { return 2; }
+extern "C" EXPORT const char osimlite_kernel_table[] = {%s, 0};
+"""
+PLATFORMS = (
+    "manylinux_2_17_x86_64 manylinux_2_17_aarch64 macosx_11_0_arm64 macosx_11_0_x86_64 win_amd64"
+)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("platform", PLATFORMS.split())
+def test_a_library_is_linked_for_every_platform(repo, wheels, platform, tmp_path, monkeypatch):
+    pytest.importorskip("ziglang", reason="needs ziglang: pip install ziglang")
+    assert [*wheels.PLATFORMS] == PLATFORMS.split()
+    zig = f"{sys.executable} -m ziglang c++ -target {wheels.PLATFORMS[platform]}"
+    monkeypatch.setenv("CXX", zig)
+    toolchain.find_compiler.cache_clear()
+    try:
+        compiler = toolchain.find_cross_compiler(platform)
+    finally:
+        toolchain.find_compiler.cache_clear()
+    export = (
+        "__declspec(dllexport)"
+        if compiler.system == "win32"
+        else '__attribute__((visibility("default")))'
+    )
+    text = f"#define EXPORT {export}\n" + SMALL % ",".join(map(str, TABLE))
+    (tmp_path / "small.cpp").write_text(text)
+    built = []
+    for target in compiler.targets:
+        compiler.compile(tmp_path / "small.cpp", tmp_path / "small.o", target)
+        library = tmp_path / f"small{toolchain.library_suffix(compiler.system)}"
+        for _ in range(2):
+            compiler.link([tmp_path / "small.o"], library)
+            built.append(library.read_bytes())
+        assert built[-1] == built[-2], "two builds differ"
+        assert not wheels.check_library(built[-1], platform)

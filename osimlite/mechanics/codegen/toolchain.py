@@ -131,8 +131,11 @@ class Compiler(NamedTuple):
             flags += ["-Wl,--as-needed", "-s"]
         elif self.system == "win32":
             # Two builds of the same text are equal to the last byte.
-            is_gnu = self.is_gcc or "ziglang" in self.command
-            flags += ["-Wl,--no-insert-timestamp"] if is_gnu else ["-Wl,/Brepro"]
+            if "ziglang" in self.command:
+                # Zig refuses the option of GNU's linker since 0.17.
+                flags.append("-Wl,-Brepro")
+            else:
+                flags.append("-Wl,--no-insert-timestamp" if self.is_gcc else "-Wl,/Brepro")
         if not self.is_gcc and (self.system != "win32" or "ziglang" in self.command):
             # Kernels use no C++ standard library, and zig would compile one first.
             flags.append("-nostdlib++")
