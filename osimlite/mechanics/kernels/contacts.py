@@ -7,6 +7,7 @@ The numbers of a pair are centre (3,) and normal (3,) of surface 1 in its link, 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 from osimlite.mechanics.kernels.condensation import CONTACT_NUMBERS, RESPONSE_WORK
 from osimlite.mechanics.kernels.layout import (
@@ -39,7 +40,7 @@ from osimlite.mechanics.laws.hunt_crossley import (
     half_space_sphere,
     sphere_sphere,
 )
-from osimlite.mechanics.laws.smooth_contact import smooth_contact_derivatives
+from osimlite.mechanics.laws.smooth_contact import SmoothContact, smooth_contact_derivatives
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
@@ -184,9 +185,8 @@ def contact_response(
         center = station(model, data, two, vector(p, CONTACT_NUMBERS.CENTER))
         # The elastic force grows with d^(3/2), so that its relative derivative by the depth is 1.5
         # / d.
-        write_response(
-            model, data, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d
-        )
+        contact = PushedContact(one, two, point, center, n, v, 1.0 - p[12])
+        write_response(model, data, y, f, contact, axis, changes, 1.5 / d)
     return OUTCOME.OK
 
 
@@ -224,28 +224,32 @@ def smooth_contact_response(
     # The force acts midway between the two surfaces.
     point = add_scaled(center, 0.5 * d - place[9], n)
     v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
-    pressed, damped, dragged, growth = smooth_contact_derivatives(
-        d, place[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], n, v
-    )
+    constants = SmoothContact(place[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
+    pressed, damped, dragged, growth = smooth_contact_derivatives(constants, d, n, v)
     if growth != 0.0:
+        touching = PushedContact(g[0], g[1], point, center, n, v, 0.5)
         changes = pressed, damped, dragged
-        write_response(
-            model,
-            data,
-            y,
-            f,
-            g[0],
-            g[1],
-            i[ITEM.OWN + 1],
-            point,
-            center,
-            n,
-            v,
-            0.5,
-            changes,
-            growth,
-        )
+        write_response(model, data, y, f, touching, i[ITEM.OWN + 1], changes, growth)
     return OUTCOME.OK
+
+
+class PushedContact(NamedTuple):
+    """Contact whose surfaces are pushed apart along the normal or across it."""
+
+    one: int  # link of surface 1
+    two: int  # link of surface 2
+    point: Vector  # point of application, m
+    center: Vector  # centre of surface 2, m; the point moves with it but for `sinks`
+    n: Vector  # normal from surface 1 to surface 2
+    v: Vector  # velocity of surface 1 relative to surface 2, m/s
+    sinks: float  # part of the motion along the normal that the point does not take part in
+
+
+class PointFactors(NamedTuple):
+    """Factors of position and velocity of a point of a link."""
+
+    by_place: Vector  # factor of the position
+    by_motion: Vector  # factor of the velocity
 
 
 def write_response(
@@ -253,14 +257,8 @@ def write_response(
     data: Floats,
     y: Floats,
     f: Floats,
-    one: int,
-    two: int,
+    contact: PushedContact,
     axis: int,
-    point: Vector,
-    center: Vector,
-    n: Vector,
-    v: Vector,
-    sinks: float,
     changes: Vector,
     growth: float,
 ) -> None:
@@ -271,18 +269,13 @@ def write_response(
         data: results of an evaluation.
         y: state.
         f: row of derivatives by coordinates (n,); changed.
-        one: link of surface 1.
-        two: link of surface 2.
+        contact: the contact.
         axis: 0 along the normal, 1 and 2 across it.
-        point: point of application (m).
-        center: centre of surface 2 (m); the point moves with it, but for a part of the normal motion.
-        n: normal from surface 1 to surface 2.
-        v: velocity of surface 1 relative to surface 2 (m/s).
-        sinks: this part of the normal motion.
         changes: derivatives of the normal force by depth and approach, and friction over slip.
         growth: relative derivative of the force by the depth (1/m).
     """
     change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
+    one, two, point, n, v = contact.one, contact.two, contact.point, contact.n, contact.v
     way, by_depth = n, 0.0
     if axis > 0:
         # Any two directions perpendicular to the normal and each other serve.
@@ -299,32 +292,10 @@ def write_response(
         change[0], change[1] = -pressed, -damped
     apply_force(model, data, two, point, way)
     apply_force(model, data, one, point, times(-1.0, way))
-    add_rotation_terms(
-        model,
-        data,
-        y,
-        f,
-        two,
-        point,
-        center,
-        n,
-        times(sinks, n),
-        times(by_depth, n),
-        times(change[1], way),
-    )
-    add_rotation_terms(
-        model,
-        data,
-        y,
-        f,
-        one,
-        point,
-        point,
-        n,
-        times(sinks, n),
-        times(-by_depth, n),
-        times(-change[1], way),
-    )
+    factors = PointFactors(times(by_depth, n), times(change[1], way))
+    add_rotation_terms(model, data, y, f, two, contact, contact.center, factors)
+    factors = PointFactors(times(-by_depth, n), times(-change[1], way))
+    add_rotation_terms(model, data, y, f, one, contact, point, factors)
 
 
 def add_rotation_terms(
@@ -333,16 +304,13 @@ def add_rotation_terms(
     y: Floats,
     row: Floats,
     link: int,
-    point: Vector,
+    contact: PushedContact,
     center: Vector,
-    n: Vector,
-    sinks: Vector,
-    by_place: Vector,
-    by_motion: Vector,
+    factors: PointFactors,
 ) -> None:
     """Add to a row the derivatives by coordinates of products with position and velocity at a point.
 
-    The point moves with another point of the link, but for a part of its motion along n.
+    The point moves with another point of the link, but for a part of its motion along the normal.
 
     Args:
         model: integers of the model.
@@ -350,12 +318,9 @@ def add_rotation_terms(
         y: state.
         row: derivatives by coordinates (n,); changed.
         link: number of the link; ground is ignored.
-        point: point of application in ground (m).
+        contact: contact with the point of application.
         center: material point that it moves with (m).
-        n: normal.
-        sinks: normal times the part of the motion along n that the point does not take part in.
-        by_place: factor of the position.
-        by_motion: factor of the velocity.
+        factors: factors of position and velocity.
     """
     if link < 0:
         return
@@ -363,7 +328,8 @@ def add_rotation_terms(
     origin, spin = vector(here, LINK_WORK.ORIGIN), vector(here, LINK_WORK.VELOCITY)
     # From the link to ground: `turning` and `shifting` are the velocity of the operations passed so
     # far, which the current one carries along.
-    arm, turning, shifting = minus(point, origin), ZERO, ZERO
+    arm, turning, shifting = minus(contact.point, origin), ZERO, ZERO
+    n, sinks = contact.n, times(contact.sinks, contact.n)
     while link >= 0:
         i = link_ints(model, link)
         for operation in range(i[LINK.END_OPERATION] - 1, i[LINK.FIRST_OPERATION] - 1, -1):
@@ -381,8 +347,10 @@ def add_rotation_terms(
                     plus(cross(turn, shifting), cross(shift, turning)),
                     cross(cross(turn, turning), arm),
                 )
-                placed = dot(by_place, plus(shift, cross(turn, arm)))
-                row[j[OPERATION.DOF]] += placed + dot(by_motion, plus(swept, cross(spin, moved)))
+                placed = dot(factors.by_place, plus(shift, cross(turn, arm)))
+                row[j[OPERATION.DOF]] += placed + dot(
+                    factors.by_motion, plus(swept, cross(spin, moved))
+                )
                 rate = y[model[MODEL.DOFS] + j[OPERATION.DOF]]
             turning, shifting = add_scaled(turning, rate, turn), add_scaled(shifting, rate, shift)
         link = i[LINK.PARENT]

@@ -13,6 +13,7 @@ from osimlite.mechanics.kernels.points import (
     velocity,
 )
 from osimlite.mechanics.laws.elastic_foundation import (
+    FoundationSpring,
     spring_in_half_space,
     spring_in_sphere,
     spring_load,
@@ -80,9 +81,8 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
             spring_in_half_space(o, n, middle) if is_plane else spring_in_sphere(o, p[6], middle)
         )
         if d > 0.0:
-            push, turn, stored = spring_load(
-                spring[0], p[11], p[12], p[13], p[14], p[15], middle, end, about, v, turning
-            )
+            constants = FoundationSpring(spring[0], p[11], p[12], p[13], p[14], p[15])
+            push, turn, stored = spring_load(constants, middle, end, about, v, turning)
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
     apply_mesh_load(model, data, item, about, force, torque, energy)
     return OUTCOME.OK

@@ -212,7 +212,7 @@ def try_multistep(
             h[MULTISTEP_WORK.CONDENSED] == c or condense_system(model, c, work)
         ):
             h[MULTISTEP_WORK.CONDENSED] = c
-            iterations = iterate_newton(model, reals, data, t1, c, y0, y1, d, psi, errors, work, h)
+            iterations = iterate_newton(model, reals, data, t1, c, y0, y1, h)
         # Without convergence, repeat once with new derivatives.
         if iterations > 0 or is_new or h[MULTISTEP_WORK.AGE] <= 0.0:
             break
@@ -318,10 +318,6 @@ def iterate_newton(
     c: float,
     y0: Floats,
     y1: Floats,
-    d: Floats,
-    psi: Floats,
-    change: Floats,
-    work: Floats,
     h: Floats,
 ) -> int:
     """Solve c f(t, y1) = psi + d by Newton's iteration, where d = y1 - prediction.
@@ -334,21 +330,15 @@ def iterate_newton(
         c: coefficient of the formula (s).
         y0: state at the start, for the error norm.
         y1: prediction, then the solution and its derivative.
-        d: filled with the difference of the solution from the prediction.
-        psi: sum over older differences.
-        change: workspace of a state.
-        work: condensed linear equations.
-        h: record of the method.
+        h: record of the method, with psi and the condensed equations; d is filled in.
 
     Returns:
         The number of iterations, 0 if they do not converge.
     """
-    size, f1, previous_residual, previous_length = (
-        model[MODEL.STATE_SIZE],
-        at(y1, model[MODEL.STATE_SIZE]),
-        0.0,
-        0.0,
-    )
+    size, previous_residual, previous_length = model[MODEL.STATE_SIZE], 0.0, 0.0
+    rows, work, f1 = at(h, HEAD), at(h, HEAD + STATES * size), at(y1, size)
+    d, psi = at(rows, ROWS * size), at(rows, (ROWS + 1) * size)
+    change = at(data, model[MODEL.WORK_STATE] + ERRORS * size)
     for k in range(size):
         d[k] = 0.0
     for iteration in range(ITERATIONS):

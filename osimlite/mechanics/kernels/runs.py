@@ -72,86 +72,53 @@ def run_several(
     Returns:
         `OUTCOME.OK`; how each run ended is in `endings`.
     """
+    runs = Motion(
+        model,
+        reals,
+        data,
+        sizes,
+        clocks,
+        counts,
+        times,
+        reports,
+        log,
+        forces,
+        events,
+        peaks,
+        watches,
+        levels,
+    )
     for k in range(first, last):
-        m = select_run(
-            model,
-            reals,
-            data,
-            each,
-            sizes,
-            clocks,
-            counts,
-            states,
-            times,
-            reports,
-            log,
-            forces,
-            events,
-            peaks,
-            watches,
-            levels,
-            k,
-        )
+        m = select_run(runs, each, k)
         endings[k] = integrate_run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
     return OUTCOME.OK
 
 
-def select_run(
-    model: Ints,
-    reals: Floats,
-    data: Floats,
-    each: int,
-    sizes: Ints,
-    clocks: Floats,
-    counts: Ints,
-    states: Floats,
-    times: Floats,
-    reports: Floats,
-    log: Floats,
-    forces: Floats,
-    events: Floats,
-    peaks: Floats,
-    watches: Ints,
-    levels: Floats,
-    k: int,
-) -> Motion:
+def select_run(runs: Motion, each: int, k: int) -> Motion:
     """Return one of several runs.
 
     Args:
-        model: integers of the model.
-        reals: numbers of the runs, in rows of `each`.
-        data: workspace of an evaluation and of the method, shared.
-        each: length of a row of numbers, 0 if all runs share one.
-        sizes: sizes and settings, see `RUN_SIZES`.
-        clocks: per run time and next step to try (s).
-        counts: per run the counts, see `COUNTS`.
-        states: per run the state.
-        times: times of the reports (s).
-        reports: per run the states at these times.
-        log: log of the steps, shared.
-        forces: forces of contacts at the steps of the log, shared.
-        events: per run the events.
-        peaks: per run the largest forces of contacts.
-        watches: watches, see `Motion`.
-        levels: numbers of the watches.
+        runs: vectors of all runs, each of which has a row of `reals`, `clock`, `counts`, `reports`,
+            `events` and `peaks`; the others are shared.
+        each: length of a row of `reals`, 0 if all runs share one.
         k: number of the run.
     """
-    size, pairs = model[MODEL.STATE_SIZE], model[MODEL.CONTACTS]
+    size, pairs, sizes = runs.model[MODEL.STATE_SIZE], runs.model[MODEL.CONTACTS], runs.sizes
     return Motion(
-        model,
-        at(reals, each * k),
-        data,
+        runs.model,
+        at(runs.reals, each * k),
+        runs.data,
         sizes,
-        at(clocks, 2 * k),
-        at(counts, COUNTS.SIZE * k),
-        times,
-        at(reports, k * sizes[RUN_SIZES.TIMES] * size),
-        log,
-        forces,
-        at(events, sizes[RUN_SIZES.EVENT] * k * sizes[RUN_SIZES.MOST_EVENTS]),
-        at(peaks, 2 * k * pairs),
-        watches,
-        levels,
+        at(runs.clock, 2 * k),
+        at(runs.counts, COUNTS.SIZE * k),
+        runs.times,
+        at(runs.reports, k * sizes[RUN_SIZES.TIMES] * size),
+        runs.log,
+        runs.forces,
+        at(runs.events, sizes[RUN_SIZES.EVENT] * k * sizes[RUN_SIZES.MOST_EVENTS]),
+        at(runs.peaks, 2 * k * pairs),
+        runs.watches,
+        runs.levels,
     )
 
 

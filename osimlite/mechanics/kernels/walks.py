@@ -461,26 +461,24 @@ def run_by_reflexes(
     Returns:
         `OUTCOME.OK`; how each run ended is in `endings`.
     """
+    runs = Motion(
+        model,
+        reals,
+        data,
+        sizes,
+        clocks,
+        counts,
+        times,
+        reports,
+        log,
+        forces,
+        events,
+        peaks,
+        watches,
+        levels,
+    )
     for k in range(first, last):
-        m = select_run(
-            model,
-            reals,
-            data,
-            each,
-            sizes,
-            clocks,
-            counts,
-            states,
-            times,
-            reports,
-            log,
-            forces,
-            events,
-            peaks,
-            watches,
-            levels,
-            k,
-        )
+        m = select_run(runs, each, k)
         walk = Walk(
             m,
             senses,

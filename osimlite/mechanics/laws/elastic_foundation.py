@@ -11,6 +11,8 @@ friction as in Simbody's ElasticFoundationForce (friction as in
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from osimlite.mechanics.laws.hunt_crossley import friction_coefficient
 from osimlite.mechanics.laws.vectors import (
     ZERO,
@@ -62,13 +64,19 @@ def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, V
     )
 
 
+class FoundationSpring(NamedTuple):
+    """Constants of a spring of the layer."""
+
+    k: float  # stiffness of the layer times area of the triangle, N/m
+    c: float  # dissipation, s/m
+    us: float  # coefficient of static friction, see `hunt_crossley.friction_coefficient`
+    ud: float  # coefficient of dynamic friction
+    uv: float  # coefficient of viscous friction, s/m
+    vt: float  # transition velocity, m/s
+
+
 def spring_load(
-    k: float,
-    c: float,
-    us: float,
-    ud: float,
-    uv: float,
-    vt: float,
+    spring: FoundationSpring,
     middle: Vector,
     end: Vector,
     about: Vector,
@@ -82,12 +90,7 @@ def spring_load(
     is its `friction_coefficient`. The energy is k |d|^2 / 2.
 
     Args:
-        k: stiffness of the layer times area of the triangle (N/m).
-        c: dissipation (s/m).
-        us: coefficient of static friction, see `hunt_crossley.friction_coefficient`.
-        ud: coefficient of dynamic friction.
-        uv: coefficient of viscous friction (s/m).
-        vt: transition velocity (m/s).
+        spring: constants of the spring.
         middle: middle of the spring (m).
         end: nearest point of the other surface (m).
         about: reference point of torque and velocity (m).
@@ -97,6 +100,7 @@ def spring_load(
     Returns:
         Force (N), torque about `about` (N m), and energy (J).
     """
+    k, c, us, ud, uv, vt = spring
     way = minus(end, middle)
     d = norm(way)
     if d == 0.0:

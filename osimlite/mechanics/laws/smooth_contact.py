@@ -14,6 +14,7 @@ Frontiers in Bioengineering and Biotechnology 4 (2016) 77, as in OpenSim's Meyer
 from __future__ import annotations
 
 from math import cosh, log, sqrt, tanh
+from typing import NamedTuple
 
 from osimlite.mechanics.laws.hunt_crossley import friction_coefficient
 from osimlite.mechanics.laws.vectors import Vector, add_scaled, dot, times
@@ -78,24 +79,29 @@ def smooth_contact_force(
     return add_scaled(times(f, n), f * friction_coefficient(w, us, ud, uv, vt) / w, slip)
 
 
+class SmoothContact(NamedTuple):
+    """Constants of a smooth contact."""
+
+    R: float  # radius of the sphere, m
+    E: float  # stiffness property, Pa
+    cf: float  # constant of smoothing, m², m²/s²
+    bd: float  # steepness of the transition at contact, 1/m
+    c: float  # dissipation, s/m
+    us: float  # coefficient of static friction
+    ud: float  # coefficient of dynamic friction
+    uv: float  # coefficient of viscous friction, s/m
+    vt: float  # transition velocity, m/s
+    bv: float  # steepness of the transition as the surfaces separate, s/m
+
+
 def smooth_contact_derivatives(
-    d: float, R: float, E: float, cf: float, bd: float, c: float, us: float, ud: float, uv: float, vt: float,
-    bv: float, n: Vector, v: Vector,
-) -> tuple[float, float, float, float]:  # fmt: skip
+    constants: SmoothContact, d: float, n: Vector, v: Vector
+) -> tuple[float, float, float, float]:
     """Return the derivatives of the force of `smooth_contact_force`.
 
     Args:
+        constants: constants of the contact.
         d: depth (m), negative for a gap.
-        R: radius of the sphere (m).
-        E: stiffness property (Pa).
-        cf: constant of smoothing (m², m²/s²).
-        bd: steepness of the transition at contact (1/m).
-        c: dissipation (s/m).
-        us: coefficient of static friction.
-        ud: coefficient of dynamic friction.
-        uv: coefficient of viscous friction (s/m).
-        vt: transition velocity (m/s).
-        bv: steepness of the transition as the surfaces separate (s/m).
         n: outward unit normal of the half space.
         v: velocity of the half space relative to the sphere at the point (m/s).
 
@@ -104,6 +110,7 @@ def smooth_contact_derivatives(
         tangential force over slip (N s/m), and relative derivative of the force by the depth (1/m);
         all 0 where there is no force.
     """
+    R, E, cf, bd, c, us, ud, uv, vt, bv = constants
     hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
     # Deep in a gap tanh underflows to -1 and the force is exactly 0.
     if hertz <= 0.0:

@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.mechanics.kernels.mesh_contacts import MESH_WORK, apply_mesh_load
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import angular_velocity, station, velocity
-from osimlite.mechanics.laws.elastic_foundation import spring_load
+from osimlite.mechanics.laws.elastic_foundation import FoundationSpring, spring_load
 from osimlite.mechanics.laws.vectors import ZERO, Vector, minus, plus, times
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND
@@ -221,7 +221,12 @@ class Springs:
         energy = 0.0
         for k, x, y, z, *end in acting:
             push, turn, stored = spring_load(
-                k, c, us, ud, uv, self.vt, (x, y, z), to_triple(end), about, v, turning
+                FoundationSpring(k, c, us, ud, uv, self.vt),
+                (x, y, z),
+                to_triple(end),
+                about,
+                v,
+                turning,
             )
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
         return force, torque, energy

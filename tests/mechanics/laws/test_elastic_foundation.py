@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.mechanics.laws.elastic_foundation import (
+    FoundationSpring,
     spring_in_half_space,
     spring_in_sphere,
     spring_load,
@@ -31,7 +32,7 @@ def test_nearest_points():
 
 def force(d, v, material=MATERIAL):
     """Force and energy where the middle is the origin and everything is about the nearest point."""
-    pushed, torque, energy = spring_load(*material, ZERO, d, d, v, ZERO)
+    pushed, torque, energy = spring_load(FoundationSpring(*material), ZERO, d, d, v, ZERO)
     assert torque == ZERO
     return pushed, energy
 
@@ -67,8 +68,12 @@ def test_torque_and_motion_about_any_point(middle, end, about, velocity, spin):
             velocity, (wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx), strict=True
         )
     ]
-    (fx, fy, fz), torque, energy = spring_load(*MATERIAL, middle, end, about, velocity, spin)
-    same, none, stored = spring_load(*MATERIAL, middle, end, end, tuple(there), spin)
+    (fx, fy, fz), torque, energy = spring_load(
+        FoundationSpring(*MATERIAL), middle, end, about, velocity, spin
+    )
+    same, none, stored = spring_load(
+        FoundationSpring(*MATERIAL), middle, end, end, tuple(there), spin
+    )
     assert (fx, fy, fz, energy) == pytest.approx((*same, stored)) and none == ZERO
     assert torque == pytest.approx(
         [ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx], abs=1e-12

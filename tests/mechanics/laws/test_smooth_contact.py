@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_energy, contact_force
 from osimlite.mechanics.laws.smooth_contact import (
+    SmoothContact,
     smooth_contact_derivatives,
     smooth_contact_energy,
     smooth_contact_force,
@@ -61,9 +62,8 @@ def test_derivatives_are_those_of_the_force(d, approach, slip, turn, c):
         return np.array(smooth_contact_force(hertz, c, *friction, cf, bv, UP, v))
 
     v = slip * math.cos(turn), approach, slip * math.sin(turn)
-    by_depth, by_speed, across, growth = smooth_contact_derivatives(
-        d, R, E, cf, bd, c, *friction, bv, UP, v
-    )
+    constants = SmoothContact(R, E, cf, bd, c, *friction, bv)
+    by_depth, by_speed, across, growth = smooth_contact_derivatives(constants, d, UP, v)
     there, scale = force(0.0, 0.0), abs(force(0.0, 0.0)[1]) + 1e-3
     assert by_depth == pytest.approx(
         (force(h, 0.0) - force(-h, 0.0))[1] / (2.0 * h), abs=1e-3 * scale
@@ -75,7 +75,7 @@ def test_derivatives_are_those_of_the_force(d, approach, slip, turn, c):
         math.copysign(math.hypot(there[0], there[2]), across), rel=1e-9, abs=1e-12
     )
     assert growth * there[1] == pytest.approx(by_depth, rel=1e-9, abs=1e-12)
-    assert smooth_contact_derivatives(-1.0, R, E, cf, bd, c, *friction, bv, UP, v) == (
+    assert smooth_contact_derivatives(constants, -1.0, UP, v) == (
         0.0,
         0.0,
         0.0,
