@@ -100,6 +100,11 @@ def test_a_wheel_has_a_library_for_each_level_of_processors(wheels, tmp_path):
     assert not wheels.check_wheel(wheel)
 
 
+def test_the_first_name_of_windows_comes_after_its_numbers(wheels):
+    library = windows().replace(b"\0evaluate", b"\x4e\x01evaluate")
+    assert not wheels.check_library(library, "win_amd64")
+
+
 SMALL = """extern "C" EXPORT long long evaluate() { return 1; }
 extern "C" EXPORT long long merson_along_16() { return 2; }
 extern "C" EXPORT const char osimlite_kernel_table[] = {%s, 0};
