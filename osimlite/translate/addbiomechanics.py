@@ -112,8 +112,8 @@ class SubjectFolder:
         names = UniqueNames()
         trials = []
         for trial in self.subject.trials:
-            files, facts = self._write_trial(trial, base, names(trial.name or "trial"))
-            written += files
+            trial_files, facts = self._write_trial(trial, base, names(trial.name or "trial"))
+            written += trial_files
             trials.append(facts)
         self.summary = {
             "subject": {
@@ -128,8 +128,8 @@ class SubjectFolder:
             },
             "contact_bodies": list(self.subject.contact_bodies),
             "models": [
-                {"type": kind, "file": self._models[index]}
-                for index, kind in enumerate(self.subject.pass_types)
+                {"type": pass_type, "file": self._models[index]}
+                for index, pass_type in enumerate(self.subject.pass_types)
                 if index in self._models
             ],
             "trials": trials,
@@ -138,13 +138,13 @@ class SubjectFolder:
 
     def _write_models(self, base: Path) -> list[Path]:
         """Write the model of each pass as it is, and a version for OpenSim where Nimble reads it otherwise."""
-        written = []
+        files = []
         names = UniqueNames()
         make_folder(base / "models")
-        for index, (kind, text) in enumerate(
+        for index, (pass_type, text) in enumerate(
             zip(self.subject.pass_types, self.subject.model_texts, strict=True)
         ):
-            name = names(kind)
+            name = names(pass_type)
             # Files without models hold raw data.
             if not text:
                 self.fidelity.add(
@@ -156,7 +156,7 @@ class SubjectFolder:
                 continue
             path = base / "models" / f"{name}.osim"
             write_atomically(path, text)
-            written.append(path)
+            files.append(path)
             self._models[index] = f"models/{name}.osim"
             self.fidelity.translated[f"/passes/{name}/model"] = self._models[index]
             # The conversion changes the model in place.
@@ -174,8 +174,8 @@ class SubjectFolder:
                 )
                 continue
             # Constraints are turned off in any case; only other changes need a second file.
-            moved = [change for change in changes if "isEnforced" not in change.done]
-            for change in moved:
+            motion_changes = [change for change in changes if "isEnforced" not in change.done]
+            for change in motion_changes:
                 self.fidelity.add(
                     "joint",
                     f"/passes/{name}/model{change.component}",
@@ -183,27 +183,27 @@ class SubjectFolder:
                     f"models/{name}_opensim.osim: {change.done}",
                 )
             # The setups of the trials use the model that moves as Nimble computed it.
-            if moved:
-                repaired = base / "models" / f"{name}_opensim.osim"
-                write_atomically(repaired, to_text(model))
-                written.append(repaired)
+            if motion_changes:
+                converted_path = base / "models" / f"{name}_opensim.osim"
+                write_atomically(converted_path, to_text(model))
+                files.append(converted_path)
                 self._models[index] = f"models/{name}_opensim.osim"
-        return written
+        return files
 
     def _write_trial(
         self, trial: B3dTrial, base: Path, name: str
     ) -> tuple[list[Path], dict[str, object]]:
         """Write the files of a trial, and return them with facts for the summary."""
         folder = make_folder(base / "trials" / name)
-        place = f"/trials/{name}"
+        trial_path = f"/trials/{name}"
         times, arrays = trial.times, trial.read_arrays()
-        written: list[Path] = []
+        paths: list[Path] = []
 
         def put(file: str, table: StoTable, source: str, *, has_missing: bool = True) -> None:
             path = folder / file
             write_sto(path, name, table.times, table.columns, table.rows, has_missing=has_missing)
-            written.append(path)
-            self.fidelity.translated[f"{place}/{source}"] = f"trials/{name}/{file}"
+            paths.append(path)
+            self.fidelity.translated[f"{trial_path}/{source}"] = f"trials/{name}/{file}"
 
         facts: dict[str, object] = {"name": trial.name, "folder": f"trials/{name}"}
         facts |= _describe_trial(trial)
@@ -215,20 +215,20 @@ class SubjectFolder:
             if unseen.any():
                 self.fidelity.add(
                     "marker",
-                    f"{place}/markers",
+                    f"{trial_path}/markers",
                     "a marker at the origin of ground, which means that it was not seen",
                     "written as a gap",
                     f"{int(unseen.sum())} positions",
                 )
             rows = positions.reshape(len(times), -1)
             write_trc(folder / MARKERS_FILE, times.tolist(), markers, rows)
-            written.append(folder / MARKERS_FILE)
-            self.fidelity.translated[f"{place}/markers"] = f"trials/{name}/{MARKERS_FILE}"
+            paths.append(folder / MARKERS_FILE)
+            self.fidelity.translated[f"{trial_path}/markers"] = f"trials/{name}/{MARKERS_FILE}"
         unnamed = len(self.subject.marker_names) - len(markers)
         if unnamed:
             self.fidelity.add(
                 "marker",
-                f"{place}/markers",
+                f"{trial_path}/markers",
                 "a marker without a name",
                 LEFT_OUT,
                 f"{unnamed} markers",
@@ -240,11 +240,11 @@ class SubjectFolder:
             if source in arrays:
                 labels = _label_columns(self.subject.header, key, axes, arrays[source].shape[1])
                 put(f"{source}.sto", StoTable(name, times, labels, arrays[source]), source)
-        reasons = trial.missing_forces
-        if reasons.any():
+        reason_codes = trial.missing_forces
+        if reason_codes.any():
             put(
                 MISSING_FILE,
-                StoTable(name, times, ("reason",), reasons[:, None].astype(float)),
+                StoTable(name, times, ("reason",), reason_codes[:, None].astype(float)),
                 "missing_forces",
             )
         index = self._find_pass(trial)
@@ -252,11 +252,11 @@ class SubjectFolder:
         if index is None:
             self.fidelity.add(
                 "pass",
-                place,
+                trial_path,
                 "coordinates and forces: the trial has no such processing pass",
                 LEFT_OUT,
             )
-            return written, facts
+            return paths, facts
         facts["pass"] = trial.passes[index].name
         put(
             COORDINATES_FILE,
@@ -268,14 +268,14 @@ class SubjectFolder:
         forces = trial.read_ground_forces(index)
         if forces.columns:
             put(FORCES_FILE, forces, "ground_forces", has_missing=False)
-            self._note_forces(trial, index, forces, place)
-            written.append(
+            self._note_forces(trial, index, forces, trial_path)
+            paths.append(
                 _write_document(folder / LOADS_FILE, _create_loads(self.subject.contact_bodies))
             )
         moments = trial.read_moments(index)
         if moments.rows.any():
             put(MOMENTS_FILE, moments, "moments")
-        self._note_left_out(trial, index, place)
+        self._note_left_out(trial, index, trial_path)
         if index in self._models and len(times) > 1:
             model = f"../../{self._models[index]}"
             loads = LOADS_FILE if forces.columns else ""
@@ -284,8 +284,8 @@ class SubjectFolder:
             cutoff = RAW_LOWPASS_HZ if is_raw else -1.0
             facts["setup_lowpass_hz"] = cutoff if is_raw else None
             setups = _create_setups(name, model, loads, (float(times[0]), float(times[-1])), cutoff)
-            written += [_write_document(folder / file, setup) for file, setup in setups.items()]
-        return written, facts
+            paths += [_write_document(folder / file, setup) for file, setup in setups.items()]
+        return paths, facts
 
     def _find_pass(self, trial: B3dTrial) -> int | None:
         """Return the index of the pass to write; None if the trial does not have it."""
@@ -303,7 +303,10 @@ class SubjectFolder:
         columns, rows = list(table.columns), [*table.rows.T]
         for coupler in self.subject.read_model(index).components(CoordinateCouplerConstraint):
             name = _get_last_name(str(coupler.dependent_coordinate_name))
-            arguments = [_get_last_name(str(each)) for each in coupler.independent_coordinate_names]
+            arguments = [
+                _get_last_name(str(coordinate))
+                for coordinate in coupler.independent_coordinate_names
+            ]
             function = coupler.coupled_coordinates_function
             # A coordinate that the file has is not computed again.
             if name in columns or function is None or not {*arguments} <= {*table.columns}:
@@ -317,64 +320,66 @@ class SubjectFolder:
             table.name, table.times, tuple(columns), np.array(rows).T.reshape(len(table.times), -1)
         )
 
-    def _note_forces(self, trial: B3dTrial, index: int, forces: StoTable, place: str) -> None:
+    def _note_forces(self, trial: B3dTrial, index: int, forces: StoTable, trial_path: str) -> None:
         """Note how the written forces differ from the file's centres of pressure, and which are missing."""
-        reasons = trial.missing_forces
-        if reasons.any():
-            counts = Counter(reasons[reasons != 0].tolist())
-            words = ", ".join(
+        reason_codes = trial.missing_forces
+        if reason_codes.any():
+            counts = Counter(reason_codes[reason_codes != 0].tolist())
+            summary = ", ".join(
                 f"{count} of '{_describe_reason(number)}'" for number, count in counts.items()
             )
             self.fidelity.add(
                 "missing-forces",
-                f"{place}/ground_forces",
+                f"{trial_path}/ground_forces",
                 "that forces of a frame are missing or wrong",
                 f"the forces are written, and the reasons in {MISSING_FILE}; do not trust inverse dynamics there",
-                f"{int((reasons != 0).sum())} of {trial.frame_count} frames: {words}",
+                f"{int((reason_codes != 0).sum())} of {trial.frame_count} frames: {summary}",
             )
-        stored = trial.read_arrays(index).get("contact_points")
-        if stored is None:
+        file_points = trial.read_arrays(index).get("contact_points")
+        if file_points is None:
             return
         distances = []
         for body in range(len(self.subject.contact_bodies)):
-            point = stored[:, 3 * body : 3 * body + 3]
-            written = forces.rows[:, 9 * body + 3 : 9 * body + 6]
+            file_point = file_points[:, 3 * body : 3 * body + 3]
+            written_point = forces.rows[:, 9 * body + 3 : 9 * body + 6]
             # Zeros mark frames without a centre of pressure.
-            selected = point.any(axis=1) & (np.abs(forces.rows[:, 9 * body + 1]) > LOADED_FORCE_N)
-            distances += np.linalg.norm(point - written, axis=1)[selected].tolist()
+            selected = file_point.any(axis=1) & (
+                np.abs(forces.rows[:, 9 * body + 1]) > LOADED_FORCE_N
+            )
+            distances += np.linalg.norm(file_point - written_point, axis=1)[selected].tolist()
         errors: Mapping[str, Error] = {"point": Error.measure(distances, "m")} if distances else {}
         self.fidelity.add(
             "center-of-pressure",
-            f"{place}/ground_forces",
+            f"{trial_path}/ground_forces",
             "centres of pressure, which the file has as zero in some frames, and with a torque along the force",
             "computed from the wrench, with a vertical torque; force, point and torque give exactly the wrench",
             errors=errors,
         )
 
-    def _note_left_out(self, trial: B3dTrial, index: int, place: str) -> None:
+    def _note_left_out(self, trial: B3dTrial, index: int, trial_path: str) -> None:
         """Note the arrays and passes of a trial that are not written."""
-        present = [name for name in PASS_FIELDS.values() if name in trial.read_arrays(index)]
+        available = [name for name in PASS_FIELDS.values() if name in trial.read_arrays(index)]
         derived = [
             name
-            for name in present
+            for name in available
             if name.startswith(("root_", "mass_center")) or name in DERIVED_FIELDS
         ]
         if derived:
             self.fidelity.add(
                 "derived",
-                f"{place}/derived",
+                f"{trial_path}/derived",
                 "what follows from coordinates, forces and model",
                 f"{LEFT_OUT}; osimlite.read_b3d has it",
                 ", ".join(derived),
             )
-        for other, each in enumerate(trial.passes):
-            if other != index:
+        for pass_index, processing_pass in enumerate(trial.passes):
+            if pass_index != index:
                 self.fidelity.add(
                     "pass",
-                    f"{place}/passes/{other}-{each.name}",
+                    f"{trial_path}/passes/{pass_index}-{processing_pass.name}",
                     "several processing passes of a trial",
                     f"{LEFT_OUT}; select one with --processing-pass",
-                    each.name,
+                    processing_pass.name,
                 )
 
 
@@ -386,8 +391,8 @@ def _describe_reason(number: int) -> str:
 def _describe_trial(trial: B3dTrial) -> dict[str, object]:
     """Return facts about a trial for the summary."""
     header = trial.header
-    reasons = trial.missing_forces
-    counts = Counter(int(reason) for reason in reasons if reason)
+    reason_codes = trial.missing_forces
+    counts = Counter(int(reason) for reason in reason_codes if reason)
     return {
         "frames": trial.frame_count,
         "time_step_s": trial.time_step,
@@ -403,13 +408,13 @@ def _describe_trial(trial: B3dTrial) -> dict[str, object]:
         },
         "passes": [
             {
-                "type": each.name,
-                "lowpass_cutoff_hz": each.header["lowpass_cutoff"] or None,
+                "type": processing_pass.name,
+                "lowpass_cutoff_hz": processing_pass.header["lowpass_cutoff"] or None,
                 "unobserved_coordinates": sum(
-                    not seen for seen in each.header["positions_observed"]
+                    not observed for observed in processing_pass.header["positions_observed"]
                 ),
             }
-            for each in trial.passes
+            for processing_pass in trial.passes
         ],
     }
 
@@ -454,7 +459,7 @@ def _create_loads(bodies: Sequence[str]) -> ExternalLoads:
 
 
 def _create_setups(
-    name: str, model: str, loads: str, span: tuple[float, float], cutoff: float
+    name: str, model: str, loads: str, time_range: tuple[float, float], cutoff: float
 ) -> dict[str, InverseDynamicsTool | AnalyzeTool]:
     """Return the setups of a trial by their files.
 
@@ -462,10 +467,10 @@ def _create_setups(
         name: name of the trial.
         model: path of the model from the folder of the trial.
         loads: file of the external loads; "" without loads.
-        span: first and last time, s.
+        time_range: first and last time, s.
         cutoff: cutoff frequency of the filter of the coordinates, Hz; negative for no filter.
     """
-    start, end = span
+    start, end = time_range
     return {
         INVERSE_DYNAMICS_FILE: InverseDynamicsTool(
             name=name,

@@ -114,9 +114,9 @@ def to_biomod(
     for force in model.components(Force):
         if not isinstance(force, Muscle):
             fidelity.add("force", force.path, "forces other than muscles", LEFT_OUT)
-    stem = legal(model.name or "model") if name is None else name
-    coordinates = format_coordinates(robot, f"{stem}.bioMod")
-    return BioMod(stem, "\n".join(lines) + "\n", coordinates, fidelity, robot)
+    file_stem = legal(model.name or "model") if name is None else name
+    coordinates = format_coordinates(robot, f"{file_stem}.bioMod")
+    return BioMod(file_stem, "\n".join(lines) + "\n", coordinates, fidelity, robot)
 
 
 def _format_numbers(numbers: Sequence[float] | Array) -> str:
@@ -132,22 +132,24 @@ def _format_segments(robot: Robot) -> Iterator[str]:
     joints = {joint.child: joint for joint in robot.joints}
     for link in robot.links[1:]:
         joint = joints[link.name]
-        parent, origin, word = joint.parent, joint.origin, _find_axis(joint)
-        if joint.kind != "fixed" and word is None:
+        parent, origin, axis_letter = joint.parent, joint.origin, _find_axis(joint)
+        if joint.kind != "fixed" and axis_letter is None:
             # A segment moves along its own axes only: turn to the axis before, and back after.
-            turned = np.eye(4)
+            axis_frame = np.eye(4)
             # The helper segment has the axis of the joint as its z axis.
-            turned[:3, :3] = _align(joint.axis)
+            axis_frame[:3, :3] = _align(joint.axis)
             yield from _format_segment(
-                f"{link.name}_axis", parent, origin @ turned, joint, "z", robot
+                f"{link.name}_axis", parent, origin @ axis_frame, joint, "z", robot
             )
             yield from ("\tmass 0", "endsegment", "")
             # The rotation back is the transpose.
-            parent, origin = f"{link.name}_axis", turned.T
+            parent, origin = f"{link.name}_axis", axis_frame.T
             yield from _format_segment(link.name, parent, origin, None, "", robot)
         else:
-            moved = joint if joint.kind != "fixed" else None
-            yield from _format_segment(link.name, parent, origin, moved, word or "", robot)
+            moving_joint = joint if joint.kind != "fixed" else None
+            yield from _format_segment(
+                link.name, parent, origin, moving_joint, axis_letter or "", robot
+            )
         # Without these lines biorbd gives the segment a small mass.
         yield f"\tmass {format_number(link.mass)}"
         yield "\tinertia"
@@ -157,7 +159,7 @@ def _format_segments(robot: Robot) -> Iterator[str]:
 
 
 def _format_segment(
-    name: str, parent: str, origin: Array, joint: RobotJoint | None, word: str, robot: Robot
+    name: str, parent: str, origin: Array, joint: RobotJoint | None, axis_letter: str, robot: Robot
 ) -> Iterator[str]:
     """Yield the lines of a segment up to its mass.
 
@@ -166,7 +168,7 @@ def _format_segment(
         parent: name of the segment that carries it.
         origin: frame of the segment in that of the parent (4, 4), before the motion.
         joint: the joint that moves it; None if it does not move.
-        word: axis of the motion.
+        axis_letter: axis of the motion.
         robot: the robot.
     """
     yield f"segment {name}"
@@ -175,11 +177,11 @@ def _format_segment(
     yield "\trt"
     yield from (f"\t\t{_format_numbers(row)}" for row in origin)
     if joint is not None:
-        yield f"\t{'rotations' if joint.kind == 'revolute' else 'translations'} {word}"
+        yield f"\t{'rotations' if joint.kind == 'revolute' else 'translations'} {axis_letter}"
         if joint.coordinate is not None:
-            low, high = robot.mechanism.coordinates[joint.coordinate].range
+            lower, upper = robot.mechanism.coordinates[joint.coordinate].range
             yield "\trangesQ"
-            yield f"\t\t{_format_numbers((low, high))}"
+            yield f"\t\t{_format_numbers((lower, upper))}"
 
 
 def _find_axis(joint: RobotJoint) -> str | None:
@@ -234,19 +236,23 @@ def _format_muscles(
             # biorbd has no paths that are functions.
             continue
         points = [point for point in path.path_point_set.objects if isinstance(point, PathPoint)]
-        odd = len(path.path_point_set.objects) - len(points)
-        conditional = sum(isinstance(point, ConditionalPathPoint) for point in points)
-        wraps = len(path.path_wrap_set.objects)
+        moving_count = len(path.path_point_set.objects) - len(points)
+        conditional_count = sum(isinstance(point, ConditionalPathPoint) for point in points)
+        wrap_count = len(path.path_wrap_set.objects)
         if len(points) < 2:
             fidelity.add("muscle", muscle.path, "a path without two fixed points", LEFT_OUT)
             continue
-        for count, words, done in (
-            (wraps, "a path around surfaces", "straight between its points"),
-            (odd, "points that move with a coordinate", "the path runs without them"),
-            (conditional, "points that count in a range only", "the path always runs through them"),
+        for count, description, replacement in (
+            (wrap_count, "a path around surfaces", "straight between its points"),
+            (moving_count, "points that move with a coordinate", "the path runs without them"),
+            (
+                conditional_count,
+                "points that count in a range only",
+                "the path always runs through them",
+            ),
         ):
             if count:
-                fidelity.add("path", muscle.path, words, done, f"{count} in the path")
+                fidelity.add("path", muscle.path, description, replacement, f"{count} in the path")
         fidelity.add(
             "muscle-law",
             muscle.path,
@@ -255,8 +261,8 @@ def _format_muscles(
         )
         name = names(muscle.name)
         # The first and the last point are attributes of the group, the others are via points.
-        placed = [_place(point, robot, placements) for point in points]
-        (first, origin), *inner, (last, insertion) = placed
+        positions = [_place(point, robot, placements) for point in points]
+        (first, origin), *via_points, (last, insertion) = positions
         yield from (
             f"musclegroup {name}_group",
             f"\toriginparent {first}",
@@ -278,9 +284,11 @@ def _format_muscles(
             "pennationangle": [muscle.pennation_angle_at_optimal],
             "maxvelocity": [muscle.max_contraction_velocity],
         }
-        yield from (f"\t{word} {_format_numbers(values)}" for word, values in numbers.items())
+        yield from (
+            f"\t{attribute} {_format_numbers(values)}" for attribute, values in numbers.items()
+        )
         yield from ("endmuscle", "")
-        for index, (segment, point) in enumerate(inner):
+        for index, (segment, point) in enumerate(via_points):
             yield from (f"viapoint {name}_{index + 1}", f"\tparent {segment}", f"\tmuscle {name}")
             yield f"\tmusclegroup {name}_group"
             yield from (f"\tposition {_format_numbers(point)}", "endviapoint", "")

@@ -42,8 +42,8 @@ class Bvh:
         """Write ``<name>.bvh`` into a folder, which is made if it does not exist."""
         path = make_folder(folder) / f"{self.name}.bvh"
         with open_atomically(path) as stream:
-            for part in format_bvh(self.motion):
-                stream.write(part.encode())
+            for chunk in format_bvh(self.motion):
+                stream.write(chunk.encode())
         return [path]
 
 
@@ -77,8 +77,8 @@ def to_bvh(
     times, values = np.zeros(1), np.asarray(mechanism.assemble({}), dtype=float)[None, :]
     if motion is not None:
         # Poses that violate constraints would tear the skeleton.
-        recorded = RecordedMotion.read(mechanism, motion).assembled()
-        times, values = np.asarray(recorded.times), np.asarray(recorded.values)
+        assembled = RecordedMotion.read(mechanism, motion).assembled()
+        times, values = np.asarray(assembled.times), np.asarray(assembled.values)
     result = make_bvh(mechanism, times, values, scale=scale)
     fidelity = Fidelity(mechanism.name, "bvh")
     for body, joint in zip(mechanism.bodies, result.names, strict=True):
@@ -90,10 +90,10 @@ def to_bvh(
                 "a bone whose joint moves in its parent, which some programs ignore",
                 "position channels: poses are exact where they are read",
             )
-    known = fidelity.translated.keys()
+    translated_paths = fidelity.translated.keys()
     # Bodies that are welded to others have no joint.
     for component in model.body_set.objects:
-        if isinstance(component, Body) and component.path not in known:
+        if isinstance(component, Body) and component.path not in translated_paths:
             fidelity.add("body", component.path, "a body that is part of another one", LEFT_OUT)
     if any(True for _ in model.force_set.objects):
         fidelity.add("force", "/forceset", *CONTENTS)

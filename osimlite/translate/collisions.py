@@ -60,13 +60,13 @@ def collect_collisions(
                 "left out",
             )
             continue
-        made = _make_shape(geometry, path, fidelity, mesh_files)
-        if made is None:
+        shape_and_frame = _make_shape(geometry, path, fidelity, mesh_files)
+        if shape_and_frame is None:
             continue
-        shape, own = made
-        body, placed = mechanism.frames[frame]
+        shape, local_frame = shape_and_frame
+        body, frame_in_body = mechanism.frames[frame]
         owner = "/ground" if body < 0 else mechanism.bodies[body].path
-        origin = placed @ make_offset(geometry.location, geometry.orientation) @ own
+        origin = frame_in_body @ make_offset(geometry.location, geometry.orientation) @ local_frame
         result.setdefault(owner, []).append(Visual(shape, origin, source=path))
     return result
 
@@ -75,7 +75,7 @@ def _make_shape(
     geometry: ContactGeometry, path: str, fidelity: Fidelity, mesh_files: MeshFiles
 ) -> tuple[Shape, Array] | None:
     """Return the shape of a contact surface and its frame in the frame of the geometry, or None."""
-    here = np.eye(4)
+    local_frame = np.eye(4)
 
     def report(what: str, done: str, detail: str = "") -> None:
         fidelity.add("contact-geometry", path, what, done, detail)
@@ -87,27 +87,27 @@ def _make_shape(
                 "a collision shape without it",
                 f"sphere of {geometry.radius:g} m",
             )
-            return Ball(geometry.radius), here
+            return Ball(geometry.radius), local_frame
         case ContactHalfSpace():
             # OpenSim's half space fills x > 0, so that the box lies on that side of its face.
-            here[0, 3] = HALF_SPACE_BOX_M[0] / 2.0
+            local_frame[0, 3] = HALF_SPACE_BOX_M[0] / 2.0
             size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
             report(
                 "a half space, and its material",
                 f"a collision box of {size} m whose face is its surface",
             )
-            return Box(HALF_SPACE_BOX_M), here
+            return Box(HALF_SPACE_BOX_M), local_frame
         # URDF has no ellipsoids, so that a scaled ball becomes a mesh file.
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             file = mesh_files.name_of_stretched("ellipsoid", make_ball(), geometry.radii)
             report("an ellipsoid, and its material", "a collision shape in a mesh file", file)
-            return MeshFile(file), here
+            return MeshFile(file), local_frame
         case ContactMesh():
             shape = mesh_shape(geometry.filename, path, mesh_files, fidelity.add)
             if shape is not None:
                 done = "a collision shape of the file; many programs take its convex hull"
                 report("the material of a contact mesh", done, shape.file)
-                return shape, here
+                return shape, local_frame
             return None
     report(f"a contact surface of class {type(geometry).__name__}", "left out")
     return None

@@ -128,24 +128,28 @@ def to_urdf(
     """
     if limits not in ("none", "range"):
         raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
-    for what, limit in (("effort", effort), ("velocity", velocity)):
+    for quantity, limit in (("effort", effort), ("velocity", velocity)):
         if limit is not None and not 0.0 < limit < math.inf:
             raise OsimliteError(
-                f"a limit of {what} is a positive number, not {limit:g}; leave it out for no limit"
+                f"a limit of {quantity} is a positive number, not {limit:g}; leave it out for no limit"
             )
     # Options are checked before the model is built, which may take seconds.
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
     # Meshes are searched beside the model, then in the named folders.
-    places = MeshFolders(None if folder is None else Path(folder), geometry)
-    mesh_files = MeshFiles(places)
+    mesh_folders = MeshFolders(None if folder is None else Path(folder), geometry)
+    mesh_files = MeshFiles(mesh_folders)
     shapes = (
         collect_visuals(model, mechanism, fidelity.add, mesh_files=mesh_files)
         if visuals
         else Visuals()
     )
-    touching = collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}
-    robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body, collisions=touching)
+    collision_shapes = (
+        collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}
+    )
+    robot = build_robot(
+        mechanism, locked=locked, visuals=shapes.by_body, collisions=collision_shapes
+    )
     # Merging comes before limits and names, which belong to the remaining links.
     if merge:
         robot = merge_fixed(robot)

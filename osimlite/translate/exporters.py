@@ -50,53 +50,53 @@ class Exporter:
     takes_motion: bool = False  # whether the function takes the keyword argument `motion`
 
 
-def write_urdf(*model: Any, **choices: Any) -> Urdf:
+def write_urdf(*model: Any, **options: Any) -> Urdf:
     """Translate a model to URDF; see :func:`osimlite.to_urdf`."""
     # Importing a translator takes time, and each command needs at most one.
     from osimlite.translate.export import to_urdf
 
-    return to_urdf(*model, **choices)
+    return to_urdf(*model, **options)
 
 
-def write_mjcf(*model: Any, **choices: Any) -> Mjcf:
+def write_mjcf(*model: Any, **options: Any) -> Mjcf:
     """Translate a model to MJCF; see :func:`osimlite.to_mjcf`."""
     from osimlite.translate.mjcf.export import to_mjcf
 
-    return to_mjcf(*model, **choices)
+    return to_mjcf(*model, **options)
 
 
-def write_bvh(*model: Any, **choices: Any) -> Bvh:
+def write_bvh(*model: Any, **options: Any) -> Bvh:
     """Translate a model and its motion to BVH; see :func:`osimlite.translate.bvh.to_bvh`."""
     from osimlite.translate.bvh import to_bvh
 
-    return to_bvh(*model, **choices)
+    return to_bvh(*model, **options)
 
 
-def write_biomod(*model: Any, **choices: Any) -> BioMod:
+def write_biomod(*model: Any, **options: Any) -> BioMod:
     """Translate a model for biorbd; see :func:`osimlite.translate.biomod.to_biomod`."""
     from osimlite.translate.biomod import to_biomod
 
-    return to_biomod(*model, **choices)
+    return to_biomod(*model, **options)
 
 
-def write_page(shown: Shown, path: Path) -> str:
+def write_page(viewed: Shown, path: Path) -> str:
     """Write a page for browsers, and return its name and size."""
-    return f"{shown.write_page(path)} ({_megabytes(path)})"
+    return f"{viewed.write_page(path)} ({_megabytes(path)})"
 
 
-def write_glb(shown: Shown, path: Path) -> str:
+def write_glb(viewed: Shown, path: Path) -> str:
     """Write a file of glTF, and return its name and size."""
-    return f"{shown.write_glb(path)} ({_megabytes(path)})"
+    return f"{viewed.write_glb(path)} ({_megabytes(path)})"
 
 
-def write_rerun(shown: Shown, path: Path) -> str:
+def write_rerun(viewed: Shown, path: Path) -> str:
     """Write a recording for the viewer of Rerun, and return its name, its size and how to open it."""
-    return f"{shown.write_rrd(path)} ({_megabytes(path)}); open it with: rerun {path}"
+    return f"{viewed.write_rrd(path)} ({_megabytes(path)}); open it with: rerun {path}"
 
 
-def write_screenshot(shown: Shown, path: Path, *, at: float | None) -> str:
+def write_screenshot(viewed: Shown, path: Path, *, at: float | None) -> str:
     """Write a picture of a moment (s), and return its name."""
-    return str(shown.write_picture(path, SCREENSHOT_SIZE, at))
+    return str(viewed.write_picture(path, SCREENSHOT_SIZE, at))
 
 
 def _megabytes(path: Path) -> str:

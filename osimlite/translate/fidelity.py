@@ -36,8 +36,8 @@ class Error(NamedTuple):
             differences: differences between target and model (k,).
             unit: their unit.
         """
-        off = np.abs(differences)
-        return cls(float(off.max()), float(np.sqrt(np.mean(off**2))), unit)
+        magnitudes = np.abs(differences)
+        return cls(float(magnitudes.max()), float(np.sqrt(np.mean(magnitudes**2))), unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +95,9 @@ class RecordGroup:
         """Return the largest error of each quantity and unit, over all components and coordinates."""
         result: dict[tuple[str, str], Error] = {}
         for record in self.records:
-            for what, error in record.errors.items():
+            for quantity, error in record.errors.items():
                 # Moment arms about different coordinates are one quantity for a summary.
-                name = what.partition(" about ")[0]
+                name = quantity.partition(" about ")[0]
                 # Tuples are compared by their first entry, the largest error.
                 result[name, error.unit] = max(error, result.get((name, error.unit), error))
         return [(name, error) for (name, _), error in result.items()]
@@ -152,17 +152,17 @@ class Fidelity:
         """
         self.records.append(Record(kind, component, cannot_say, done, detail, errors or {}))
 
-    def note_name(self, component: str, kind: str, own: str, name: str) -> None:
+    def note_name(self, component: str, kind: str, component_name: str, name: str) -> None:
         """Note the new name of an element if it differs from the name of its component.
 
         Args:
             component: absolute path in the model.
             kind: kind of element, for example "joint".
-            own: name of the component.
+            component_name: name of the component.
             name: name of the element.
         """
         # Only new names are worth an entry.
-        if name != own:
+        if name != component_name:
             self.renamed.setdefault(component, {})[kind] = name
 
     def groups(self) -> list[RecordGroup]:
@@ -179,9 +179,13 @@ class Fidelity:
             Numbers of components that are translated exactly, approximately, and not at all.
         """
         # A component with several records counts once, by the worst of them.
-        dropped = {record.component for record in self.records if record.how == "dropped"}
-        changed = {record.component for record in self.records} - dropped
-        return len(self.translated.keys() - changed - dropped), len(changed), len(dropped)
+        dropped_paths = {record.component for record in self.records if record.how == "dropped"}
+        changed_paths = {record.component for record in self.records} - dropped_paths
+        return (
+            len(self.translated.keys() - changed_paths - dropped_paths),
+            len(changed_paths),
+            len(dropped_paths),
+        )
 
     def list_missing(self, paths: Iterable[str]) -> list[str]:
         """Return the paths that the account does not cover.
@@ -192,10 +196,12 @@ class Fidelity:
         recorded = {record.component for record in self.records}
         missing = []
         for path in paths:
-            parts = path.split("/")
+            path_parts = path.split("/")
             # Paths begin with a slash, so that the first part is empty.
-            above = {"/".join(parts[:count]) for count in range(2, len(parts) + 1)} | {path}
-            if path not in self.translated and not above & recorded:
+            ancestors = {
+                "/".join(path_parts[:count]) for count in range(2, len(path_parts) + 1)
+            } | {path}
+            if path not in self.translated and not ancestors & recorded:
                 missing.append(path)
         return missing
 

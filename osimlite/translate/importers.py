@@ -73,14 +73,14 @@ class Importer:
     choices: tuple[OptionSpec, ...] = ()
 
 
-def read_mjcf(path: Path, *, written_for: str | None = None, **choices: Any) -> Osim:
+def read_mjcf(path: Path, *, written_for: str | None = None, **options: Any) -> Osim:
     """Convert an MJCF file to an OpenSim model; see :func:`osimlite.from_mjcf`."""
     from osimlite.translate.mjcf_import.convert import from_mjcf
 
     version: Any = written_for
     if written_for is not None and written_for.isdecimal():
         version = int(written_for)
-    return from_mjcf(path, written_for=version, **choices)
+    return from_mjcf(path, written_for=version, **options)
 
 
 MJCF_CHOICES = (
@@ -171,11 +171,11 @@ B3D_CHOICES = (
 """Options of the format of AddBiomechanics."""
 
 
-def read_bvh(path: Path, **choices: Any) -> BvhMarkers:
+def read_bvh(path: Path, **options: Any) -> BvhMarkers:
     """Read joint centres of a BVH file; see :class:`osimlite.translate.bvh.BvhMarkers`."""
     from osimlite.translate.bvh import BvhMarkers
 
-    return BvhMarkers(path, **choices)
+    return BvhMarkers(path, **options)
 
 
 IMPORTERS: list[Importer] = [

@@ -96,8 +96,8 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
         UnsupportedError: Nimble cannot read the model, so that it has no motion there.
     """
     changes: list[NimbleChange] = []
-    parts: list[Object] = [*model.joint_set.objects]
-    for joint in parts:
+    joints: list[Object] = [*model.joint_set.objects]
+    for joint in joints:
         # Patellae are left out by Nimble.
         if not isinstance(joint, Joint) or joint.name in OMITTED_JOINTS:
             continue
@@ -148,49 +148,51 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
 
 def _rewrite_custom_joint(joint: CustomJoint) -> list[NimbleChange]:
     """Write into the functions of a CustomJoint what Nimble makes of them."""
-    kind = classify_custom_joint(joint)
+    nimble_joint = classify_custom_joint(joint)
     names = [coordinate.name for coordinate in joint.coordinates]
     axes = list(joint.spatial_transform.axes().values())
     vectors = [_flip(axis) for axis in axes]
-    linear = [
+    linear_axes = [
         index
         for index, axis in enumerate(axes)
         if isinstance(unwrap_function(axis)[0], LinearFunction)
     ]
-    if kind is NimbleJoint.WELD:
+    if nimble_joint is NimbleJoint.WELD:
         return []
-    if kind is NimbleJoint.CUSTOM:
-        new = _build_custom_axes(joint, axes, vectors)
+    if nimble_joint is NimbleJoint.CUSTOM:
+        new_axes = _build_custom_axes(joint, axes, vectors)
     else:
-        if kind in (NimbleJoint.EULER, NimbleJoint.EULER_FREE):
-            vectors[:3] = _orthogonalize(joint, vectors[:3], may_tilt=kind is NimbleJoint.EULER)
-        if kind is NimbleJoint.EULER_FREE:
+        if nimble_joint in (NimbleJoint.EULER, NimbleJoint.EULER_FREE):
+            vectors[:3] = _orthogonalize(
+                joint, vectors[:3], may_tilt=nimble_joint is NimbleJoint.EULER
+            )
+        if nimble_joint is NimbleJoint.EULER_FREE:
             vectors[3:] = UNIT_AXES
         # The axes that follow a coordinate; all others are fixed.
-        driven = {
+        driven_axes = {
             NimbleJoint.EULER: [0, 1, 2],
             NimbleJoint.EULER_FREE: [0, 1, 2, 3, 4, 5],
-        }.get(kind, linear)
-        new = [(vector, Constant(name="function", value=0.0), "") for vector in vectors]
-        for name, index in zip(names, driven, strict=False):
-            new[index] = (
+        }.get(nimble_joint, linear_axes)
+        new_axes = [(vector, Constant(name="function", value=0.0), "") for vector in vectors]
+        for name, index in zip(names, driven_axes, strict=False):
+            new_axes[index] = (
                 vectors[index],
                 LinearFunction(name="function", coefficients=(1.0, 0.0)),
                 name,
             )
-    changed = []
-    for (place, axis), (vector, function, name) in zip(
-        joint.spatial_transform.axes().items(), new, strict=True
+    changed_axes = []
+    for (axis_name, axis), (vector, function, name) in zip(
+        joint.spatial_transform.axes().items(), new_axes, strict=True
     ):
         if _replace_axis(axis, vector, function, name):
-            changed.append(place)
-    if not changed:
+            changed_axes.append(axis_name)
+    if not changed_axes:
         return []
     return [
         NimbleChange(
             joint.path,
-            f"Nimble makes {kind.value} of this CustomJoint and ignores what that joint does not have",
-            f"functions of {join_words(changed)} rewritten",
+            f"Nimble makes {nimble_joint.value} of this CustomJoint and ignores what that joint does not have",
+            f"functions of {join_words(changed_axes)} rewritten",
         )
     ]
 
@@ -215,8 +217,12 @@ def _build_custom_axes(
     functions: list[tuple[Function, str]] = []
     for axis in axes:
         function, scale = unwrap_function(axis)
-        words = axis.names
-        name = words[0] if len(words) == 1 and words[0] in names else (names or [""])[0]
+        axis_coordinates = axis.names
+        name = (
+            axis_coordinates[0]
+            if len(axis_coordinates) == 1 and axis_coordinates[0] in names
+            else (names or [""])[0]
+        )
         if isinstance(function, LinearFunction):
             slope, offset = function.coefficients
             # The sign is in the vector already; see :func:`_flip`.
@@ -244,8 +250,8 @@ def _build_custom_axes(
     for unit in UNIT_AXES:
         # Of two translations along one axis Nimble keeps the last.
         matches = [index for index in range(3, 6) if tuple(vectors[index]) == unit]
-        chosen = functions[matches[-1]] if matches else (Constant(name="function", value=0.0), "")
-        result.append((unit, *chosen))
+        selected = functions[matches[-1]] if matches else (Constant(name="function", value=0.0), "")
+        result.append((unit, *selected))
     return result
 
 
@@ -279,9 +285,11 @@ def _orthogonalize(
     matrix = matrix / np.linalg.norm(matrix, axis=0)
     for _ in range(ORTHOGONALIZATIONS):
         for i in range(3):
-            others = [matrix[:, j] for j in range(3) if j != i]
+            other_columns = [matrix[:, j] for j in range(3) if j != i]
             column: Array = matrix[:, i]
-            matrix[:, i] = column - sum(float(column @ other) * other for other in others)
+            matrix[:, i] = column - sum(
+                float(column @ other_column) * other_column for other_column in other_columns
+            )
     return [tuple(column.tolist()) for column in matrix.T]
 
 
@@ -328,29 +336,29 @@ def _extend_splines(joint: CustomJoint) -> list[NimbleChange]:
     Beyond its points a SimmSpline continues as a cubic in Nimble, and as a straight line in OpenSim.
     """
     ranges = {coordinate.name: coordinate.range for coordinate in joint.coordinates}
-    extended = []
-    for place, axis in joint.spatial_transform.axes().items():
+    extended_axes = []
+    for axis_name, axis in joint.spatial_transform.axes().items():
         function = axis.function
         spline = function.function if isinstance(function, MultiplierFunction) else function
         if not isinstance(spline, SimmSpline) or len(axis.names) != 1:
             continue
-        low, high = sorted(ranges.get(axis.names[0], (0.0, 0.0)))
+        lower, upper = sorted(ranges.get(axis.names[0], (0.0, 0.0)))
         # A spline of two points is a line in both programs.
-        if len(spline.x) > 2 and (low < spline.x[0] or high > spline.x[-1]):
-            _extend_spline(spline, low, high)
-            extended.append(place)
-    if not extended:
+        if len(spline.x) > 2 and (lower < spline.x[0] or upper > spline.x[-1]):
+            _extend_spline(spline, lower, upper)
+            extended_axes.append(axis_name)
+    if not extended_axes:
         return []
     return [
         NimbleChange(
             joint.path,
             "beyond its points a SimmSpline continues as a cubic in Nimble, and as a straight line in OpenSim",
-            f"splines of {join_words(extended)} extended to the range of the coordinate",
+            f"splines of {join_words(extended_axes)} extended to the range of the coordinate",
         )
     ]
 
 
-def _extend_spline(spline: SimmSpline, low: float, high: float) -> None:
+def _extend_spline(spline: SimmSpline, lower: float, upper: float) -> None:
     """Add points on the first and last cubic of a spline, so that it covers an interval.
 
     The spline does not change between its points: with three points on the continued cubic, the
@@ -358,24 +366,24 @@ def _extend_spline(spline: SimmSpline, low: float, high: float) -> None:
     that of the cubic.
     """
     pieces = curves.SimmCubicSpline(spline.x, spline.y).pieces
-    margin = EXTRA_FRACTION * (high - low)
+    margin = EXTRA_FRACTION * (upper - lower)
     x, y = list(spline.x), list(spline.y)
     fractions = [(k + 1) / EXTRA_POINTS for k in range(EXTRA_POINTS)]
-    if high > x[-1]:
+    if upper > x[-1]:
         start = x[-1]
-        value, slope, bend, _ = pieces[-1]
+        value, slope, curvature, _ = pieces[-1]
         # The last record has no cubic term, because OpenSim continues as a line.
         cubic = pieces[-2][3]
-        for t in [fraction * (high + margin - start) for fraction in fractions]:
+        for t in [fraction * (upper + margin - start) for fraction in fractions]:
             x.append(start + t)
-            y.append(value + t * (slope + t * (bend + t * cubic)))
-    if low < x[0]:
+            y.append(value + t * (slope + t * (curvature + t * cubic)))
+    if lower < x[0]:
         start = x[0]
-        value, slope, bend, cubic = pieces[0]
+        value, slope, curvature, cubic = pieces[0]
         # Insert from the inner to the outer point, so that the points stay in ascending order.
-        for t in [fraction * (low - margin - start) for fraction in fractions]:
+        for t in [fraction * (lower - margin - start) for fraction in fractions]:
             x.insert(0, start + t)
-            y.insert(0, value + t * (slope + t * (bend + t * cubic)))
+            y.insert(0, value + t * (slope + t * (curvature + t * cubic)))
     spline.x, spline.y = tuple(x), tuple(y)
 
 
@@ -383,7 +391,7 @@ def _note_bend(joint: ConstantCurvatureJoint) -> list[NimbleChange]:
     """Note that a ConstantCurvatureJoint bends farther in Nimble, if its ranges allow it."""
     for coordinate, neutral in zip(joint.coordinates, joint.neutral_angle_x_z_y, strict=False):
         # The neutral angle adds to the coordinate.
-        if max(abs(bound + neutral) for bound in coordinate.range) > MAX_BEND_RAD:
+        if max(abs(limit + neutral) for limit in coordinate.range) > MAX_BEND_RAD:
             return [
                 NimbleChange(
                     joint.path,
@@ -395,12 +403,12 @@ def _note_bend(joint: ConstantCurvatureJoint) -> list[NimbleChange]:
 
 def _release_constraints(model: Model) -> list[NimbleChange]:
     """Turn off the constraints between coordinates and bodies that Nimble moves."""
-    free = {coordinate.name for coordinate in list_coordinates(model)}
+    free_names = {coordinate.name for coordinate in list_coordinates(model)}
     changes = []
     for constraint in model.components(Constraint):
         if isinstance(constraint, CoordinateCouplerConstraint):
             name = constraint.dependent_coordinate_name.rpartition("/")[2]
-            if name not in free:
+            if name not in free_names:
                 continue
         if constraint.isEnforced:
             constraint.isEnforced = False
@@ -410,7 +418,7 @@ def _release_constraints(model: Model) -> list[NimbleChange]:
                 )
             )
     for coordinate in model.components(Coordinate):
-        if coordinate.prescribed and coordinate.name in free:
+        if coordinate.prescribed and coordinate.name in free_names:
             coordinate.prescribed = False
             changes.append(
                 NimbleChange(

@@ -42,21 +42,21 @@ def format_coordinates(robot: Robot, file: str) -> str:
             for path, (link, frame) in robot.link_of.items()
         ],
         "shapes": [
-            {"path": shape.source, "link": link.name, "as": kind}
+            {"path": shape.source, "link": link.name, "as": shape_type}
             for link in robot.links
-            for kind, shapes in (("visual", link.visuals), ("collision", link.collisions))
+            for shape_type, shapes in (("visual", link.visuals), ("collision", link.collisions))
             for shape in shapes
             if shape.source
         ],
     }
-    head = {
+    header = {
         "format": FORMAT,
         "version": VERSION,
         "model": robot.mechanism.name,
         "robot": robot.name,
         "file": file,
     }
-    lines = [f'  "{name}": {_format_json(value)}' for name, value in head.items()]
+    lines = [f'  "{name}": {_format_json(value)}' for name, value in header.items()]
     for name, items in sections.items():
         rows = ",\n".join(f"    {_format_json(item)}" for item in items)
         lines.append(f'  "{name}": [\n{rows}\n  ]' if rows else f'  "{name}": []')
@@ -65,18 +65,18 @@ def format_coordinates(robot: Robot, file: str) -> str:
 
 def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
     """Return an entry for each coordinate: its path, unit, default values and joints."""
-    drives: dict[int, list[str]] = {}
+    driven_joints: dict[int, list[str]] = {}
     for joint in robot.moving:
-        for place in joint.coordinates:
+        for index in joint.coordinates:
             # A coordinate may drive several joints, and a joint may depend on several coordinates.
-            drives.setdefault(place, []).append(joint.name)
+            driven_joints.setdefault(index, []).append(joint.name)
     return [
         {
             "path": info.path,
             "name": info.name,
             "unit": info.unit or None,
-            "joint": robot.joint_of[place].name if place in robot.joint_of else None,
-            "drives": drives.get(place, []),
+            "joint": robot.joint_of[index].name if index in robot.joint_of else None,
+            "drives": driven_joints.get(index, []),
             "default_value": info.default_value,
             "default_speed": info.default_speed,
             "range": info.range,
@@ -84,33 +84,33 @@ def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
             "locked": info.locked,
             "prescribed": None if info.prescribed is None else describe_function(info.prescribed),
         }
-        for place, info in enumerate(robot.mechanism.coordinates)
+        for index, info in enumerate(robot.mechanism.coordinates)
     ]
 
 
 def _list_joints(robot: Robot) -> list[dict[str, Any]]:
     """Return an entry for each moving joint: its coordinates and its function of them."""
-    following = mimics(robot)
+    mimics_by_joint = mimics(robot)
     coordinates = robot.mechanism.coordinates
     result: list[dict[str, Any]] = []
     for joint in robot.moving:
-        said: dict[str, Any] = {
+        entry: dict[str, Any] = {
             "name": joint.name,
             "of": joint.source,
             "kind": joint.kind,
-            "coordinates": [coordinates[place].path for place in joint.coordinates],
+            "coordinates": [coordinates[index].path for index in joint.coordinates],
             "function": describe_function(joint.function),
         }
         # Readers can use such a joint without evaluating a function.
         if joint.function == IDENTITY:
-            said["identity"] = True
-        if (mimic := following.get(joint.name)) is not None:
-            said |= {
+            entry["identity"] = True
+        if (mimic := mimics_by_joint.get(joint.name)) is not None:
+            entry |= {
                 "mimics": mimic.leader,
                 "multiplier": mimic.line.slope,
                 "offset": mimic.line.start,
             }
-        result.append(said)
+        result.append(entry)
     return result
 
 
@@ -121,7 +121,7 @@ def _list_couplers(robot: Robot) -> list[dict[str, Any]]:
         {
             "path": coupler.name,
             "dependent": coordinates[coupler.dependent].path,
-            "independent": [coordinates[place].path for place in coupler.independent],
+            "independent": [coordinates[index].path for index in coupler.independent],
             "function": describe_function(coupler.function),
         }
         for coupler in couplers(robot)
@@ -139,7 +139,7 @@ def replace_non_finite(value: Any) -> Any:
         case float():
             return value if math.isfinite(value) else None
         case dict():
-            return {key: replace_non_finite(item) for key, item in value.items()}
+            return {key: replace_non_finite(member) for key, member in value.items()}
         case list() | tuple():
-            return [replace_non_finite(item) for item in value]
+            return [replace_non_finite(member) for member in value]
     return value

@@ -34,7 +34,7 @@ def add_strength_limits(
             limit.
     """
     tree = model.tree()
-    places = {info.path: place for place, info in enumerate(robot.mechanism.coordinates)}
+    index_by_path = {info.path: index for index, info in enumerate(robot.mechanism.coordinates)}
     result: dict[int, list[tuple[str, float]]] = {}
     for actuator in tree.components:
         if (
@@ -44,20 +44,20 @@ def add_strength_limits(
         ):
             continue
         try:
-            place = places.get(
+            index = index_by_path.get(
                 tree.path_of(tree.target(actuator, "coordinate", actuator.coordinate)) or ""
             )
         except ModelError:
             continue
         # URDF's effort limit is symmetric.
-        greatest = max(abs(actuator.min_control), abs(actuator.max_control))
-        force = abs(actuator.optimal_force) * greatest if actuator.optimal_force else 0.0
-        if place is not None:
-            result.setdefault(place, []).append((tree.path_of(actuator) or "", force))
+        max_control = max(abs(actuator.min_control), abs(actuator.max_control))
+        force = abs(actuator.optimal_force) * max_control if actuator.optimal_force else 0.0
+        if index is not None:
+            result.setdefault(index, []).append((tree.path_of(actuator) or "", force))
     limits: dict[str, float] = {}
-    for place, actuators in result.items():
+    for index, actuators in result.items():
         total = sum(force for _, force in actuators)
-        joint = robot.joint_of.get(place)
+        joint = robot.joint_of.get(index)
         # An actuator without bounds of its control has no largest force.
         if joint is None or not math.isfinite(total):
             continue

@@ -63,16 +63,22 @@ def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
     dropped: set[int] = set()
     for component in tree.components:
         path = tree.path_of(component) or ""
-        above = tree.parent_of(component)
-        if above is not None and id(above) in dropped:
+        parent = tree.parent_of(component)
+        if parent is not None and id(parent) in dropped:
             # A part of something left out, such as the path of a muscle.
             dropped.add(id(component))
         elif path not in accounted and not isinstance(component, CONTAINERS):
             dropped.add(id(component))
             name = getattr(component, "class_name", "") or type(component).__name__
-            known = ((kind, what) for cls, kind, what in _LOST_TYPES if isinstance(component, cls))
-            kind, what = next(known, ("component", f"a component of class {name}"))
-            fidelity.add(kind, path, what, LEFT_OUT, name)
+            descriptions = (
+                (loss_type, description)
+                for cls, loss_type, description in _LOST_TYPES
+                if isinstance(component, cls)
+            )
+            loss_type, description = next(
+                descriptions, ("component", f"a component of class {name}")
+            )
+            fidelity.add(loss_type, path, description, LEFT_OUT, name)
 
 
 class _Survey:
@@ -97,9 +103,9 @@ class _Survey:
             if isinstance(result, Coordinate):
                 self._record_coordinate(index, result, info.path)
         for link in self.robot.links:
-            for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
+            for shape_type, shapes in (("visual", link.visuals), ("collision", link.collisions)):
                 for shape in shapes:
-                    self.fidelity.translated[shape.source] = f"{kind} of link {link.name}"
+                    self.fidelity.translated[shape.source] = f"{shape_type} of link {link.name}"
         self._record_couplers()
         self._record_frames()
         account_for_rest(self.tree, self.fidelity)
@@ -127,25 +133,25 @@ class _Survey:
 
     def _record_links(self) -> None:
         """Record what became of each body, and of the parts of bodies in closed loops."""
-        carriers = {body.path: body.mobilizer.joint for body in self.robot.mechanism.bodies}
+        joint_of_body = {body.path: body.mobilizer.joint for body in self.robot.mechanism.bodies}
         for path, (link, _) in self.robot.link_of.items():
             if path not in self.tree.by_path:
                 self.note(
                     "loop",
-                    carriers[path],
+                    joint_of_body[path],
                     "a closed loop of joints",
                     "cut: the joint carries a part of the body's mass, and nothing holds the parts together",
                     f"link {link.name}",
                 )
                 continue
             self.fidelity.translated[path] = f"link {link.name}"
-            if carriers.get(path, "/ground") not in (*self.tree.by_path, "/ground"):
+            if joint_of_body.get(path, "/ground") not in (*self.tree.by_path, "/ground"):
                 self.note(
                     "loose-body",
                     path,
                     "a body without a joint",
                     "free of ground, as in OpenSim",
-                    carriers[path],
+                    joint_of_body[path],
                 )
             if len(link.bodies) > 1 and path != "/ground":
                 massless = (
@@ -174,33 +180,37 @@ class _Survey:
     @cached_property
     def _moving_ends(self) -> set[str]:
         """Links that a moving joint carries and that carry no other link."""
-        carriers = {joint.parent for joint in self.robot.joints}
-        return {joint.child for joint in self.robot.moving} - carriers
+        parent_links = {joint.parent for joint in self.robot.joints}
+        return {joint.child for joint in self.robot.moving} - parent_links
 
     def _record_joints(self) -> None:
         """Record the joints of the robot by which each joint of the model was replaced."""
-        massless = {link.name for link in self.robot.links if not link.bodies}
+        massless_links = {link.name for link in self.robot.links if not link.bodies}
         for joint in self.tree.components:
             if not isinstance(joint, Joint):
                 continue
             path = self.tree.path_of(joint) or ""
-            chain = [part for part in self.robot.joints if part.source == path]
-            names = " ".join(part.name for part in chain)
+            chain = [robot_joint for robot_joint in self.robot.joints if robot_joint.source == path]
+            names = " ".join(robot_joint.name for robot_joint in chain)
             self.fidelity.translated[path] = (
                 f"joint {names}" if names else "merged into the link that carries it"
             )
-            between = [part.child for part in chain if part.child in massless]
-            if between:
+            middle_links = [
+                robot_joint.child for robot_joint in chain if robot_joint.child in massless_links
+            ]
+            if middle_links:
                 self.note(
                     "massless-link",
                     path,
                     "a joint with several axes, or one whose axis passes by the origin of the body it moves",
                     "a chain of one-axis joints with massless links between (1e-9 kg in MuJoCo)",
-                    f"links {' '.join(between)}",
+                    f"links {' '.join(middle_links)}",
                 )
-            moving = {index for part in chain for index in part.coordinates}
+            coordinate_indices = {
+                index for robot_joint in chain for index in robot_joint.coordinates
+            }
             # URDF has no ball joint.
-            if moving and not joint.speeds_are_rates:
+            if coordinate_indices and not joint.speeds_are_rates:
                 self.note(
                     "ball-joint",
                     path,
@@ -215,19 +225,21 @@ class _Survey:
             "m" if self.robot.mechanism.coordinates[index].motion_type == "translational" else "rad"
         )
         joint = self.robot.joint_of.get(index)
-        driven = [part for part in self.robot.moving if index in part.coordinates]
-        if not driven:
+        driven_joints = [
+            robot_joint for robot_joint in self.robot.moving if index in robot_joint.coordinates
+        ]
+        if not driven_joints:
             self.fidelity.translated[path] = "fixed"
             value = f"{coordinate.default_value:g} {unit}"
             self.note("locked", path, "that a joint is locked", "a fixed joint at its value", value)
             return
         self.fidelity.translated[path] = (
-            f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
+            f"joint {driven_joints[0].name}" if joint is None else f"joint {joint.name}"
         )
         if joint is not None and joint.name != path.rsplit("/", 1)[1]:
             self._record_new_name(path, f"joint {joint.name}")
         self._record_range(
-            coordinate, path, unit, hard=joint is not None and joint.limits is not None
+            coordinate, path, unit, has_limit=joint is not None and joint.limits is not None
         )
         if coordinate.locked:
             self.note(
@@ -240,17 +252,19 @@ class _Survey:
             done = "a joint that moves: drive it in your program"
             self.note("prescribed", path, "that a coordinate follows a function of time", done)
         self._record_start(coordinate, path, unit)
-        self._record_functions(driven, path)
+        self._record_functions(driven_joints, path)
 
-    def _record_range(self, coordinate: Coordinate, path: str, unit: str, *, hard: bool) -> None:
+    def _record_range(
+        self, coordinate: Coordinate, path: str, unit: str, *, has_limit: bool
+    ) -> None:
         """Record that URDF has hard limits only."""
-        low, high = coordinate.range
-        text = f"{low:g} to {high:g} {unit}"
+        lower, upper = coordinate.range
+        text = f"{lower:g} to {upper:g} {unit}"
         self.note(
             "coordinate-range",
             path,
             "a range that stops nothing (a URDF limit is a hard stop)",
-            "written as a hard limit" if hard else "no limit written",
+            "written as a hard limit" if has_limit else "no limit written",
             text,
         )
         if coordinate.clamped:
@@ -276,12 +290,12 @@ class _Survey:
                 f"{coordinate.default_speed_value:g} {unit}/s",
             )
 
-    def _record_functions(self, driven: list[RobotJoint], path: str) -> None:
+    def _record_functions(self, driven_joints: list[RobotJoint], path: str) -> None:
         """Record joints that are functions of a coordinate."""
-        for part in driven:
-            if part.function == IDENTITY:
+        for robot_joint in driven_joints:
+            if robot_joint.function == IDENTITY:
                 continue
-            mimic = self._mimics.get(part.name)
+            mimic = self._mimics.get(robot_joint.name)
             self.note(
                 "coordinate-function",
                 path,
@@ -289,17 +303,20 @@ class _Survey:
                 f"a free joint: {COMPUTE_ADVICE}"
                 if mimic is None
                 else "a joint that mimics another",
-                f"joint {part.name}" + ("" if mimic is None else f" follows {mimic.leader}"),
+                f"joint {robot_joint.name}" + ("" if mimic is None else f" follows {mimic.leader}"),
             )
 
     def _record_couplers(self) -> None:
         """Record coordinates that are functions of others."""
         for coupler in couplers(self.robot):
-            driven = [
-                part.name for part in self.robot.moving if coupler.dependent in part.coordinates
+            driven_joints = [
+                robot_joint.name
+                for robot_joint in self.robot.moving
+                if coupler.dependent in robot_joint.coordinates
             ]
             leaders = {
-                self._mimics[name].leader if name in self._mimics else None for name in driven
+                self._mimics[name].leader if name in self._mimics else None
+                for name in driven_joints
             }
             # Several joints of one coordinate may mimic different leaders; then none is named.
             leader = leaders.pop() if len(leaders) == 1 else None
@@ -334,9 +351,9 @@ class _Survey:
             if isinstance(self.tree.parent_of(frame), Joint):
                 self.fidelity.translated[path] = "origins of the joint's parts"
                 continue
-            body, where = mechanism.frames[path]
+            body, frame_in_body = mechanism.frames[path]
             owner = mechanism.bodies[body].path if body >= 0 else "/ground"
-            x, y, z = where[:3, 3]
+            x, y, z = frame_in_body[:3, 3]
             self.note(
                 "frame",
                 path,
