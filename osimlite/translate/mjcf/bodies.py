@@ -35,7 +35,7 @@ MAX_JOINTS_PER_BODY = 6
 def add_bodies(draft: MjcfDraft) -> None:
     """Add all bodies with their inertias and joints."""
     robot = draft.robot
-    carriers = {joint.child: joint for joint in robot.joints}
+    joint_by_child = {joint.child: joint for joint in robot.joints}
     bodies = {
         path: index for index, path in enumerate(body.path for body in draft.mechanism.bodies)
     } | {"/ground": -1}
@@ -51,17 +51,21 @@ def add_bodies(draft: MjcfDraft) -> None:
         else:
             chain: list[RobotJoint] = []
             while not chain or chain[0].parent not in draft.frames:
-                chain.insert(0, carriers[chain[0].parent if chain else link.name])
+                chain.insert(0, joint_by_child[chain[0].parent if chain else link.name])
             element = _add_chain(draft, chain, link.name)
             _add_inertia(
-                draft, element, link, path, moves=any(part.kind != "fixed" for part in chain)
+                draft,
+                element,
+                link,
+                path,
+                is_moving=any(robot_joint.kind != "fixed" for robot_joint in chain),
             )
             if path in draft.tree.by_path:
                 draft.fidelity.translated[path] = f"body {link.name}"
                 draft.fidelity.note_name(path, "body", path.rpartition("/")[2], link.name)
         draft.bodies[bodies[path]] = element
     for component, path in draft.iterate_components(Joint):
-        names = [part.name for part in robot.moving if part.source == path]
+        names = [robot_joint.name for robot_joint in robot.moving if robot_joint.source == path]
         draft.fidelity.translated[path] = f"joints {' '.join(names)}" if names else "welded"
         for frame in component.frames:
             draft.fidelity.translated[draft.tree.path_of(frame) or ""] = "anchors of joints"
@@ -79,11 +83,11 @@ def add_frames(draft: MjcfDraft) -> None:
 def _add_chain(draft: MjcfDraft, chain: list[RobotJoint], name: str) -> _Element:
     """Add the element of the body at the end of a chain of joints to the body that carries it."""
     parent, start = draft.frames[chain[0].parent]
-    moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
+    moving_indices = [index for index, joint in enumerate(chain) if joint.kind != "fixed"]
     # A longer chain is cut: a carrier body with negligible inertia has the first joints.
-    if len(moving) > MAX_JOINTS_PER_BODY:
-        cut = moving[MAX_JOINTS_PER_BODY]
-        carrier = _add_chain(draft, chain[:cut], draft.make_name("body", f"{name}_carrier"))
+    if len(moving_indices) > MAX_JOINTS_PER_BODY:
+        split_index = moving_indices[MAX_JOINTS_PER_BODY]
+        carrier = _add_chain(draft, chain[:split_index], draft.make_name("body", f"{name}_carrier"))
         add_element(
             carrier,
             "inertial",
@@ -91,29 +95,29 @@ def _add_chain(draft: MjcfDraft, chain: list[RobotJoint], name: str) -> _Element
             mass=MIN_MASS,
             diaginertia=np.full(3, MIN_MASS),
         )
-        return _add_chain(draft, chain[cut:], name)
-    # From the end of the chain, `rest` is the transform from a joint to the body at zero.
-    rest = np.eye(4)
+        return _add_chain(draft, chain[split_index:], name)
+    # From the end of the chain, `to_body` is the transform from a joint to the body at zero.
+    to_body = np.eye(4)
     joints: list[tuple[RobotJoint, Array, Array]] = []
-    ends: dict[str, Array] = {}
+    frames_in_body: dict[str, Array] = {}
     for joint in reversed(chain):
         if not joints:
-            ends[joint.child] = invert_transform(rest)
+            frames_in_body[joint.child] = invert_transform(to_body)
         if joint.kind != "fixed":
-            joints.append((joint, rest[:3, :3].T @ joint.axis, invert_transform(rest)[:3, 3]))
-        rest = joint.origin @ rest
-    element = add_element(parent, "body", name=name, **format_pose(start @ rest))
-    draft.frames |= {link: (element, placed) for link, placed in ends.items()}
+            joints.append((joint, to_body[:3, :3].T @ joint.axis, invert_transform(to_body)[:3, 3]))
+        to_body = joint.origin @ to_body
+    element = add_element(parent, "body", name=name, **format_pose(start @ to_body))
+    draft.frames |= {link: (element, frame) for link, frame in frames_in_body.items()}
     for joint, axis, anchor in reversed(joints):
-        turns = joint.kind == "revolute"
-        place = clear_rounding(anchor)
+        is_hinge = joint.kind == "revolute"
+        index = clear_rounding(anchor)
         # The anchor of a slide has no effect.
-        anchored = place if turns and place.any() else None
+        anchored = index if is_hinge and index.any() else None
         add_element(
             element,
             "joint",
             name=joint.name,
-            type="hinge" if turns else "slide",
+            type="hinge" if is_hinge else "slide",
             axis=clear_rounding(axis),
             pos=anchored,
         )
@@ -121,7 +125,7 @@ def _add_chain(draft: MjcfDraft, chain: list[RobotJoint], name: str) -> _Element
 
 
 def _add_inertia(
-    draft: MjcfDraft, element: _Element, link: RobotLink, path: str, *, moves: bool
+    draft: MjcfDraft, element: _Element, link: RobotLink, path: str, *, is_moving: bool
 ) -> None:
     """Add mass and inertia of a body, repaired where MuJoCo rejects them."""
     moments, axes = principal_axes(link.inertia)
@@ -139,7 +143,7 @@ def _add_inertia(
         )
     moments = _repair_moments(moments)
     # Bodies that are welded to the world need no mass.
-    if moves and (mass < MIN_MASS or moments.min() < MIN_MASS):
+    if is_moving and (mass < MIN_MASS or moments.min() < MIN_MASS):
         if mass < MIN_MASS:
             draft.fidelity.add(
                 "massless",
@@ -151,12 +155,12 @@ def _add_inertia(
         mass = max(mass, MIN_MASS)
         moments = np.maximum(moments, MIN_MASS)
     if mass > 0.0:
-        quat = clear_rounding(quaternion_of(axes))
+        quaternion = clear_rounding(quaternion_of(axes))
         add_element(
             element,
             "inertial",
             pos=clear_rounding(link.center),
-            quat=quat,
+            quat=quaternion,
             mass=mass,
             diaginertia=moments,
         )
@@ -167,10 +171,10 @@ def _repair_moments(moments: Array) -> Array:
 
     This holds in floating point as well.
     """
-    raised = moments.copy()
-    least, middle, greatest = np.argsort(moments)
-    raised[least] = max(raised[least], raised[greatest] - raised[middle], 0.0)
+    repaired = moments.copy()
+    smallest, middle, largest = np.argsort(moments)
+    repaired[smallest] = max(repaired[smallest], repaired[largest] - repaired[middle], 0.0)
     # MuJoCo compares the sum without tolerance, so that rounding must not leave it too small.
-    while raised[least] + raised[middle] < raised[greatest]:
-        raised[least] = np.nextafter(raised[least], np.inf)
-    return raised
+    while repaired[smallest] + repaired[middle] < repaired[largest]:
+        repaired[smallest] = np.nextafter(repaired[smallest], np.inf)
+    return repaired

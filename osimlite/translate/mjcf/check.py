@@ -105,39 +105,47 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
 def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int) -> Check:
     """Compare a MuJoCo file with a model; for the arguments see :func:`check_mjcf`."""
     try:
-        compiled = mujoco.MjModel.from_xml_path(str(file))
+        mj_model = mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:
         raise OsimliteError(f"MuJoCo does not load it: {error}", file=str(file)) from error
     paths = Paths(model)
     if not paths.names:
         raise ModelError(f"'{model.name}' has no muscles or other paths to compare")
-    theirs = _MujocoModel(mujoco, compiled, paths)
+    loaded = _MujocoModel(mujoco, mj_model, paths)
     # MuJoCo knows names, not paths.
     owners = {name.rpartition("/")[2]: name for name in paths.names}
-    tendons = {name: place for name in owners if (place := theirs.find_tendon(name)) is not None}
+    tendons = {name: index for name in owners if (index := loaded.find_tendon(name)) is not None}
     if not tendons:
         raise ModelError(
             f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners))}'",
             file=str(file),
         )
-    known, truth = draw_poses(paths, poses, seed)
-    lengths, arms, places = zip(*(theirs.measure_tendons(q) for q in known.q), strict=True)
+    sampled_poses, samples_by_path = draw_poses(paths, poses, seed)
+    lengths, moment_arms, body_positions = zip(
+        *(loaded.measure_tendons(q) for q in sampled_poses.q), strict=True
+    )
     result = []
     for name, tendon in tendons.items():
-        own = truth[owners[name]]
-        off = np.array(lengths)[:, tendon] - own.lengths
-        turned = measure_arm_errors(paths.mechanism, np.array(arms)[:, tendon], own)
-        by_coordinate = {theirs.names[place]: error for place, error in turned.items()}
-        muscle = model.tree().by_path[owners[name]]
-        more = (
-            theirs.measure_strength(name, muscle, own.lengths) if isinstance(muscle, Muscle) else {}
+        path_samples = samples_by_path[owners[name]]
+        length_errors = np.array(lengths)[:, tendon] - path_samples.lengths
+        arm_errors = measure_arm_errors(
+            paths.mechanism, np.array(moment_arms)[:, tendon], path_samples
         )
-        result.append(MuscleCheck(name, Error.measure(off, "m"), by_coordinate, **more))
+        by_coordinate = {loaded.names[index]: error for index, error in arm_errors.items()}
+        muscle = model.tree().by_path[owners[name]]
+        strength_errors = (
+            loaded.measure_strength(name, muscle, path_samples.lengths)
+            if isinstance(muscle, Muscle)
+            else {}
+        )
+        result.append(
+            MuscleCheck(name, Error.measure(length_errors, "m"), by_coordinate, **strength_errors)
+        )
     return Check(
         tuple(result),
         tuple(name for name in owners if name not in tendons),
-        tuple(theirs.names[place] for place in theirs.free if place not in theirs.joints),
-        _compare_bodies(theirs, known.origins, places),
+        tuple(loaded.names[index] for index in loaded.free if index not in loaded.joints),
+        _compare_bodies(loaded, sampled_poses.origins, body_positions),
     )
 
 
@@ -147,46 +155,48 @@ def _convert_to_data(value: Any) -> Any:
         case Error():
             return value._asdict()
         case dict():
-            return {name: _convert_to_data(item) for name, item in value.items()}
+            return {name: _convert_to_data(member) for name, member in value.items()}
         case tuple() | list():
-            return [_convert_to_data(item) for item in value]
+            return [_convert_to_data(member) for member in value]
     return value
 
 
 class _MujocoModel:
     """Compiled model of MuJoCo that is posed by the coordinates of a model of OpenSim."""
 
-    def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
+    def __init__(self, mujoco: Any, mj_model: Any, paths: Paths) -> None:
         self.mujoco = mujoco
-        self.model = compiled
-        self.data = mujoco.MjData(compiled)
+        self.model = mj_model
+        self.data = mujoco.MjData(mj_model)
         self.names = joint_names(paths.mechanism)
         self.free = list_free_coordinates(paths.mechanism)
-        kinds = mujoco.mjtObj
+        object_types = mujoco.mjtObj
         joints = (
-            (k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name))
+            (k, mujoco.mj_name2id(mj_model, object_types.mjOBJ_JOINT, name))
             for k, name in enumerate(self.names)
         )
         self.joints = {k: joint for k, joint in joints if joint >= 0}
         bodies = ((k, body.name) for k, body in enumerate(paths.mechanism.bodies))
-        matched = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_BODY, name)) for k, name in bodies)
+        matched = (
+            (k, mujoco.mj_name2id(mj_model, object_types.mjOBJ_BODY, name)) for k, name in bodies
+        )
         self.bodies = {k: body for k, body in matched if body >= 0}
         self.followers = [
-            (int(compiled.eq_obj1id[k]), int(compiled.eq_obj2id[k]), compiled.eq_data[k, :5])
-            for k in range(compiled.neq)
-            if compiled.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and compiled.eq_active0[k]
+            (int(mj_model.eq_obj1id[k]), int(mj_model.eq_obj2id[k]), mj_model.eq_data[k, :5])
+            for k in range(mj_model.neq)
+            if mj_model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and mj_model.eq_active0[k]
         ]
 
     def find_tendon(self, name: str) -> int | None:
         """Return the index of the tendon of an actuator, or of the tendon, with a name; or None."""
-        kinds = self.mujoco.mjtObj
-        actuator = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_ACTUATOR, name)
+        object_types = self.mujoco.mjtObj
+        actuator = self.mujoco.mj_name2id(self.model, object_types.mjOBJ_ACTUATOR, name)
         if (
             actuator >= 0
             and self.model.actuator_trntype[actuator] == self.mujoco.mjtTrn.mjTRN_TENDON
         ):
             return int(self.model.actuator_trnid[actuator, 0])
-        tendon = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_TENDON, name)
+        tendon = self.mujoco.mj_name2id(self.model, object_types.mjOBJ_TENDON, name)
         return tendon if tendon >= 0 else None
 
     def measure_tendons(self, q: Array) -> tuple[Array, Array, Array]:
@@ -260,34 +270,40 @@ class _MujocoModel:
         if gain[2] < 0.0:
             gain[2] = gain[3] / self.model.actuator_acc0[actuator]
         curves = Curves.read(self.model.actuator_lengthrange[actuator], gain, bias)
-        spread = np.sort(lengths)
-        (wanted,) = compute_isometric_tension(muscle, spread, (1.0,))
-        off = (curves.compute_tension(spread, 1.0) - wanted)[
-            np.isfinite(wanted)
+        sorted_lengths = np.sort(lengths)
+        (tensions,) = compute_isometric_tension(muscle, sorted_lengths, (1.0,))
+        force_errors = (curves.compute_tension(sorted_lengths, 1.0) - tensions)[
+            np.isfinite(tensions)
         ] / muscle.max_isometric_force
         # MuJoCo's fibers lie along the tendon.
-        along = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
+        projected_fiber = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
         return {
-            "force": Error.measure(off, "Fmax") if len(off) else None,
-            "fiber": float(curves.fiber / along),
+            "force": Error.measure(force_errors, "Fmax") if len(force_errors) else None,
+            "fiber": float(curves.fiber / projected_fiber),
             "tendon": float(curves.tendon - muscle.tendon_slack_length),
         }
 
 
-def _compare_bodies(theirs: _MujocoModel, origins: Array, places: Sequence[Array]) -> Error | None:
+def _compare_bodies(
+    loaded: _MujocoModel, origins: Array, positions: Sequence[Array]
+) -> Error | None:
     """Return the error of body positions after the best rigid motion in each pose.
 
     The rotation is computed by Kabsch's algorithm.
     """
     # Fewer than three points do not determine a rigid motion.
-    if len(theirs.bodies) < 3:
+    if len(loaded.bodies) < 3:
         return None
-    off = []
-    for pose, result in enumerate(places):
-        wanted = origins[list(theirs.bodies), pose]
-        a, b = result - result.mean(0), wanted - wanted.mean(0)
-        left, _, right = np.linalg.svd(a.T @ b)
+    distances = []
+    for pose, result in enumerate(positions):
+        expected = origins[list(loaded.bodies), pose]
+        measured_offsets, expected_offsets = result - result.mean(0), expected - expected.mean(0)
+        left_vectors, _, right_vectors = np.linalg.svd(measured_offsets.T @ expected_offsets)
         # The sign avoids a reflection.
-        flip = np.diag((1.0, 1.0, np.sign(np.linalg.det(left @ right))))
-        off.append(np.linalg.norm(a @ left @ flip @ right - b, axis=1))
-    return Error.measure(np.concatenate(off), "m")
+        flip = np.diag((1.0, 1.0, np.sign(np.linalg.det(left_vectors @ right_vectors))))
+        distances.append(
+            np.linalg.norm(
+                measured_offsets @ left_vectors @ flip @ right_vectors - expected_offsets, axis=1
+            )
+        )
+    return Error.measure(np.concatenate(distances), "m")

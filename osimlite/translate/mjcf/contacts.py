@@ -41,9 +41,9 @@ def add_contacts(draft: MjcfDraft) -> None:
     surfaces = list(draft.iterate_components(ContactGeometry))
     if draft.options.contact == "none" or not surfaces:
         return
-    touches = add_element(draft.get_section("default"), "default", class_="touches")
+    contact_default = add_element(draft.get_section("default"), "default", class_="touches")
     add_element(
-        touches,
+        contact_default,
         "geom",
         contype=0,
         conaffinity=0,
@@ -55,40 +55,43 @@ def add_contacts(draft: MjcfDraft) -> None:
         try:
             _add_surface(draft, geometry, path)
         except (ModelError, Untranslatable) as error:
-            what = f"a {type(geometry).__name__}"
-            draft.fidelity.add("contact-geometry", path, what, f"{LEFT_OUT}: {error}")
+            description = f"a {type(geometry).__name__}"
+            draft.fidelity.add("contact-geometry", path, description, f"{LEFT_OUT}: {error}")
     for force, path in draft.iterate_components(Force):
         if not isinstance(force, ContactForce) or not force.appliesForce:
             continue
-        what = f"contact by the law of a {type(force).__name__}"
+        description = f"contact by the law of a {type(force).__name__}"
         try:
-            pairs = " ".join(_add_pairs(draft, force))
+            pair_names = " ".join(_add_pairs(draft, force))
         except ModelError as error:
-            draft.fidelity.add("contact", path, what, f"{LEFT_OUT}: {error}")
+            draft.fidelity.add("contact", path, description, f"{LEFT_OUT}: {error}")
             continue
-        done = "contact by MuJoCo's law, which is another: what touches is held, but forces and motions differ"
-        draft.fidelity.add("contact", path, what, done, f"pairs {pairs}")
+        replacement = "contact by MuJoCo's law, which is another: what touches is held, but forces and motions differ"
+        draft.fidelity.add("contact", path, description, replacement, f"pairs {pair_names}")
 
 
 def _add_surface(draft: MjcfDraft, geometry: ContactGeometry, path: str) -> None:
     """Add the geom of a contact geometry, if MuJoCo has one for it."""
-    body, placed = draft.find_placement(geometry, "socket_frame")
-    made = _make_geom(
-        draft, geometry, path, still=not draft.bodies[body].xpath("ancestor-or-self::body/joint")
+    body, frame_in_body = draft.find_placement(geometry, "socket_frame")
+    geom_and_frame = _make_geom(
+        draft,
+        geometry,
+        path,
+        is_static=not draft.bodies[body].xpath("ancestor-or-self::body/joint"),
     )
-    if made is None:
+    if geom_and_frame is None:
         return
-    form, own = made
+    attributes, local_frame = geom_and_frame
     name = draft.make_name("geom", path)
-    frame = placed @ make_offset(geometry.location, geometry.orientation) @ own
+    frame = frame_in_body @ make_offset(geometry.location, geometry.orientation) @ local_frame
     add_element(
-        draft.bodies[body], "geom", class_="touches", name=name, **form, **format_pose(frame)
+        draft.bodies[body], "geom", class_="touches", name=name, **attributes, **format_pose(frame)
     )
     draft.fidelity.translated[path] = f"geom {name}"
 
 
 def _make_geom(
-    draft: MjcfDraft, geometry: ContactGeometry, path: str, *, still: bool
+    draft: MjcfDraft, geometry: ContactGeometry, path: str, *, is_static: bool
 ) -> tuple[dict[str, Value], Array] | None:
     """Return the attributes of a geom and its frame (4, 4) in that of the geometry.
 
@@ -100,14 +103,16 @@ def _make_geom(
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             return {"type": "ellipsoid", "size": geometry.radii}, np.eye(4)
         # MuJoCo allows planes on static bodies only.
-        case ContactHalfSpace() if still:
+        case ContactHalfSpace() if is_static:
             return {"type": "plane", "size": (0.0, 0.0, 1.0)}, _PLANE
         case ContactHalfSpace():
-            middle = make_offset((HALF_SPACE_BOX_M[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            box_frame = make_offset((HALF_SPACE_BOX_M[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
-            done = f"a box of {size} m whose face is its surface"
-            draft.fidelity.add("contact-geometry", path, "a half space on a body that moves", done)
-            return {"type": "box", "size": [edge / 2.0 for edge in HALF_SPACE_BOX_M]}, middle
+            replacement = f"a box of {size} m whose face is its surface"
+            draft.fidelity.add(
+                "contact-geometry", path, "a half space on a body that moves", replacement
+            )
+            return {"type": "box", "size": [edge / 2.0 for edge in HALF_SPACE_BOX_M]}, box_frame
         case ContactMesh():
             shape = mesh_shape(geometry.filename, path, draft.mesh_files, draft.fidelity.add)
             if shape is None:
@@ -121,21 +126,33 @@ def _make_geom(
 
 def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
     """Add a pair for any two surfaces of a force that are on different bodies; yield their names."""
-    for (one, first), (two, second) in combinations(_iterate_surfaces(draft, force), 2):
-        became = [
-            draft.fidelity.translated.get(draft.tree.path_of(item) or "") for item in (one, two)
+    for (first_surface, first_friction), (second_surface, second_friction) in combinations(
+        _iterate_surfaces(draft, force), 2
+    ):
+        geom_records = [
+            draft.fidelity.translated.get(draft.tree.path_of(surface) or "")
+            for surface in (first_surface, second_surface)
         ]
-        bodies = [draft.find_placement(item, "socket_frame").body for item in (one, two)]
-        flat = isinstance(one, ContactHalfSpace) and isinstance(two, ContactHalfSpace)
+        bodies = [
+            draft.find_placement(surface, "socket_frame").body
+            for surface in (first_surface, second_surface)
+        ]
+        are_half_spaces = isinstance(first_surface, ContactHalfSpace) and isinstance(
+            second_surface, ContactHalfSpace
+        )
         # Two half spaces have no defined contact, and a body does not touch itself.
-        if flat or bodies[0] == bodies[1] or None in became:
+        if are_half_spaces or bodies[0] == bodies[1] or None in geom_records:
             continue
-        geoms = [str(what).removeprefix("geom ") for what in became]
+        geoms = [str(geom_record).removeprefix("geom ") for geom_record in geom_records]
         name = draft.make_name("pair", ".".join(geoms))
         # Simbody combines two coefficients by their harmonic mean.
-        slide = 2.0 * first * second / (first + second) if first + second else 0.0
+        sliding = (
+            2.0 * first_friction * second_friction / (first_friction + second_friction)
+            if first_friction + second_friction
+            else 0.0
+        )
         # OpenSim has no torsional or rolling friction.
-        friction = (slide, slide, 0.0, 0.0, 0.0)
+        friction = (sliding, sliding, 0.0, 0.0, 0.0)
         add_element(
             draft.get_section("contact"),
             "pair",
@@ -159,10 +176,12 @@ def _iterate_surfaces(
         return
     for parameters in force.contact_parameters.objects:
         spec = type(parameters).field_specs()["geometry"]
-        for position, word in enumerate(parameters.geometry):
-            result = draft.tree.resolve(Use(parameters, force, spec, word, position)).target
+        for position, geometry_name in enumerate(parameters.geometry):
+            result = draft.tree.resolve(
+                Use(parameters, force, spec, geometry_name, position)
+            ).target
             if not isinstance(result, ContactGeometry):
                 raise ModelError(
-                    f"it names the contact geometry '{word}', which the model does not have"
+                    f"it names the contact geometry '{geometry_name}', which the model does not have"
                 )
             yield result, parameters.dynamic_friction

@@ -36,14 +36,19 @@ def add_actuator(draft: MjcfDraft, force: CoordinateActuator, path: str, **dynam
     Returns:
         Kind and name of the element.
     """
-    lead, _ = _find_lead(draft, force)
+    leader, _ = _find_lead(draft, force)
     return add_scaled_actuator(
-        draft, force, path, joint=lead.joint, gear=force.optimal_force / lead.line.slope, **dynamics
+        draft,
+        force,
+        path,
+        joint=leader.joint,
+        gear=force.optimal_force / leader.line.slope,
+        **dynamics,
     )
 
 
 def add_scaled_actuator(
-    draft: MjcfDraft, force: CoordinateActuator | PathActuator, path: str, **on: Value
+    draft: MjcfDraft, force: CoordinateActuator | PathActuator, path: str, **target: Value
 ) -> str:
     """Add an actuator whose force is its control times its gear.
 
@@ -51,17 +56,19 @@ def add_scaled_actuator(
         draft: MJCF under construction.
         force: actuator of the model, for the limits of its control.
         path: absolute path of the actuator.
-        on: attributes of the transmission, with the gear.
+        target: attributes of the transmission, with the gear.
 
     Returns:
         Kind and name of the element.
     """
     name = draft.make_name("actuator", path)
-    ends = (force.min_control, force.max_control)
-    finite = all(map(math.isfinite, ends)) and ends[0] < ends[1]
+    control_range = (force.min_control, force.max_control)
+    has_range = all(map(math.isfinite, control_range)) and control_range[0] < control_range[1]
     # In OpenSim only some tools enforce these limits; the range is written for information.
-    limits: dict[str, Value] = {"ctrllimited": False, "ctrlrange": ends} if finite else {}
-    add_element(draft.get_section("actuator"), "general", name=name, **on, **limits)
+    limits: dict[str, Value] = (
+        {"ctrllimited": False, "ctrlrange": control_range} if has_range else {}
+    )
+    add_element(draft.get_section("actuator"), "general", name=name, **target, **limits)
     return f"actuator {name}"
 
 
@@ -76,11 +83,11 @@ def add_lagging_actuator(draft: MjcfDraft, force: ActivationCoordinateActuator, 
     Returns:
         Kind and name of the element.
     """
-    made = add_actuator(
+    actuator = add_actuator(
         draft, force, path, dyntype="filterexact", dynprm=force.activation_time_constant
     )
-    draft.activations[made.removeprefix("actuator ")] = force.default_activation
-    return made
+    draft.activations[actuator.removeprefix("actuator ")] = force.default_activation
+    return actuator
 
 
 def add_spring(draft: MjcfDraft, force: SpringGeneralizedForce, path: str) -> str:
@@ -94,10 +101,15 @@ def add_spring(draft: MjcfDraft, force: SpringGeneralizedForce, path: str) -> st
     Returns:
         Kind and name of the element.
     """
-    lead, _ = _find_lead(draft, force)
-    rest = force.rest_length
+    leader, _ = _find_lead(draft, force)
+    rest_length = force.rest_length
     return _add_tendon(
-        draft, lead, path, (rest, rest), stiffness=force.stiffness, damping=force.viscosity
+        draft,
+        leader,
+        path,
+        (rest_length, rest_length),
+        stiffness=force.stiffness,
+        damping=force.viscosity,
     )
 
 
@@ -115,48 +127,56 @@ def add_limit(draft: MjcfDraft, force: CoordinateLimitForce, path: str) -> str:
     Raises:
         Untranslatable: the lower limit is above the upper one.
     """
-    lead, place = _find_lead(draft, force)
-    info = draft.mechanism.coordinates[place]
-    Ku, qu, Kl, ql, D, t = read_limit_constants(force, info)
+    leader, index = _find_lead(draft, force)
+    coordinate = draft.mechanism.coordinates[index]
+    Ku, qu, Kl, ql, D, t = read_limit_constants(force, coordinate)
     if ql > qu:
         raise Untranslatable("its lower limit lies above its upper one")
     # One tendon has one stiffness; two stiffnesses need a tendon for each side.
     if Ku == Kl:
-        made = _add_tendon(draft, lead, path, (ql, qu), stiffness=Ku)
+        tendons = _add_tendon(draft, leader, path, (ql, qu), stiffness=Ku)
     else:
-        made = _add_tendon(draft, lead, f"{path}_upper", (-UNREACHABLE_VALUE, qu), stiffness=Ku)
-        made += " " + _add_tendon(
-            draft, lead, f"{path}_lower", (ql, UNREACHABLE_VALUE), stiffness=Kl
+        tendons = _add_tendon(
+            draft, leader, f"{path}_upper", (-UNREACHABLE_VALUE, qu), stiffness=Ku
+        )
+        tendons += " " + _add_tendon(
+            draft, leader, f"{path}_lower", (ql, UNREACHABLE_VALUE), stiffness=Kl
         ).removeprefix("tendon ")
     # The difference to OpenSim's smooth limit is in the transition of width t.
-    beyond = np.linspace(0.0, 3.0 * t, 200)
-    off = [limit_force(qu + d, 0.0, Ku, qu, Kl, ql, D, t) + Ku * d for d in beyond]
-    off += [limit_force(ql - d, 0.0, Ku, qu, Kl, ql, D, t) - Kl * d for d in beyond]
-    unit = "N m" if info.motion_type == "rotational" else "N"
+    excesses = np.linspace(0.0, 3.0 * t, 200)
+    force_errors = [
+        limit_force(qu + excess, 0.0, Ku, qu, Kl, ql, D, t) + Ku * excess for excess in excesses
+    ]
+    force_errors += [
+        limit_force(ql - excess, 0.0, Ku, qu, Kl, ql, D, t) - Kl * excess for excess in excesses
+    ]
+    unit = "N m" if coordinate.motion_type == "rotational" else "N"
     draft.fidelity.add(
         "limit-force",
         path,
         "a limit whose stiffness grows smoothly, and which damps beyond it",
         "a spring of its stiffness from the limit on, without damping",
-        made,
-        {"force": Error.measure(off, unit), "damping": Error(D, D, f"{unit} s")},
+        tendons,
+        {"force": Error.measure(force_errors, unit), "damping": Error(D, D, f"{unit} s")},
     )
-    return made
+    return tendons
 
 
 def _add_tendon(
-    draft: MjcfDraft, lead: Lead, path: str, slack: tuple[float, float], **law: Value
+    draft: MjcfDraft, leader: Lead, path: str, slack: tuple[float, float], **law: Value
 ) -> str:
     """Add a tendon whose length is the coordinate plus a constant.
 
     It is slack between two values of the coordinate.
     """
-    slope, start = lead.line
+    slope, start = leader.line
     # The length of the tendon is the coordinate plus start / slope.
-    ends = [end + start / slope for end in slack]
+    spring_range = [end + start / slope for end in slack]
     name = draft.make_name("tendon", path)
-    tendon = add_element(draft.get_section("tendon"), "fixed", name=name, springlength=ends, **law)
-    add_element(tendon, "joint", joint=lead.joint, coef=1.0 / slope)
+    tendon = add_element(
+        draft.get_section("tendon"), "fixed", name=name, springlength=spring_range, **law
+    )
+    add_element(tendon, "joint", joint=leader.joint, coef=1.0 / slope)
     return f"tendon {name}"
 
 
@@ -167,9 +187,9 @@ def _find_lead(
     if not force.coordinate:
         raise Untranslatable("it names no coordinate")
     path = draft.tree.path_of(draft.tree.target(force, "coordinate", force.coordinate)) or ""
-    place = draft.mechanism.coordinate_index(path)
-    if draft.mechanism.coordinates[place].locked:
+    index = draft.mechanism.coordinate_index(path)
+    if draft.mechanism.coordinates[index].locked:
         raise Untranslatable("its coordinate is locked, so that it moves nothing")
-    if place not in draft.leads:
+    if index not in draft.leads:
         raise Untranslatable("its coordinate has no joint of its own, being a function of another")
-    return draft.leads[place], place
+    return draft.leads[index], index

@@ -16,44 +16,52 @@ def add_coordinates(draft: MjcfDraft) -> None:
     """Add ranges of coordinates to their joints, without limits, and hold prescribed coordinates."""
     elements = {joint.get("name"): joint for joint in draft.get_section("worldbody").iter("joint")}
     note = draft.fidelity.add
-    moving = {place for joint in draft.robot.moving for place in joint.coordinates}
-    for place, info in enumerate(draft.mechanism.coordinates):
-        lead = draft.leads.get(place)
-        done = (
+    moving = {index for joint in draft.robot.moving for index in joint.coordinates}
+    for index, coordinate in enumerate(draft.mechanism.coordinates):
+        leader = draft.leads.get(index)
+        result = (
             "locked: a part of the body that carries it"
-            if info.locked
+            if coordinate.locked
             else "what its joints follow"
         )
-        draft.fidelity.translated[info.path] = done if lead is None else f"joint {lead.joint}"
-        if lead is None and place not in moving and not info.locked:
-            note("coordinate", info.path, "a coordinate that moves nothing", "left out")
-        if lead is not None:
-            draft.fidelity.note_name(info.path, "joint", info.name, lead.joint)
+        draft.fidelity.translated[coordinate.path] = (
+            result if leader is None else f"joint {leader.joint}"
+        )
+        if leader is None and index not in moving and not coordinate.locked:
+            note("coordinate", coordinate.path, "a coordinate that moves nothing", "left out")
+        if leader is not None:
+            draft.fidelity.note_name(coordinate.path, "joint", coordinate.name, leader.joint)
         # A scaled joint would need a scaled range, which users would misread.
-        if lead is not None and lead.line == (1.0, 0.0):
-            element = elements[lead.joint]
-            if all(map(math.isfinite, info.range)) and info.range[0] < info.range[1]:
-                element.set("range", " ".join(map(repr, info.range)))
+        if leader is not None and leader.line == (1.0, 0.0):
+            element = elements[leader.joint]
+            if (
+                all(map(math.isfinite, coordinate.range))
+                and coordinate.range[0] < coordinate.range[1]
+            ):
+                element.set("range", " ".join(map(repr, coordinate.range)))
                 # A range of a coordinate does not stop a motion in OpenSim.
                 element.set("limited", "false")
-        if info.clamped:
-            note("clamped", info.path, "clamped range in user interfaces", "left out")
-        if info.prescribed is not None and not info.locked and lead is not None:
-            start = info.prescribed.evaluate(np.zeros(1))[0]
+        if coordinate.clamped:
+            note("clamped", coordinate.path, "clamped range in user interfaces", "left out")
+        if coordinate.prescribed is not None and not coordinate.locked and leader is not None:
+            start = coordinate.prescribed.evaluate(np.zeros(1))[0]
             # The driver evaluates the function of time at every step.
-            exact = (
-                Composition(Linear(*lead.line), info.prescribed) if draft.options.driver else None
+            joint_function = (
+                Composition(Linear(*leader.line), coordinate.prescribed)
+                if draft.options.driver
+                else None
             )
             draft.add_follower(
-                lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact)
+                leader.joint,
+                Follower(None, (leader.line.slope * start + leader.line.start,), joint_function),
             )
-            if exact is None:
+            if joint_function is None:
                 note(
                     "prescribed",
-                    info.path,
+                    coordinate.path,
                     "a coordinate that follows a function of time",
                     "held at its value at time 0; write the function into eq_data at every step",
-                    f"equality {lead.joint}",
+                    f"equality {leader.joint}",
                 )
     for joint in draft.tree.components:
         if isinstance(joint, Joint) and not joint.speeds_are_rates:

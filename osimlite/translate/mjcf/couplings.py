@@ -51,14 +51,16 @@ def add_couplings(draft: MjcfDraft) -> None:
     """Add an equality for every joint that follows a function or a coupler."""
     robot = draft.robot
     draft.leads |= {
-        place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()
+        index: Lead(joint.name, line) for index, (joint, line) in leaders(robot).items()
     }
     # The driver computes ellipsoid joints exactly, without the mechanism.
     if not draft.options.driver:
         add_ellipsoids(draft)
     drivers = coordinate_drivers(robot)
-    by_coupler = {
-        item.dependent: item.name for item in couplers(robot) if item.dependent in drivers
+    coupler_by_coordinate = {
+        coupler.dependent: coupler.name
+        for coupler in couplers(robot)
+        if coupler.dependent in drivers
     }
     for joint in robot.moving:
         driver = joint_driver(joint, drivers)
@@ -71,47 +73,59 @@ def add_couplings(draft: MjcfDraft) -> None:
             driver.coordinate is None
             or draft.leads.get(driver.coordinate, (None,))[0] != joint.name
         ):
-            whose = by_coupler.get(joint.coordinates[0]) if joint.function == IDENTITY else None
-            _add_follower(draft, joint, driver, whose or joint.source)
-    for place, path in by_coupler.items():
-        names = " ".join(joint.name for joint in robot.moving if place in joint.coordinates)
+            coupler_path = (
+                coupler_by_coordinate.get(joint.coordinates[0])
+                if joint.function == IDENTITY
+                else None
+            )
+            _add_follower(draft, joint, driver, coupler_path or joint.source)
+    for index, path in coupler_by_coordinate.items():
+        names = " ".join(joint.name for joint in robot.moving if index in joint.coordinates)
         draft.fidelity.translated[path] = (
             f"equality {names}" if names else "what it binds is locked"
         )
-    for item in couplers(robot):
-        if item.dependent not in drivers:
-            several = "a coordinate that is a function of several others, or of itself"
-            draft.fidelity.add("coupler", item.name, several, "left out: the coordinate is free")
+    for coupler in couplers(robot):
+        if coupler.dependent not in drivers:
+            description = "a coordinate that is a function of several others, or of itself"
+            draft.fidelity.add(
+                "coupler", coupler.name, description, "left out: the coordinate is free"
+            )
 
 
-def _add_follower(draft: MjcfDraft, joint: RobotJoint, driver: CouplingDriver, whose: str) -> None:
+def _add_follower(
+    draft: MjcfDraft, joint: RobotJoint, driver: CouplingDriver, component_path: str
+) -> None:
     """Let a joint follow the coordinate that drives it, exactly or by a fitted polynomial."""
     unit = "rad" if joint.kind == "revolute" else "m"
     if driver.coordinate is None:
         draft.add_follower(joint.name, Follower(None, (driver.function.evaluate(np.zeros(1))[0],)))
         return
-    info = draft.mechanism.coordinates[driver.coordinate]
-    lead = draft.leads.get(driver.coordinate) or _add_argument_joint(draft, driver.coordinate)
-    own, function = lead.line.inverse(), driver.function
-    low, high = select_span(function, info.range, info.default_value)
-    first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
-    exact = function if own == (1.0, 0.0) else Composition(function, Linear(*own))
+    coordinate = draft.mechanism.coordinates[driver.coordinate]
+    leader = draft.leads.get(driver.coordinate) or _add_argument_joint(draft, driver.coordinate)
+    coordinate_line, function = leader.line.inverse(), driver.function
+    lower, upper = select_span(function, coordinate.range, coordinate.default_value)
+    first, last = sorted(leader.line.slope * end + leader.line.start for end in (lower, upper))
+    exact = (
+        function
+        if coordinate_line == (1.0, 0.0)
+        else Composition(function, Linear(*coordinate_line))
+    )
     fit = fit_quartic(exact, (first, last), unit)
-    follower = Follower(lead.joint, fit.coefficients)
-    done = "a quartic, fitted"
+    follower = Follower(leader.joint, fit.coefficients)
+    replacement = "a quartic, fitted"
     # The driver replaces the quartic by the exact function, and needs no helper.
     if fit.error is not None and draft.options.spline == "series" and not draft.options.driver:
-        drive, (outer,) = fit_composition([function], (low, high))
-        led = add_helper(draft, driver.coordinate, drive)
-        assert led is not None
-        follower = Follower(led.joint, compose_with_line(led.line, outer))
-        done = "a quartic of a quartic, fitted"
+        inner, (outer,) = fit_composition([function], (lower, upper))
+        helper = add_helper(draft, driver.coordinate, inner)
+        assert helper is not None
+        follower = Follower(helper.joint, compose_with_line(helper.line, outer))
+        replacement = "a quartic of a quartic, fitted"
         # The error is measured between the points of the fit as well.
-        x = np.linspace(low, high, 400)
+        x = np.linspace(lower, upper, 400)
         fit = PolynomialFit(
             (),
             Error.measure(
-                Polynomial(outer)(Polynomial(drive)(x)) - sample_function(function, x), unit
+                Polynomial(outer)(Polynomial(inner)(x)) - sample_function(function, x), unit
             ),
         )
     if fit.error is not None and draft.options.driver:
@@ -119,101 +133,102 @@ def _add_follower(draft: MjcfDraft, joint: RobotJoint, driver: CouplingDriver, w
     elif fit.error is not None:
         draft.fidelity.add(
             "function",
-            whose,
+            component_path,
             "a joint that follows a coordinate by another function than a polynomial of degree four",
-            done,
-            f"joint {joint.name} over {info.name} from {low:g} to {high:g}",
+            replacement,
+            f"joint {joint.name} over {coordinate.name} from {lower:g} to {upper:g}",
             {"value": fit.error},
         )
     draft.add_follower(joint.name, follower)
 
 
-def _add_argument_joint(draft: MjcfDraft, place: int) -> Lead:
+def _add_argument_joint(draft: MjcfDraft, coordinate_index: int) -> Lead:
     """Add a joint for a coordinate that is only the argument of functions.
 
     It turns a small body about its centre.
     """
-    info = draft.mechanism.coordinates[place]
-    name = joint_names(draft.mechanism)[place]
+    coordinate = draft.mechanism.coordinates[coordinate_index]
+    name = joint_names(draft.mechanism)[coordinate_index]
     # The driver moves joints exactly, whatever equalities make of them.
     inertia = (
         SPECK_MASS_KG * SPECK_MASS_KG
         if draft.options.driver
         else max(
-            ARGUMENT_INERTIA_PART * _compute_inertia(draft, place), SPECK_MASS_KG * SPECK_MASS_KG
+            ARGUMENT_INERTIA_PART * _compute_inertia(draft, coordinate_index),
+            SPECK_MASS_KG * SPECK_MASS_KG,
         )
     )
-    speck = draft.add_speck(name, draft.bodies[GROUND], np.eye(4), inertia)
-    add_element(speck, "joint", name=name, type="hinge", axis="0 0 1")
+    carrier = draft.add_speck(name, draft.bodies[GROUND], np.eye(4), inertia)
+    add_element(carrier, "joint", name=name, type="hinge", axis="0 0 1")
     draft.fidelity.add(
         "argument",
-        info.path,
+        coordinate.path,
         "a coordinate that no axis moves by, but only functions of it",
         "a joint of its own, which turns a small body",
         f"joint {name}, {inertia:.3g} kg m^2",
     )
-    draft.leads[place] = Lead(name, StraightLine(1.0, 0.0))
-    return draft.leads[place]
+    draft.leads[coordinate_index] = Lead(name, StraightLine(1.0, 0.0))
+    return draft.leads[coordinate_index]
 
 
-def _compute_inertia(draft: MjcfDraft, place: int) -> float:
+def _compute_inertia(draft: MjcfDraft, coordinate_index: int) -> float:
     """Return the inertia that a coordinate moves in the default pose (kg·m²).
 
     Coordinates that couplers move along are included.
     """
     q = draft.default_state[0]
     rates = np.zeros(len(q))
-    rates[place] = 1.0
-    for other, driver in coordinate_drivers(draft.robot).items():
-        if driver.coordinate == place:
-            rates[other] = driver.function.evaluate(q[[place]])[1][0]
+    rates[coordinate_index] = 1.0
+    for follower_index, driver in coordinate_drivers(draft.robot).items():
+        if driver.coordinate == coordinate_index:
+            rates[follower_index] = driver.function.evaluate(q[[coordinate_index]])[1][0]
     # Kinetic energy at unit rate: twice of it is the inertia.
     speeds = draft.mechanism.speeds_from_rates(q, rates)
     return float(speeds @ draft.mechanism.mass_matrix(q) @ speeds)
 
 
-def add_helper(draft: MjcfDraft, place: int, drive: Array) -> Lead | None:
+def add_helper(draft: MjcfDraft, coordinate_index: int, inner: Array) -> Lead | None:
     """Add a joint whose value is a polynomial of a coordinate, or return an existing one.
 
     Args:
         draft: MJCF under construction.
-        place: index of the coordinate in the mechanism.
-        drive: coefficients of the polynomial (5,), constant first.
+        coordinate_index: index of the coordinate in the mechanism.
+        inner: coefficients of the polynomial (5,), constant first.
 
     Returns:
         Joint, and the line from its value to that of the polynomial; None if the coordinate is
         locked.
     """
-    info = draft.mechanism.coordinates[place]
-    if info.locked:
+    coordinate = draft.mechanism.coordinates[coordinate_index]
+    if coordinate.locked:
         return None
-    lead = draft.leads.get(place) or _add_argument_joint(draft, place)
-    own = lead.line.inverse()
+    leader = draft.leads.get(coordinate_index) or _add_argument_joint(draft, coordinate_index)
+    coordinate_line = leader.line.inverse()
     # The identity needs no helper.
-    if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
-        return Lead(lead.joint, own)
-    follower = Follower(lead.joint, compose_with_line(own, drive))
+    if np.array_equal(inner, (0.0, 1.0, 0.0, 0.0, 0.0)):
+        return Lead(leader.joint, coordinate_line)
+    follower = Follower(leader.joint, compose_with_line(coordinate_line, inner))
     # Paths with equal polynomials share a helper.
     name = next(
         (
             name
-            for name, each in draft.followers.items()
-            if each == follower and name in draft.helpers
+            for name, existing in draft.followers.items()
+            if existing == follower and name in draft.helpers
         ),
         None,
     )
     if name is None:
-        name = draft.make_name("joint", f"{info.name}_helper")
+        name = draft.make_name("joint", f"{coordinate.name}_helper")
         draft.helpers.add(name)
-        speck = add_element(draft.bodies[GROUND], "body", name=draft.make_name("body", name))
+        carrier = add_element(draft.bodies[GROUND], "body", name=draft.make_name("body", name))
         add_element(
-            speck,
+            carrier,
             "inertial",
             pos=np.zeros(3),
             mass=MIN_MASS,
             diaginertia=np.full(3, HELPER_INERTIA),
         )
-        add_element(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
+        add_element(carrier, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
         draft.add_follower(name, follower)
     return Lead(name, StraightLine(1.0, 0.0))
 
@@ -228,8 +243,8 @@ def compose_with_line(line: StraightLine, polynomial: Array) -> tuple[float, ...
     Returns:
         Coefficients of the composition, constant first.
     """
-    whole: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
-    return tuple(whole.coef.tolist())
+    composed: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
+    return tuple(composed.coef.tolist())
 
 
 def _hold_joint(draft: MjcfDraft, joint: RobotJoint) -> None:
@@ -238,20 +253,22 @@ def _hold_joint(draft: MjcfDraft, joint: RobotJoint) -> None:
     The driver moves it exactly.
     """
     value = joint.value(draft.default_state[0])
-    leads = [
-        lead
-        for place in joint.coordinates
-        if (lead := draft.leads.get(place)) and lead.line == (1.0, 0.0)
+    leaders = [
+        leader
+        for index in joint.coordinates
+        if (leader := draft.leads.get(index)) and leader.line == (1.0, 0.0)
     ]
-    if draft.options.driver and len(leads) == len(joint.coordinates):
-        names = tuple(lead.joint for lead in leads)
+    if draft.options.driver and len(leaders) == len(joint.coordinates):
+        names = tuple(leader.joint for leader in leaders)
         draft.add_follower(joint.name, Follower(None, (value,), joint.function, names))
         return
     draft.add_follower(joint.name, Follower(None, (value,)))
-    places = list(joint.coordinates)
-    random = np.random.default_rng(0)
-    low, high = np.array([draft.mechanism.coordinates[place].range for place in places]).T
-    off = [joint.function.evaluate(random.uniform(low, high))[0] - value for _ in range(500)]
+    indices = list(joint.coordinates)
+    generator = np.random.default_rng(0)
+    lower, upper = np.array([draft.mechanism.coordinates[index].range for index in indices]).T
+    value_errors = [
+        joint.function.evaluate(generator.uniform(lower, upper))[0] - value for _ in range(500)
+    ]
     unit = "rad" if joint.kind == "revolute" else "m"
     draft.fidelity.add(
         "function",
@@ -259,5 +276,5 @@ def _hold_joint(draft: MjcfDraft, joint: RobotJoint) -> None:
         "a joint that is a function of several coordinates",
         "held where it is in the default pose",
         f"joint {joint.name}",
-        {"value": Error.measure(off, unit)},
+        {"value": Error.measure(value_errors, unit)},
     )

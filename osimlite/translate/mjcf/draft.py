@@ -139,20 +139,20 @@ def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
     Raises:
         UnsupportedError: a number is not finite, which MJCF cannot express.
     """
-    said = {
+    texts = {
         name.rstrip("_"): format_value(value)
         for name, value in attributes.items()
         if value is not None
     }
     # A text may well be "NaN"; a number of that kind would end MuJoCo's reader.
-    for name, words in said.items():
-        if NON_FINITE_WORDS.intersection(words.split()) and not isinstance(
+    for name, text in texts.items():
+        if NON_FINITE_WORDS.intersection(text.split()) and not isinstance(
             attributes.get(name), str
         ):
             raise UnsupportedError(
-                f"MJCF cannot say a number that is not finite: {name} of the {tag} '{said.get('name', '')}' is {words}"
+                f"MJCF cannot say a number that is not finite: {name} of the {tag} '{texts.get('name', '')}' is {text}"
             )
-    return SubElement(parent, tag, said)
+    return SubElement(parent, tag, texts)
 
 
 @dataclass
@@ -239,31 +239,31 @@ class MjcfDraft:
             )
             return self.mechanism.values({}), self.mechanism.speeds({})
 
-    def iterate_components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
+    def iterate_components(self, component_class: type[C]) -> Iterator[tuple[C, str]]:
         """Yield the components of a class that are not accounted for, with their paths."""
-        spoken_of = self.fidelity.translated.keys() | {
+        recorded = self.fidelity.translated.keys() | {
             record.component for record in self.fidelity.records
         }
         for component in self.tree.components:
             if (
-                isinstance(component, kind)
-                and (path := self.tree.path_of(component) or "") not in spoken_of
+                isinstance(component, component_class)
+                and (path := self.tree.path_of(component) or "") not in recorded
             ):
                 yield component, path
 
-    def record_result(self, path: str, became: str) -> None:
+    def record_result(self, path: str, result: str) -> None:
         """Record what a component and all components below it became.
 
         Components that are accounted for keep their entry.
 
         Args:
             path: absolute path of the component.
-            became: kind and name of the element.
+            result: kind and name of the element.
         """
         # Components below become what their owner becomes, unless they have their own entry.
-        for each in self.tree.by_path:
-            if each == path or each.startswith(f"{path}/"):
-                self.fidelity.translated.setdefault(each, became)
+        for other_path in self.tree.by_path:
+            if other_path == path or other_path.startswith(f"{path}/"):
+                self.fidelity.translated.setdefault(other_path, result)
 
     def get_section(self, tag: str) -> _Element:
         """Return the section of the file with a tag, such as `tendon`, `actuator` or `equality`."""
@@ -277,18 +277,22 @@ class MjcfDraft:
             kind: name space of MuJoCo: `geom`, `site`, `tendon`, `actuator`, `equality` ...
             path: absolute path of the component, or any name.
         """
-        taken = self._names.setdefault(kind, set())
-        own = path.rsplit("/", 1)[-1]
-        whole = xml_name(to_dotted_name(path))
-        name = xml_name(own or whole)
+        used_names = self._names.setdefault(kind, set())
+        component_name = path.rsplit("/", 1)[-1]
+        dotted_name = xml_name(to_dotted_name(path))
+        name = xml_name(component_name or dotted_name)
         # The short name if it is free: users look for it.
-        if name in taken:
+        if name in used_names:
             # The path is unique in the model, but another pass may have used it.
-            name = whole if whole not in taken else make_unique_name(whole, taken, first=2)
-        taken.add(name)
+            name = (
+                dotted_name
+                if dotted_name not in used_names
+                else make_unique_name(dotted_name, used_names, first=2)
+            )
+        used_names.add(name)
         # Only components have a name of their own to compare with.
         if path in self.tree.by_path:
-            self.fidelity.note_name(path, kind, own, name)
+            self.fidelity.note_name(path, kind, component_name, name)
         return name
 
     def find_placement(self, owner: Component, socket: str) -> FramePlacement:
@@ -309,20 +313,22 @@ class MjcfDraft:
             raise ModelError(f"the frame '{path}' is not fixed to a body")
         return self.mechanism.frames[path]
 
-    def add_site(self, path: str, body: int, place: Array, **attributes: Value) -> str:
+    def add_site(self, path: str, body: int, position: Array, **attributes: Value) -> str:
         """Add a site to a body.
 
         Args:
             path: path of the component after which it is named.
             body: index of the body, -1 for ground.
-            place: position (3,) (m) or transform (4, 4) in the body.
+            position: position (3,) (m) or transform (4, 4) in the body.
             **attributes: further attributes.
 
         Returns:
             Name of the site.
         """
         name = self.make_name("site", path)
-        frame = format_pose(place) if place.shape == (4, 4) else {"pos": clear_rounding(place)}
+        frame = (
+            format_pose(position) if position.shape == (4, 4) else {"pos": clear_rounding(position)}
+        )
         add_element(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
 
@@ -399,10 +405,10 @@ class MjcfDraft:
     @cached_property
     def _transforms_at_zero(self) -> dict[str, Array]:
         """Transforms (4, 4) of all links in ground by name, with all joints at zero."""
-        placed = {self.robot.links[0].name: np.eye(4)}
+        transforms = {self.robot.links[0].name: np.eye(4)}
         for joint in self.robot.joints:
-            placed[joint.child] = placed[joint.parent] @ joint.compute_transform(0.0)
-        return placed
+            transforms[joint.child] = transforms[joint.parent] @ joint.compute_transform(0.0)
+        return transforms
 
     def add_mesh(self, file: str, scale: tuple[float, float, float]) -> str:
         """Return the asset of a mesh file at a scale, which is added if it is new.
@@ -440,9 +446,12 @@ def format_pose(matrix: Array) -> dict[str, Value]:
     Returns:
         "pos" and "quat"; None for no translation or rotation.
     """
-    place = clear_rounding(matrix[:3, 3])
-    turned = clear_rounding(quaternion_of(matrix[:3, :3]))
-    return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
+    position = clear_rounding(matrix[:3, 3])
+    quaternion = clear_rounding(quaternion_of(matrix[:3, :3]))
+    return {
+        "pos": position if position.any() else None,
+        "quat": quaternion if quaternion[1:].any() else None,
+    }
 
 
 def clear_rounding(values: Array) -> Array:

@@ -22,12 +22,12 @@ def add_driven(draft: MjcfDraft) -> None:
     forces = force_elements(
         draft.model, draft.mechanism, skip_unsupported=True, folder=draft.folder
     )
-    for words in forces.skipped:
-        path, _, kind = words.partition(" (")
+    for skipped in forces.skipped:
+        path, _, force_class = skipped.partition(" (")
         draft.fidelity.add(
             "force",
             path.strip("'"),
-            f"a {kind.rstrip(')')}",
+            f"a {force_class.rstrip(')')}",
             f"{LEFT_OUT}: osimlite cannot compute it",
         )
     for element in forces.elements:

@@ -139,19 +139,21 @@ class Driver:
         self._equilibrate = equilibrate
         self._add_controls()
         self._places = np.array(sorted(self.mjcf.leads), dtype=int)
-        leads = [self.mjcf.leads[place] for place in self._places]
-        joints = [self.model.joint(lead.joint) for lead in leads]
+        leaders = [self.mjcf.leads[index] for index in self._places]
+        joints = [self.model.joint(leader.joint) for leader in leaders]
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self._dofs = np.array([joint.dofadr[0] for joint in joints], dtype=int)
-        self._slopes, self._starts = np.array([lead.line for lead in leads]).reshape(-1, 2).T
-        led = set(self.mjcf.leads)
+        self._slopes, self._starts = np.array([leader.line for leader in leaders]).reshape(-1, 2).T
+        leading_indices = set(self.mjcf.leads)
         # Coordinates without a joint of their own follow a leading coordinate.
         self._following = {
-            k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led
+            k: coupling_driver
+            for k, coupling_driver in coordinate_drivers(self.mjcf.robot).items()
+            if k not in leading_indices
         }
         self._followed = [self._make_follower(name) for name in self.mjcf.followers]
         self._free = np.setdiff1d(
-            np.arange(self.model.nv), [followed.dof for followed in self._followed]
+            np.arange(self.model.nv), [follower.dof for follower in self._followed]
         )
         self._rates: list[float] = []
         self._failure: BaseException | None = None
@@ -225,12 +227,12 @@ class Driver:
     def _call_back(self) -> Iterator[None]:
         """Let MuJoCo call the driver for forces and activations within a `with` block."""
         mujoco = self._mujoco
-        before = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
+        previous = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
 
         def push(model: Any, data: Any) -> None:
             # Callbacks of other code continue to act.
-            if before[0] is not None:
-                before[0](model, data)
+            if previous[0] is not None:
+                previous[0](model, data)
             self._apply_forces(data)
 
         mujoco.set_mjcb_control(push)
@@ -238,8 +240,8 @@ class Driver:
         try:
             yield
         finally:
-            mujoco.set_mjcb_control(before[0])
-            mujoco.set_mjcb_act_dyn(before[1])
+            mujoco.set_mjcb_control(previous[0])
+            mujoco.set_mjcb_act_dyn(previous[1])
         if self._failure is not None:
             failure, self._failure = self._failure, None
             raise failure
@@ -291,39 +293,54 @@ class Driver:
         """
         if not data.ne:
             return
-        # Accelerations are `moves` @ those of the free joints + `wanted`.
-        moves = np.eye(self.model.nv)
-        wanted = np.zeros(self.model.nv)
-        for followed in self._followed:
-            _, gradient, _, wanted[followed.dof] = followed.evaluate(data)
-            moves[followed.dof, followed.dof] = 0.0
-            if followed.leaders:
-                moves[followed.dof, followed.leaders] = gradient
-        moves = moves[:, self._free]
+        # Accelerations are `from_free` @ those of the free joints + `prescribed`.
+        from_free = np.eye(self.model.nv)
+        prescribed = np.zeros(self.model.nv)
+        for follower in self._followed:
+            _, gradient, _, prescribed[follower.dof] = follower.evaluate(data)
+            from_free[follower.dof, follower.dof] = 0.0
+            if follower.leaders:
+                from_free[follower.dof, follower.leaders] = gradient
+        from_free = from_free[:, self._free]
         # MuJoCo puts the rows of equalities first, in their order.
-        places = np.searchsorted(data.efc_id[: data.ne], [item.equality for item in self._followed])
-        others = np.setdiff1d(np.arange(data.ne), places)
-        rows = data.efc_J.reshape(-1, self.model.nv)[others]
+        equality_rows = np.searchsorted(
+            data.efc_id[: data.ne], [follower_joint.equality for follower_joint in self._followed]
+        )
+        other_rows = np.setdiff1d(np.arange(data.ne), equality_rows)
+        jacobian = data.efc_J.reshape(-1, self.model.nv)[other_rows]
         applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
-        inertia = np.array([self._multiply_mass(data, column) for column in moves.T.copy()]) @ moves
-        known = np.append(
-            moves.T @ (applied - self._multiply_mass(data, wanted)),
-            data.efc_aref[others] - rows @ wanted,
+        inertia = (
+            np.array([self._multiply_mass(data, column) for column in from_free.T.copy()])
+            @ from_free
         )
-        held = rows @ moves
-        matrix = np.block([[inertia, held.T], [held, np.zeros((len(others), len(others)))]])
+        right_side = np.append(
+            from_free.T @ (applied - self._multiply_mass(data, prescribed)),
+            data.efc_aref[other_rows] - jacobian @ prescribed,
+        )
+        free_jacobian = jacobian @ from_free
+        matrix = np.block(
+            [
+                [inertia, free_jacobian.T],
+                [free_jacobian, np.zeros((len(other_rows), len(other_rows)))],
+            ]
+        )
         result = (
-            np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
+            np.linalg.lstsq(matrix, right_side)[0]
+            if len(other_rows)
+            else np.linalg.solve(matrix, right_side)
         )
-        accelerations = moves @ result[: len(self._free)] + wanted
+        accelerations = from_free @ result[: len(self._free)] + prescribed
         # Forces that produce exactly these accelerations.
         data.qfrc_passive += self._multiply_mass(data, accelerations) - applied
         # `_update_equalities` writes for the start of a step; within the step fitted equalities have no
         # errors to correct.
-        for place, item in zip(places, self._followed, strict=True):
-            rest = 0.0 if item.fitted else data.efc_aref[place]
-            data.efc_aref[place] = (
-                rest + (wanted if len(item.leaders) == 1 else accelerations)[item.dof]
+        for row_index, follower_joint in zip(equality_rows, self._followed, strict=True):
+            correction = 0.0 if follower_joint.fitted else data.efc_aref[row_index]
+            data.efc_aref[row_index] = (
+                correction
+                + (prescribed if len(follower_joint.leaders) == 1 else accelerations)[
+                    follower_joint.dof
+                ]
             )
 
     def _multiply_mass(self, data: Any, accelerations: Array) -> Array:
@@ -372,18 +389,22 @@ class Driver:
 
         These get the value, the slope and the curvature of the exact functions.
         """
-        for followed in self._followed:
-            if followed.fitted:
-                value, gradient, rate, _ = followed.evaluate(self.data)
-                self.data.qpos[followed.own], self.data.qvel[followed.dof] = value, rate
+        for follower in self._followed:
+            if follower.fitted:
+                value, gradient, rate, _ = follower.evaluate(self.data)
+                self.data.qpos[follower.own], self.data.qvel[follower.dof] = value, rate
                 polynomial = np.zeros(5)
                 polynomial[0] = value
-                if len(followed.leaders) == 1:
-                    x = self.data.qpos[followed.addresses[0]]
+                if len(follower.leaders) == 1:
+                    x = self.data.qpos[follower.addresses[0]]
                     slope = gradient[0]
-                    bend = 0.5 * followed.function.evaluate((x,))[2][0][0]
-                    polynomial[:3] = value + x * (bend * x - slope), slope - 2.0 * bend * x, bend
-                self.model.eq_data[followed.equality, :5] = polynomial
+                    curvature = 0.5 * follower.function.evaluate((x,))[2][0][0]
+                    polynomial[:3] = (
+                        value + x * (curvature * x - slope),
+                        slope - 2.0 * curvature * x,
+                        curvature,
+                    )
+                self.model.eq_data[follower.equality, :5] = polynomial
 
     # ------------------------------------------------------------------------------------------------ making ready
     def _restore_inertias(self) -> None:
@@ -397,13 +418,13 @@ class Driver:
     def _make_follower(self, name: str) -> _FollowerJoint:
         """Return the addresses and the function of a joint that follows others."""
         follower = self.mjcf.followers[name]
-        own = self.model.joint(name)
+        joint = self.model.joint(name)
         names = follower.arguments or (() if follower.leader is None else (follower.leader,))
-        leaders = [self.model.joint(each) for each in names]
+        leaders = [self.model.joint(leader_name) for leader_name in names]
         return _FollowerJoint(
             self.model.equality(name).id,
-            own.qposadr[0],
-            own.dofadr[0],
+            joint.qposadr[0],
+            joint.dofadr[0],
             [leader.qposadr[0] for leader in leaders],
             [leader.dofadr[0] for leader in leaders],
             follower.function or Polynomial(follower.polynomial[::-1]),
@@ -414,15 +435,17 @@ class Driver:
         """Add MuJoCo's controls to those of the model, and find where the forces have their values."""
         controls = self.system.forces.controls
         # Two sets of controls with different values reveal where the values are stored.
-        none, one = (
+        zero_controls, unit_controls = (
             controls.add_functions(dict.fromkeys(controls.names, ConstantValue(value)))
             for value in (0.0, 1.0)
         )
-        self.system.set_controls(none)
-        place = self.system.structure[MODEL.CONTROLS]
-        first = self.system.structure[place + ITEM.NUMBERS] if place else 0
-        self._controls = first + np.flatnonzero(
-            np.array(none.make_record()[1]) != np.array(one.make_record()[1])
+        self.system.set_controls(zero_controls)
+        controls_offset = self.system.structure[MODEL.CONTROLS]
+        first_value = (
+            self.system.structure[controls_offset + ITEM.NUMBERS] if controls_offset else 0
+        )
+        self._controls = first_value + np.flatnonzero(
+            np.array(zero_controls.make_record()[1]) != np.array(unit_controls.make_record()[1])
         )
         names = [self.model.actuator(k).name for k in range(self.model.nu)]
         self._states = names.index(STATES_ACTUATOR) if STATES_ACTUATOR in names else -1

@@ -26,18 +26,18 @@ from osimlite.translate.mjcf.draft import (
 def add_ellipsoids(draft: MjcfDraft) -> None:
     """Add the mechanism for every joint whose body stays on an ellipsoid."""
     joints = draft.robot.joints
-    slides = [
-        place for place, joint in enumerate(joints) if isinstance(joint.function, EllipsoidPoint)
+    slide_indices = [
+        index for index, joint in enumerate(joints) if isinstance(joint.function, EllipsoidPoint)
     ]
-    for _, group in groupby(slides, key=lambda place: joints[place].source):
-        places = list(group)
+    for _, group in groupby(slide_indices, key=lambda index: joints[index].source):
+        indices = list(group)
         _add_mechanism(
-            draft, [joints[place] for place in places], joints[places[-1] + 1 : places[-1] + 4]
+            draft, [joints[index] for index in indices], joints[indices[-1] + 1 : indices[-1] + 4]
         )
 
 
 def _add_mechanism(
-    draft: MjcfDraft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]
+    draft: MjcfDraft, slides: list[RobotJoint], rotations: tuple[RobotJoint, ...]
 ) -> None:
     """Add the body on slides, its connection and the couplings of one joint.
 
@@ -50,33 +50,37 @@ def _add_mechanism(
         if np.array_equal(joint.axis, axis):
             radii[joint.function.component] = joint.function.radius
     base = draft.frames.get(slides[0].parent)
-    end = draft.frames.get(turns[-1].child) if turns else None
-    whole = {place for joint in turns for place in joint.coordinates} == set(slides[0].coordinates)
+    end = draft.frames.get(rotations[-1].child) if rotations else None
+    same_coordinates = {place for joint in rotations for place in joint.coordinates} == set(
+        slides[0].coordinates
+    )
     # Another arrangement of axes is left to the general treatment of functions.
-    if len(radii) < len(slides) or base is None or end is None or not whole:
+    if len(radii) < len(slides) or base is None or end is None or not same_coordinates:
         return
     # Any distance is exact; the largest radius makes ratios of about one half.
-    ahead = max(radii.values())
+    lead_distance = max(radii.values())
     path = slides[0].source
     name = draft.make_name("ellipsoid", path)
     element, frame = base
-    speck = draft.add_speck(name, element, frame @ slides[0].origin)
+    carrier = draft.add_speck(name, element, frame @ slides[0].origin)
     state = draft.default_state[0]
     for component, axis in enumerate(np.eye(3)):
-        reader = draft.make_name("joint", f"{name}_{'xyz'[component]}")
-        add_element(speck, "joint", name=reader, type="slide", axis=axis)
+        carrier_joint = draft.make_name("joint", f"{name}_{'xyz'[component]}")
+        add_element(carrier, "joint", name=carrier_joint, type="slide", axis=axis)
         radius = radii.get(component, 0.0)
         normal = EllipsoidPoint(component, 1.0).evaluate(state[list(slides[0].coordinates)])[0]
-        draft.starts[reader] = (radius + ahead) * normal
+        draft.starts[carrier_joint] = (radius + lead_distance) * normal
         for slide in slides:
             if slide.function == EllipsoidPoint(component, radius):
-                draft.add_follower(slide.name, Follower(reader, (0.0, radius / (radius + ahead))))
+                draft.add_follower(
+                    slide.name, Follower(carrier_joint, (0.0, radius / (radius + lead_distance)))
+                )
     element, frame = end
     point = frame.copy()
-    point[:3, 3] += ahead * frame[:3, 2]
-    sites = [draft.make_name("site", f"{name}_{word}") for word in ("ahead", "speck")]
+    point[:3, 3] += lead_distance * frame[:3, 2]
+    sites = [draft.make_name("site", f"{name}_{suffix}") for suffix in ("ahead", "speck")]
     add_element(element, "site", name=sites[0], **format_pose(point))
-    add_element(speck, "site", name=sites[1])
+    add_element(carrier, "site", name=sites[1])
     equality = draft.make_name("equality", path)
     add_element(
         draft.get_section("equality"), "connect", name=equality, site1=sites[0], site2=sites[1]

@@ -185,8 +185,8 @@ def to_mjcf(
         raise SettingError(f"spline is 'quartic' or 'series', not '{spline}'")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
-    place = None if folder is None else Path(folder)
-    mesh_files = MeshFiles(MeshFolders(place, geometry))
+    model_folder = None if folder is None else Path(folder)
+    mesh_files = MeshFiles(MeshFolders(model_folder, geometry))
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
     robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
     draft = MjcfDraft(
@@ -194,13 +194,17 @@ def to_mjcf(
         robot,
         fidelity,
         MjcfOptions(mujoco, visuals, contact, fit, spline, driver),
-        place,
+        model_folder,
         mesh_files,
     )
     _add_settings(draft)
     fidelity.translated["/"] = f"mujoco {mechanism.name}"
-    for make in (*MECHANISM_PASSES, *((add_driven,) if driver else FORCE_PASSES), *SCENERY_PASSES):
-        make(draft)
+    for run_pass in (
+        *MECHANISM_PASSES,
+        *((add_driven,) if driver else FORCE_PASSES),
+        *SCENERY_PASSES,
+    ):
+        run_pass(draft)
     # What no pass has accounted for is lost.
     account_for_rest(draft.tree, fidelity)
     for section in list(draft.root):

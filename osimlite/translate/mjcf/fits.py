@@ -46,41 +46,43 @@ def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
     """
     if router.compute_error(tendon) < ERROR_TOLERANCE_M:
         return tendon
-    fixed = [
+    fixed_indices = [
         index for index, part in enumerate(tendon) if isinstance(part, TendonSite) and part.name
     ]
     # From the end, so that indices of earlier pieces remain valid.
-    for first, last in reversed(list(pairwise(fixed))):
-        piece = tendon[first : last + 1]
-        if any(map(_is_free, piece)):
-            result = _fit_piece(piece, router.make_piece_residuals(tendon, piece))
+    for first, last in reversed(list(pairwise(fixed_indices))):
+        segment = tendon[first : last + 1]
+        if any(map(_is_free, segment)):
+            result = _fit_piece(segment, router.make_piece_residuals(tendon, segment))
             tendon = (*tendon[:first], *result, *tendon[last + 1 :])
     return tendon
 
 
-def _fit_piece(piece: Tendon, wrong: Residuals) -> Tendon:
+def _fit_piece(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     """Fit a piece of a tendon.
 
     All numbers are fitted together by least squares, then the side of each surface, repeatedly.
     """
     search = require("scipy.optimize", extra="sim", purpose="fits of tendons").least_squares
-    best, least = piece, _compute_error(wrong(piece))
+    best, smallest_error = piece, _compute_error(compute_residuals(piece))
     for _ in range(MAX_ROUNDS):
         start = best
-        size = sum(7 if isinstance(part, WrapGeom) else 3 for part in start if _is_free(part))
+        variable_count = sum(
+            7 if isinstance(part, WrapGeom) else 3 for part in start if _is_free(part)
+        )
         guess = search(
             # Millimetres: tolerances of least_squares are for residuals near 1.
-            lambda x, t=start: 1e3 * wrong(_move_free_parts(t, x)).ravel(),
-            np.zeros(size),
+            lambda x, t=start: 1e3 * compute_residuals(_move_free_parts(t, x)).ravel(),
+            np.zeros(variable_count),
             max_nfev=40,
         )
-        result = _choose_sides(_move_free_parts(start, guess.x), wrong)
-        error = _compute_error(wrong(result))
-        if error < least:
+        result = _choose_sides(_move_free_parts(start, guess.x), compute_residuals)
+        error = _compute_error(compute_residuals(result))
+        if error < smallest_error:
             best = result
-        if not error < WORTHWHILE_RATIO * least:
+        if not error < WORTHWHILE_RATIO * smallest_error:
             break
-        least = error
+        smallest_error = error
     return best
 
 
@@ -89,18 +91,20 @@ def _compute_error(residuals: Array) -> float:
     return float(np.sqrt(np.square(residuals).mean(0).sum()))
 
 
-def _choose_sides(piece: Tendon, wrong: Residuals) -> Tendon:
+def _choose_sides(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     """Return the piece with the best side for each surface."""
-    turns = np.arange(SIDE_DIRECTIONS) * (2.0 * np.pi / SIDE_DIRECTIONS)
-    directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
+    angles = np.arange(SIDE_DIRECTIONS) * (2.0 * np.pi / SIDE_DIRECTIONS)
+    directions = np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)
     # The length of a tendon jumps with the side, which no gradient shows: all sides are tried.
     for index, part in enumerate(piece):
         if isinstance(part, WrapGeom) and _is_free(part):
             options = [
-                (*piece[:index], part.replace_side(way), *piece[index + 1 :])
-                for way in (None, *directions)
+                (*piece[:index], part.replace_side(direction), *piece[index + 1 :])
+                for direction in (None, *directions)
             ]
-            piece = min((piece, *options), key=lambda option: _compute_error(wrong(option)))
+            piece = min(
+                (piece, *options), key=lambda option: _compute_error(compute_residuals(option))
+            )
     return piece
 
 
@@ -118,7 +122,7 @@ def _move_free_parts(piece: Tendon, x: Array) -> Tendon:
         if not _is_free(part):
             parts.append(part)
         elif isinstance(part, TendonSite):
-            parts.append(replace(part, place=part.place + SHIFT_SCALE_M * x[:3]))
+            parts.append(replace(part, position=part.position + SHIFT_SCALE_M * x[:3]))
             x = x[3:]
         else:
             frame = part.frame @ make_offset(SHIFT_SCALE_M * x[:3], TURN_SCALE_RAD * x[3:6])

@@ -41,14 +41,14 @@ They raise `Untranslatable` if MuJoCo cannot express it.
 def add_forces(draft: MjcfDraft) -> None:
     """Add every active force whose law MuJoCo has."""
     for force, path in draft.iterate_components(Force):
-        what = type(force).__name__
+        class_name = type(force).__name__
         try:
             if not force.appliesForce:
                 raise Untranslatable("its appliesForce is false")
             # A muscle class that osimlite cannot compute has no tension to fit to.
             if isinstance(force, Muscle) and FORCE_TYPES.find(type(force)):
                 draft.fidelity.translated[path] = add_muscle(draft, force, path)
-            elif what in MAKERS:
-                draft.fidelity.translated[path] = MAKERS[what](draft, force, path)
+            elif class_name in MAKERS:
+                draft.fidelity.translated[path] = MAKERS[class_name](draft, force, path)
         except (ModelError, Untranslatable) as error:
-            draft.fidelity.add("force", path, f"a {what}", f"{LEFT_OUT}: {error}")
+            draft.fidelity.add("force", path, f"a {class_name}", f"{LEFT_OUT}: {error}")

@@ -35,11 +35,11 @@ def add_point_spring(draft: MjcfDraft, force: PointToPointSpring, path: str) -> 
         Kind and name of the element.
     """
     # OpenSim takes both points in the bodies, whatever frames are named.
-    ends = [
+    site_names = [
         _add_point_site(draft, force, path, "socket_body1", force.point1),
         _add_point_site(draft, force, path, "socket_body2", force.point2),
     ]
-    return f"tendon {add_straight_tendon(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)}"
+    return f"tendon {add_straight_tendon(draft, path, site_names, stiffness=force.stiffness, springlength=force.rest_length)}"
 
 
 def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, path: str) -> str:
@@ -60,7 +60,7 @@ def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, p
         raise Untranslatable(
             "its points are given in ground, so that they wander through the bodies"
         )
-    ends = [
+    site_names = [
         _add_point_site(draft, force, path, "bodyA", force.pointA),
         _add_point_site(draft, force, path, "bodyB", force.pointB),
     ]
@@ -70,7 +70,7 @@ def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, p
         draft.get_section("actuator"),
         "motor",
         name=name,
-        tendon=add_straight_tendon(draft, path, ends),
+        tendon=add_straight_tendon(draft, path, site_names),
         gear=force.optimal_force,
     )
     return f"actuator {name}"
@@ -94,14 +94,14 @@ def add_torque_actuator(draft: MjcfDraft, force: TorqueActuator, path: str) -> s
     # Without body B the reaction acts on ground.
     second = draft.find_placement(force, "bodyB") if force.bodyB else GROUND_FRAME
     gear = np.append(np.zeros(3), _normalize_axis(force.axis) * force.optimal_force)
-    one = draft.add_site(path, *first)
+    first_site = draft.add_site(path, *first)
     # The axis is fixed in body B; MuJoCo applies the torque in the axes of the reference site.
     if not force.torque_is_global:
         # The opposite torque on the other body, with the sign reversed, is the same.
-        return _add_site_motor(draft, path, -gear, draft.add_site(path, *second), one)
+        return _add_site_motor(draft, path, -gear, draft.add_site(path, *second), first_site)
     if second.body != GROUND:
         raise Untranslatable("its axis is fixed in ground while both its bodies move")
-    return _add_site_motor(draft, path, gear, one, draft.add_site(path, *GROUND_FRAME))
+    return _add_site_motor(draft, path, gear, first_site, draft.add_site(path, *GROUND_FRAME))
 
 
 def add_point_actuator(draft: MjcfDraft, force: PointActuator, path: str) -> str:
@@ -197,12 +197,12 @@ def add_body_actuator(draft: MjcfDraft, force: BodyActuator, path: str) -> str:
     site = _add_point_site(draft, force, path, "socket_body", force.point)
     axes = draft.add_site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
     # MuJoCo's gear has the force first, and then the torque.
-    units = np.eye(6)[[3, 4, 5, 0, 1, 2]]
-    made = [
-        _add_site_motor(draft, f"{path}_{word}", unit, site, axes)
-        for word, unit in zip(AXIS_NAMES, units, strict=True)
+    unit_gears = np.eye(6)[[3, 4, 5, 0, 1, 2]]
+    actuators = [
+        _add_site_motor(draft, f"{path}_{axis_name}", unit, site, axes)
+        for axis_name, unit in zip(AXIS_NAMES, unit_gears, strict=True)
     ]
-    return " ".join(made)
+    return " ".join(actuators)
 
 
 def add_bushing(draft: MjcfDraft, force: BushingForce, path: str) -> str:
@@ -219,37 +219,41 @@ def add_bushing(draft: MjcfDraft, force: BushingForce, path: str) -> str:
     Returns:
         Kind and name of the element.
     """
-    (one, inner), second = (
+    (first_body, first_frame), second = (
         draft.find_placement(force, "socket_frame1"),
         draft.find_placement(force, "socket_frame2"),
     )
     name = draft.make_name("bushing", path)
-    speck = draft.add_speck(name, draft.bodies[one], inner)
+    carrier = draft.add_speck(name, draft.bodies[first_body], first_frame)
     state = draft.mechanism.at(draft.default_state[0])
     # Deviations in the default pose, at which the joints start.
-    apart = invert_transform(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
-    starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])
+    deviation = (
+        invert_transform(state.transform(first_body) @ first_frame)
+        @ state.transform(second[0])
+        @ second[1]
+    )
+    starts = (*angles_xyz(deviation[:3, :3]), *deviation[:3, 3])
     stiffness = (*force.rotational_stiffness, *force.translational_stiffness)
     damping = (*force.rotational_damping, *force.translational_damping)
     # OpenSim measures translations along the axes of the first frame, so that they come first.
     for k in (3, 4, 5, 0, 1, 2):
         joint = draft.make_name("joint", f"{name}_{AXIS_NAMES[k]}")
         draft.starts[joint] = starts[k]
-        kind = ("hinge", "slide")[k // 3]
+        joint_type = ("hinge", "slide")[k // 3]
         axis = np.eye(3)[k % 3]
         add_element(
-            speck,
+            carrier,
             "joint",
             name=joint,
-            type=kind,
+            type=joint_type,
             axis=axis,
             stiffness=stiffness[k],
             damping=damping[k],
         )
-    add_element(speck, "site", name=draft.make_name("site", f"{name}_speck"))
+    add_element(carrier, "site", name=draft.make_name("site", f"{name}_speck"))
     weld = draft.make_name("equality", path)
-    ends = {"site1": f"{name}_speck", "site2": draft.add_site(path, *second)}
-    add_element(draft.get_section("equality"), "weld", name=weld, **ends)
+    weld_sites = {"site1": f"{name}_speck", "site2": draft.add_site(path, *second)}
+    add_element(draft.get_section("equality"), "weld", name=weld, **weld_sites)
     draft.fidelity.add(
         "bushing",
         path,

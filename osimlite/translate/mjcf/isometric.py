@@ -45,9 +45,9 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
     model.add(force.copy_deep().model_copy(update={"name": "force", "geometry_path": path}))
     if isinstance(force, Muscle):
         # The control equals the time, because it is the activation of muscles without such a state.
-        brain = PrescribedController(name="brain", socket_actuators=("/forceset/force",))
-        brain.ControlFunctions.objects.append(LinearFunction(coefficients=(1.0, 0.0)))
-        model.add(brain)
+        controller = PrescribedController(name="brain", socket_actuators=("/forceset/force",))
+        controller.ControlFunctions.objects.append(LinearFunction(coefficients=(1.0, 0.0)))
+        model.add(controller)
     mechanism = build_mechanism(model)
     system = System(mechanism, force_elements(model, mechanism))
     result = np.full((len(activations), len(lengths)), np.nan)

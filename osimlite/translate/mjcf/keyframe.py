@@ -18,19 +18,19 @@ def add_keyframe(draft: MjcfDraft) -> None:
     try:
         draft.mechanism.acceleration(q, u)
     except SimulationError as error:
-        done = "as it is: the file can be posed, but what its motions are means nothing"
+        consequence = "as it is: the file can be posed, but what its motions are means nothing"
         draft.fidelity.add(
             "singular",
             "/",
             "a motion without inertia, which OpenSim has no acceleration for",
-            done,
+            consequence,
             error.message,
         )
     qdot = draft.mechanism.coordinate_rates(q, u)
     values = draft.robot.joint_values(q)
     rates = dict(zip(values, (draft.robot.joint_jacobian(q) @ qdot).tolist(), strict=True))
-    for place, (joint, line) in draft.leads.items():
-        values[joint], rates[joint] = line.slope * q[place] + line.start, line.slope * qdot[place]
+    for index, (joint, line) in draft.leads.items():
+        values[joint], rates[joint] = line.slope * q[index] + line.start, line.slope * qdot[index]
     # Joints of helper bodies are not part of the robot.
     values |= draft.starts
     # Followers last: their leaders have values by now.

@@ -32,7 +32,7 @@ INITIAL_BENDS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3,
 
 
 def fit_composition(
-    functions: Sequence[SmoothFunction], span: tuple[float, float]
+    functions: Sequence[SmoothFunction], interval: tuple[float, float]
 ) -> tuple[Array, Array]:
     """Fit quartics of a common quartic to functions of a coordinate.
 
@@ -41,31 +41,39 @@ def fit_composition(
 
     Args:
         functions: functions of the coordinate (k).
-        span: range of the coordinate (rad or m).
+        interval: range of the coordinate (rad or m).
 
     Returns:
         Inner quartic (5,), whose values are within `HELPER_RANGE_RAD`, and outer quartics (k, 5);
         constant first.
     """
     exact = [find_polynomial(function) for function in functions]
-    known = [item for item in exact if item is not None and item.degree() <= DEGREE]
-    if len(known) == len(exact):
-        return np.eye(DEGREE + 1)[1], np.array([_pad_coefficients(item) for item in known])
-    low, high = span
+    polynomials = [
+        each_function
+        for each_function in exact
+        if each_function is not None and each_function.degree() <= DEGREE
+    ]
+    if len(polynomials) == len(exact):
+        return np.eye(DEGREE + 1)[1], np.array(
+            [_pad_coefficients(each_function) for each_function in polynomials]
+        )
+    lower, upper = interval
     # Chebyshev points keep the error even over the range.
-    at = 0.5 * (low + high) + 0.5 * (high - low) * UNIT_POINTS
-    values = np.stack([sample_function(item, at) for item in functions], axis=1)
+    points = 0.5 * (lower + upper) + 0.5 * (upper - lower) * UNIT_POINTS
+    values = np.stack(
+        [sample_function(each_function, points) for each_function in functions], axis=1
+    )
     # The left and right sides have equal or opposite functions, and share the cached fit.
     signs = np.where(values[0] < 0.0, -1.0, 1.0)
-    bent, rows = fit_quartics((values * signs).tobytes())
+    inner, rows = fit_quartics((values * signs).tobytes())
     # Maps the range of the coordinate to [-1, 1].
-    normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
-    slides = np.array(
+    normal = Polynomial((-(lower + upper) / (upper - lower), 2.0 / (upper - lower)))
+    outers = np.array(
         [_pad_coefficients(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T]
     )
     return HELPER_RANGE_RAD * _pad_coefficients(
-        Polynomial(bent)(normal)
-    ), slides / HELPER_RANGE_RAD ** np.arange(DEGREE + 1)
+        Polynomial(inner)(normal)
+    ), outers / HELPER_RANGE_RAD ** np.arange(DEGREE + 1)
 
 
 @cache
@@ -81,13 +89,13 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
         Inner quartic (5,), constant first, and outer quartics (5, k) in Chebyshev polynomials.
     """
     values = np.frombuffer(data).reshape(SAMPLE_COUNT, -1)
-    powers = np.vander(UNIT_POINTS, DEGREE + 1, increasing=True)
+    monomials = np.vander(UNIT_POINTS, DEGREE + 1, increasing=True)
 
     # The inner quartic is scaled to [-1, 1], so that its bends are its only free numbers.
     # The inner quartic must reach -1 and 1, so that the outer one uses its complete range.
     def make_inner(bends: Array) -> Array:
         bent = np.array((0.0, 1.0, *bends))
-        reached = powers @ bent
+        reached = monomials @ bent
         middle = 0.5 * (reached.max() + reached.min())
         half = 0.5 * (reached.max() - reached.min())
         bent[0] -= middle
@@ -95,7 +103,7 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
 
     def fit_outer(bends: Array) -> tuple[Array, Array]:
         # For given bends the outer quartics follow by linear least squares (variable projection).
-        basis = np.polynomial.chebyshev.chebvander(powers @ make_inner(bends), DEGREE)
+        basis = np.polynomial.chebyshev.chebvander(monomials @ make_inner(bends), DEGREE)
         result: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         return result, (basis @ result - values).ravel()
 
@@ -103,7 +111,7 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
     # 1e3 lets the search end at a sensible relative change.
     best = min(
         (search(lambda bends: 1e3 * fit_outer(bends)[1], start) for start in INITIAL_BENDS),
-        key=lambda each: each.cost,
+        key=lambda search_result: search_result.cost,
     )
     return make_inner(best.x), fit_outer(best.x)[0]
 

@@ -98,14 +98,22 @@ class Curves(NamedTuple):
             activations: activations (A,).
         """
         x = (lengths - self.tendon) / self.fiber
-        low = 0.5 * (self.lmin + 1.0)
-        high = 0.5 * (1.0 + self.lmax)
-        short = x <= 1.0
-        inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
-        outer = np.where(
-            short, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high)
+        rising_mid = 0.5 * (self.lmin + 1.0)
+        falling_mid = 0.5 * (1.0 + self.lmax)
+        is_short = x <= 1.0
+        inner_distance = np.where(
+            is_short, (1.0 - x) / (1.0 - rising_mid), (x - 1.0) / (falling_mid - 1.0)
         )
-        active = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
+        outer_distance = np.where(
+            is_short,
+            (x - self.lmin) / (rising_mid - self.lmin),
+            (self.lmax - x) / (self.lmax - falling_mid),
+        )
+        active = np.where(
+            (x < rising_mid) | (x > falling_mid),
+            0.5 * outer_distance**2,
+            1.0 - 0.5 * inner_distance**2,
+        )
         active[(x < self.lmin) | (x > self.lmax)] = 0.0
         stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
         passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
@@ -120,12 +128,14 @@ class Curves(NamedTuple):
             gain: MuJoCo's gain parameters.
             bias: MuJoCo's bias parameters.
         """
-        (low, high), (first, last) = lengthrange, gain[:2]
-        fiber = (high - low) / (last - first)
+        (shortest, longest), (first, last) = lengthrange, gain[:2]
+        fiber = (longest - shortest) / (last - first)
         # A bias with another scale than the gain is not a shift of the passive curve.
         same_scale = math.isclose(bias[1] - bias[0], last - first, rel_tol=1e-9)
         shift = gain[0] - bias[0] if same_scale else math.nan
-        return cls(low - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift)
+        return cls(
+            shortest - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift
+        )
 
     def make_parameters(self, vmax: float, fvmax: float) -> tuple[Array, Array]:
         """Return MuJoCo's parameters of an actuator whose length range is (tendon, tendon + fiber).
@@ -172,62 +182,68 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
         Untranslatable: a length, a force or a velocity is not positive, or the tension cannot be
             computed.
     """
-    tied = draft.find_tendon(path)
+    path_tendon = draft.find_tendon(path)
     # MuJoCo has no pennation: lengths and forces are projected on the tendon at the optimal length.
-    cos = math.cos(force.pennation_angle_at_optimal)
-    own = Curves(
-        force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos
+    cosine = math.cos(force.pennation_angle_at_optimal)
+    model_curves = Curves(
+        force.tendon_slack_length,
+        force.optimal_fiber_length * cosine,
+        force.max_isometric_force * cosine,
     )
-    if not (own.tendon + own.fiber > own.tendon and own.force > 0.0 and own.tendon >= 0.0):
+    if not (
+        model_curves.tendon + model_curves.fiber > model_curves.tendon
+        and model_curves.force > 0.0
+        and model_curves.tendon >= 0.0
+    ):
         raise Untranslatable("its lengths or its force are not positive")
     rates = _read_rates(force)
-    vmax, fvmax = rates.vmax / cos**2, rates.fvmax
+    vmax, fvmax = rates.vmax / cosine**2, rates.fvmax
     if not min(vmax, fvmax) > MIN_POSITIVE:
         raise Untranslatable(
             "its greatest velocity, or what it holds while it lengthens, is not positive"
         )
     fits = draft.options.fit == "force"
     try:
-        spread = [
+        sampled_lengths = [
             # Quantiles weight lengths by how often they occur.
             np.quantile(lengths, np.linspace(0.0, 1.0, LENGTH_COUNT))
-            for lengths in (tied.lengths, tied.held_out)
+            for lengths in (path_tendon.lengths, path_tendon.held_out)
         ]
         tensions, held_out = np.split(
-            compute_isometric_tension(force, np.concatenate(spread), COMPARED_ACTIVATIONS),
+            compute_isometric_tension(force, np.concatenate(sampled_lengths), COMPARED_ACTIVATIONS),
             2,
             axis=1,
         )
     except OsimliteError as error:
         raise Untranslatable(f"its tension cannot be computed: {error.message}") from error
     # Fitted to one set of poses, judged in the other.
-    curves = _fit_curves(own, spread[0], tensions, free=fits)
+    curves = _fit_curves(model_curves, sampled_lengths[0], tensions, free=fits)
     name = draft.make_name("actuator", path)
     limits = (max(force.min_control, 0.0), min(force.max_control, 1.0))
-    rise, fall = rates.rise, rates.fall
+    activation, deactivation = rates.rise, rates.fall
     # Without time constants or an activation state, the control is the activation.
-    lags = rise > 0.0 and fall > 0.0 and "activation" in list_states(force)
+    has_activation = activation > 0.0 and deactivation > 0.0 and "activation" in list_states(force)
     gain, bias = curves.make_parameters(vmax, fvmax)
     add_element(
         draft.get_section("actuator"),
         "general",
         name=name,
-        tendon=tied.name,
+        tendon=path_tendon.name,
         lengthrange=(curves.tendon, curves.tendon + curves.fiber),
-        dyntype="muscle" if lags else "none",
-        dynprm=(rise, fall, 0.0) if lags else None,
+        dyntype="muscle" if has_activation else "none",
+        dynprm=(activation, deactivation, 0.0) if has_activation else None,
         gaintype="muscle",
         gainprm=gain,
         biastype="muscle",
         biasprm=bias,
         ctrlrange=limits if limits[0] < limits[1] else None,
     )
-    if lags:
+    if has_activation:
         draft.activations[name] = getattr(force, "default_activation", 0.0)
     draft.record_result(path, f"actuator {name}")
-    off = ((curves.compute_tensions(spread[1]) - held_out) / force.max_isometric_force)[
-        _select_tensions(held_out, own)
-    ]
+    force_errors = (
+        (curves.compute_tensions(sampled_lengths[1]) - held_out) / force.max_isometric_force
+    )[_select_tensions(held_out, model_curves)]
     draft.fidelity.add(
         "muscle",
         path,
@@ -235,16 +251,18 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
         "a muscle of MuJoCo's, "
         + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths")
         + rates.note
-        + ("" if lags else "; without activation dynamics: it has its full force at once"),
+        + (
+            "" if has_activation else "; without activation dynamics: it has its full force at once"
+        ),
         f"actuator {name}",
-        {"isometric force": Error.measure(off, "Fmax")} if len(off) else {},
+        {"isometric force": Error.measure(force_errors, "Fmax")} if len(force_errors) else {},
     )
     return f"actuator {name}"
 
 
-def _select_tensions(tensions: Array, own: Curves) -> NDArray[np.bool_]:
+def _select_tensions(tensions: Array, curves: Curves) -> NDArray[np.bool_]:
     """Return which tensions (A, L) are compared: finite ones below `MAX_TENSION`."""
-    return np.nan_to_num(tensions, nan=np.inf) < MAX_TENSION * own.force
+    return np.nan_to_num(tensions, nan=np.inf) < MAX_TENSION * curves.force
 
 
 class Rates(NamedTuple):
@@ -295,10 +313,10 @@ def _read_rates(force: Muscle) -> Rates:
         fvmax = DEFAULT_FVMAX
     else:
         vmax, fvmax = _measure_velocity_curve(force)
-    quick = force.activation1 + force.activation2
-    slow = force.activation2
-    rise = time / quick / RISE_TO_63_PERCENT if quick > 0.0 else 0.0
-    fall = time / slow / FALL_TO_37_PERCENT if slow > 0.0 else 0.0
+    activation_rate = force.activation1 + force.activation2
+    deactivation_rate = force.activation2
+    rise = time / activation_rate / RISE_TO_63_PERCENT if activation_rate > 0.0 else 0.0
+    fall = time / deactivation_rate / FALL_TO_37_PERCENT if deactivation_rate > 0.0 else 0.0
     note = (
         "; velocity from its time_scale, activation with MuJoCo's time constants, which change with activation: "
         "as fast up to 63 % and down to 37 % as its own"
@@ -325,70 +343,74 @@ def _measure_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, fl
 
 def _read_parameter(force: Muscle, name: str, default: float) -> float:
     """Return a parameter of MuJoCo from the property that the muscle class declares for it."""
-    named = ChainMap(
+    properties = ChainMap(
         *(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__)
     )
     try:
-        return float(attrgetter(named[name])(force))
+        return float(attrgetter(properties[name])(force))
     except AttributeError:
         return default
 
 
-def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
+def _fit_curves(initial: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
     """Return the curves nearest to tensions (A, L) at lengths (L,).
 
     If `free`, tendon, fibers and strength are fitted, too.
     """
-    known = _select_tensions(tensions, own)
-    if not known.any():
-        return own
+    is_compared = _select_tensions(tensions, initial)
+    if not is_compared.any():
+        return initial
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
 
     def make_curves(x: Sequence[Any]) -> Curves:
         lmin, lmax, end, fpmax, *rest = x
         tendon, fiber, strength, shift = rest or (0.0, 0.0, 0.0, 0.0)
         moved = (
-            own.tendon + tendon * own.fiber,
-            own.fiber * (1.0 + fiber),
-            own.force * (1.0 + strength),
+            initial.tendon + tendon * initial.fiber,
+            initial.fiber * (1.0 + fiber),
+            initial.force * (1.0 + strength),
         )
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def compute_residuals(x: Array) -> Array:
-        return ((make_curves(x.tolist()).compute_tensions(lengths) - tensions) / own.force)[known]
+        return ((make_curves(x.tolist()).compute_tensions(lengths) - tensions) / initial.force)[
+            is_compared
+        ]
 
     def differentiate(x: Array) -> Array:
         # The same one-sided differences as those of least_squares, backwards at upper bounds, but all
         # columns in one call.
         step = np.where(x >= 0.0, DIFFERENCE_STEP, -DIFFERENCE_STEP) * np.maximum(1.0, np.abs(x))
-        step = np.where((x + step < low) | (x + step > high), -step, step)
+        step = np.where((x + step < lower) | (x + step > upper), -step, step)
         moved = make_curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).compute_tensions(
             lengths
         )
-        all_off = ((moved - tensions[:, None]) / own.force).swapaxes(1, 2)[known].T.copy()
-        return ((all_off[1:] - all_off[0]) / (x + step - x)[:, None]).T
+        residuals = (
+            ((moved - tensions[:, None]) / initial.force).swapaxes(1, 2)[is_compared].T.copy()
+        )
+        return ((residuals[1:] - residuals[0]) / (x + step - x)[:, None]).T
 
-    start, low, high = (
-        [own.lmin, own.lmax, own.end, own.fpmax],
+    start, lower, upper = (
+        [initial.lmin, initial.lmax, initial.end, initial.fpmax],
         list(LOWER_BOUNDS),
         list(UPPER_BOUNDS),
     )
     if free:
         start = [*start, *[0.0] * 4]
-        low = [*low, *[-FIT_RANGE] * 4]
-        high = [*high, *[FIT_RANGE] * 4]
+        lower = [*lower, *[-FIT_RANGE] * 4]
+        upper = [*upper, *[FIT_RANGE] * 4]
     # The curves have kinks, at which a search may end; a second start is tried.
     starts = start, [0.2, 2.2, *start[2:]]
     result = [
         search(
             compute_residuals,
-            each,
+            search_result,
             differentiate,
-            bounds=(low, high),
+            bounds=(lower, upper),
             ftol=FIT_TOLERANCE,
             xtol=FIT_TOLERANCE,
         )
-        for each in starts
+        for search_result in starts
     ]
-    best = min(result, key=lambda each: each.cost)
+    best = min(result, key=lambda search_result: search_result.cost)
     return make_curves(best.x)

@@ -26,7 +26,7 @@ def add_actuator(draft: MjcfDraft, force: PathActuator, path: str) -> str:
     Returns:
         Kind and name of the element.
     """
-    made = add_scaled_actuator(
+    actuator = add_scaled_actuator(
         # A positive force of MuJoCo lengthens a tendon, that of a path actuator shortens it.
         draft,
         force,
@@ -34,8 +34,8 @@ def add_actuator(draft: MjcfDraft, force: PathActuator, path: str) -> str:
         tendon=draft.find_tendon(path).name,
         gear=-force.optimal_force,
     )
-    draft.record_result(path, made)
-    return made
+    draft.record_result(path, actuator)
+    return actuator
 
 
 def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
@@ -49,7 +49,7 @@ def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
     Returns:
         Kind and name of the element.
     """
-    tied, element = _find_tendon_element(draft, path)
+    path_tendon, element = _find_tendon_element(draft, path)
     element.attrib.update(
         {
             "stiffness": format_value(force.stiffness),
@@ -57,13 +57,13 @@ def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
             "springlength": format_value((0.0, force.resting_length)),
         }
     )
-    draft.record_result(path, f"tendon {tied.name}")
+    draft.record_result(path, f"tendon {path_tendon.name}")
     if force.dissipation:
-        lost = "damping that grows with the stretch"
+        lost_behaviour = "damping that grows with the stretch"
         draft.fidelity.add(
-            "damping", path, lost, "no damping", f"dissipation {force.dissipation:g} s/m"
+            "damping", path, lost_behaviour, "no damping", f"dissipation {force.dissipation:g} s/m"
         )
-    return f"tendon {tied.name}"
+    return f"tendon {path_tendon.name}"
 
 
 def add_ligament(draft: MjcfDraft, force: Ligament | Blankevoort1991Ligament, path: str) -> str:
@@ -80,27 +80,32 @@ def add_ligament(draft: MjcfDraft, force: Ligament | Blankevoort1991Ligament, pa
     Raises:
         Untranslatable: the tension cannot be computed.
     """
-    tied, element = _find_tendon_element(draft, path)
+    path_tendon, element = _find_tendon_element(draft, path)
     try:
-        (tension,) = compute_isometric_tension(force, tied.lengths, (0.0,))
-        (other,) = compute_isometric_tension(force, tied.held_out, (0.0,))
+        (tension,) = compute_isometric_tension(force, path_tendon.lengths, (0.0,))
+        (held_out_tension,) = compute_isometric_tension(force, path_tendon.held_out, (0.0,))
     except OsimliteError as error:
         raise Untranslatable(f"its tension cannot be computed: {error.message}") from error
     # Slack poses are left out: a spring that fits them too would be too soft.
-    stiffness, rest = _fit_spring(tied.lengths[tension > 0.0], tension[tension > 0.0])
+    stiffness, rest_length = _fit_spring(path_tendon.lengths[tension > 0.0], tension[tension > 0.0])
     element.attrib.update(
-        {"stiffness": format_value(stiffness), "springlength": format_value((0.0, rest))}
+        {"stiffness": format_value(stiffness), "springlength": format_value((0.0, rest_length))}
     )
-    draft.record_result(path, f"tendon {tied.name}")
+    draft.record_result(path, f"tendon {path_tendon.name}")
     draft.fidelity.add(
         "ligament",
         path,
         "a ligament whose tension is no line of its length",
         "the nearest spring without damping",
-        f"tendon {tied.name}: {stiffness:g} N/m beyond {rest:g} m",
-        {"tension": Error.measure(stiffness * np.maximum(tied.held_out - rest, 0.0) - other, "N")},
+        f"tendon {path_tendon.name}: {stiffness:g} N/m beyond {rest_length:g} m",
+        {
+            "tension": Error.measure(
+                stiffness * np.maximum(path_tendon.held_out - rest_length, 0.0) - held_out_tension,
+                "N",
+            )
+        },
     )
-    return f"tendon {tied.name}"
+    return f"tendon {path_tendon.name}"
 
 
 def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
@@ -117,5 +122,9 @@ def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
 
 def _find_tendon_element(draft: MjcfDraft, path: str) -> tuple[PathTendon, _Element]:
     """Return the tendon of the path of a force, and its element."""
-    tied = draft.find_tendon(path)
-    return tied, next(item for item in draft.get_section("tendon") if item.get("name") == tied.name)
+    path_tendon = draft.find_tendon(path)
+    return path_tendon, next(
+        element
+        for element in draft.get_section("tendon")
+        if element.get("name") == path_tendon.name
+    )

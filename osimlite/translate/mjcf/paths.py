@@ -65,48 +65,57 @@ def add_paths(draft: MjcfDraft) -> None:
     report_stage("measuring paths")
     exact = Paths(draft.model)
     fits = draft.options.fit != "none"
-    poses, truth = draw_poses(exact, FIT_POSES if fits else SELECTION_POSES, 0)
+    poses, samples = draw_poses(exact, FIT_POSES if fits else SELECTION_POSES, 0)
     # Other seeds give other poses: errors are measured in poses that no fit has seen.
-    held, held_truth = draw_poses(exact, TEST_POSES, 1)
-    others, other_truth = draw_poses(exact, VALIDATION_POSES, 2) if fits else (poses, truth)
+    test_poses, test_samples = draw_poses(exact, TEST_POSES, 1)
+    validation_poses, validation_samples = (
+        draw_poses(exact, VALIDATION_POSES, 2) if fits else (poses, samples)
+    )
     default = exact.lengths(draft.default_state[0])
     writer = _TendonWriter(draft)
-    for path, given in watch_items("fitting paths", owners.items(), " paths"):
+    for path, geometry in watch_items("fitting paths", owners.items(), " paths"):
         route = exact.routes[path]
-        own = draft.tree.path_of(given) or ""
+        geometry_path = draft.tree.path_of(geometry) or ""
         # Function-based paths have no points for sites.
         if not isinstance(route, ThroughPoints):
-            kind = type(given).__name__
-            draft.fidelity.add("path", own, f"a path that is a {kind}", LEFT_OUT)
+            class_name = type(geometry).__name__
+            draft.fidelity.add("path", geometry_path, f"a path that is a {class_name}", LEFT_OUT)
             continue
-        router = Router(route, truth[path], poses, draft.options.version)
+        router = Router(route, samples[path], poses, draft.options.version)
         tendon = router.find_best()
         if fits:
             # A fit that is better only in its own poses has jumps in others: judge it in new poses.
-            judge = Router(route, other_truth[path], others, draft.options.version)
-            tendon = min(tendon, fit_tendon(router, tendon), key=judge.compute_error)
+            validation = Router(
+                route, validation_samples[path], validation_poses, draft.options.version
+            )
+            tendon = min(tendon, fit_tendon(router, tendon), key=validation.compute_error)
         name = writer.write_tendon(path, tendon)
         draft.tendons[path] = PathTendon(
-            name, default[path], truth[path].lengths, held_truth[path].lengths
+            name, default[path], samples[path].lengths, test_samples[path].lengths
         )
-        draft.record_result(own, f"tendon {name}")
-        for wrap in given.path_wrap_set.objects:
+        draft.record_result(geometry_path, f"tendon {name}")
+        for wrap in geometry.path_wrap_set.objects:
             surface = (
                 draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""
             )
             draft.fidelity.translated[surface] = "what tendons go around, if they touch it"
-        errors = _measure_errors(draft, tendon, held, held_truth[path])
+        errors = _measure_errors(draft, tendon, test_poses, test_samples[path])
         # Exact tendons need no record.
         if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):
-            how = "the nearest tendon that its own points and surfaces make"
-            done = f"{how}, fitted" if fits else how
+            approximation = "the nearest tendon that its own points and surfaces make"
+            replacement = f"{approximation}, fitted" if fits else approximation
             draft.fidelity.add(
-                "path", own, _describe_inexact_parts(route, router), done, f"tendon {name}", errors
+                "path",
+                geometry_path,
+                _describe_inexact_parts(route, router),
+                replacement,
+                f"tendon {name}",
+                errors,
             )
 
 
 def _measure_errors(
-    draft: MjcfDraft, tendon: Tendon, poses: Poses, truth: PathSamples
+    draft: MjcfDraft, tendon: Tendon, poses: Poses, samples: PathSamples
 ) -> dict[str, Error]:
     """Measure the errors of a tendon in poses by which it was not selected.
 
@@ -114,37 +123,39 @@ def _measure_errors(
         draft: MJCF under construction.
         tendon: tendon to measure.
         poses: poses for tests.
-        truth: path in these poses.
+        samples: path in these poses.
 
     Returns:
         Error by quantity: length, and moment arm about each coordinate.
     """
     lengths, arms = measure_tendon(tendon, poses, draft.options.version)
-    about = measure_arm_errors(draft.mechanism, arms, truth)
+    arm_errors = measure_arm_errors(draft.mechanism, arms, samples)
     names = draft.mechanism.coordinate_names
-    named = {f"moment arm about {names[place]}": error for place, error in about.items()}
-    return {"length": Error.measure(lengths - truth.lengths, "m"), **named}
+    named_arm_errors = {
+        f"moment arm about {names[index]}": error for index, error in arm_errors.items()
+    }
+    return {"length": Error.measure(lengths - samples.lengths, "m"), **named_arm_errors}
 
 
 def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
     """Return a text about the parts of a path that MuJoCo cannot express exactly."""
-    kinds = {point.kind for point in route.points}
+    point_types = {point.kind for point in route.points}
     touched = [
         surface
-        for surface, touch in zip(route.surfaces, router.touches, strict=True)
-        if len(touch.poses)
+        for surface, contact in zip(route.surfaces, router.contacts, strict=True)
+        if len(contact.poses)
     ]
     result = [
-        *(["a point that moves with a coordinate"] if NODE_TYPE.MOVING in kinds else []),
+        *(["a point that moves with a coordinate"] if NODE_TYPE.MOVING in point_types else []),
         *(
             ["a point that comes and goes with a coordinate"]
-            if NODE_TYPE.CONDITIONAL in kinds
+            if NODE_TYPE.CONDITIONAL in point_types
             else []
         ),
         *sorted({f"a {_SURFACE_NAMES[surface.law]}" for surface in touched}),
     ]
-    several = ", several at a time" if len(touched) > 1 else ""
-    return "a path with " + " and ".join(result or ["surfaces"]) + several
+    several_note = ", several at a time" if len(touched) > 1 else ""
+    return "a path with " + " and ".join(result or ["surfaces"]) + several_note
 
 
 _SURFACE_NAMES = {
@@ -191,30 +202,37 @@ class _TendonWriter:
                 add_element(element, "geom", geom=self._write_geom(path, part), sidesite=side)
         return name
 
-    def _write_site(self, path: str, spot: TendonSite) -> str:
+    def _write_site(self, path: str, tendon_site: TendonSite) -> str:
         """Write a site of a tendon, with the bodies that move it, and return its name."""
-        if spot.slides is None:
-            return self.draft.add_site(path, spot.body, spot.place, group=WRAP_GROUP)
-        assert spot.drive is not None
-        led = add_helper(self.draft, spot.coordinate, spot.drive)
-        if led is None:
-            # The coordinate is locked.
-            value = self.draft.mechanism.coordinates[spot.coordinate].default_value
-            moved = [Polynomial(row)(Polynomial(spot.drive)(value)) for row in spot.slides]
+        if tendon_site.slides is None:
             return self.draft.add_site(
-                path, spot.body, spot.place + np.array(moved), group=WRAP_GROUP
+                path, tendon_site.body, tendon_site.position, group=WRAP_GROUP
             )
-        joint, line = led
+        assert tendon_site.drive is not None
+        helper = add_helper(self.draft, tendon_site.coordinate, tendon_site.drive)
+        if helper is None:
+            # The coordinate is locked.
+            value = self.draft.mechanism.coordinates[tendon_site.coordinate].default_value
+            displacement = [
+                Polynomial(row)(Polynomial(tendon_site.drive)(value)) for row in tendon_site.slides
+            ]
+            return self.draft.add_site(
+                path,
+                tendon_site.body,
+                tendon_site.position + np.array(displacement),
+                group=WRAP_GROUP,
+            )
+        joint, line = helper
         name = self.draft.make_name("body", path)
-        where = clear_rounding(spot.place + spot.slides[:, 0])
+        position = clear_rounding(tendon_site.position + tendon_site.slides[:, 0])
         carrier = add_element(
-            self.draft.bodies[spot.body], "body", name=name, pos=where, gravcomp=1
+            self.draft.bodies[tendon_site.body], "body", name=name, pos=position, gravcomp=1
         )
         # MuJoCo weighs equalities of bodies that slide in ground by their mass without the armature, so
         # that the mass itself must be large there.
-        mass = HELPER_INERTIA if spot.body == GROUND else MIN_MASS
+        mass = HELPER_INERTIA if tendon_site.body == GROUND else MIN_MASS
         add_element(carrier, "inertial", pos=np.zeros(3), mass=mass, diaginertia=np.full(3, mass))
-        for axis, polynomial in _split_into_axes(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
+        for axis, polynomial in _split_into_axes(tendon_site.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
             slide = self.draft.make_name("joint", f"{name}_{len(carrier)}")
             add_element(
                 carrier, "joint", name=slide, type="slide", axis=axis, armature=HELPER_INERTIA
@@ -224,25 +242,27 @@ class _TendonWriter:
         add_element(carrier, "site", name=site, group=WRAP_GROUP)
         return site
 
-    def _write_geom(self, path: str, around: WrapGeom) -> str:
+    def _write_geom(self, path: str, wrap_geom: WrapGeom) -> str:
         """Write the geom of a surface, and return its name."""
         # Muscles share wrap objects; equal geoms are written once.
         key = (
-            around.body,
-            around.kind,
-            around.radius,
-            around.length,
-            *around.frame.ravel().tolist(),
+            wrap_geom.body,
+            wrap_geom.kind,
+            wrap_geom.radius,
+            wrap_geom.length,
+            *wrap_geom.frame.ravel().tolist(),
         )
         if key not in self._geoms:
             name = self._geoms[key] = self.draft.make_name(
-                "geom", f"{path}/{around.name or 'around'}"
+                "geom", f"{path}/{wrap_geom.name or 'around'}"
             )
             size = (
-                [around.radius] if around.kind == "sphere" else [around.radius, 0.5 * around.length]
+                [wrap_geom.radius]
+                if wrap_geom.kind == "sphere"
+                else [wrap_geom.radius, 0.5 * wrap_geom.length]
             )
-            element = self.draft.bodies[around.body]
-            look: dict[str, Value] = {
+            element = self.draft.bodies[wrap_geom.body]
+            attributes: dict[str, Value] = {
                 "contype": 0,
                 "conaffinity": 0,
                 "group": WRAP_GROUP,
@@ -252,24 +272,24 @@ class _TendonWriter:
                 element,
                 "geom",
                 name=name,
-                type=around.kind,
+                type=wrap_geom.kind,
                 size=size,
-                **format_pose(around.frame),
-                **look,
+                **format_pose(wrap_geom.frame),
+                **attributes,
             )
         return self._geoms[key]
 
 
-def _split_into_axes(slides: Array) -> Iterator[tuple[Array, Array]]:
+def _split_into_axes(polynomials: Array) -> Iterator[tuple[Array, Array]]:
     """Yield axes (3,) and polynomials (5,) along them whose sum is a motion (3, 5).
 
     A motion on a straight line has one axis only.
     """
-    axes, sizes, rows = np.linalg.svd(slides, full_matrices=False)
+    axes, sizes, rows = np.linalg.svd(polynomials, full_matrices=False)
     # The singular values tell whether all coefficients lie along one axis.
     if sizes[1] <= 1e-12 * sizes[0]:
         yield axes[:, 0], sizes[0] * rows[0]
         return
-    for axis, row in zip(np.eye(3), slides, strict=True):
+    for axis, row in zip(np.eye(3), polynomials, strict=True):
         if row.any():
             yield axis, row

@@ -47,25 +47,27 @@ def find_polynomial(function: f.SmoothFunction) -> Polynomial | None:
             # OpenSim lists the coefficient of the highest power first.
             return Polynomial(coefficients[::-1]).trim()
         case f.MultivariatePolynomial(coefficients, powers) if all(
-            len(item) == 1 for item in powers
+            len(exponents) == 1 for exponents in powers
         ):
-            dense = np.zeros(1 + max(power for (power,) in powers))
+            all_coefficients = np.zeros(1 + max(power for (power,) in powers))
             for coefficient, (power,) in zip(coefficients, powers, strict=True):
-                dense[power] += coefficient
-            return Polynomial(dense).trim()
+                all_coefficients[power] += coefficient
+            return Polynomial(all_coefficients).trim()
         case f.ScaledFunction(scale, inner):
-            own = find_polynomial(inner)
-            return None if own is None else scale * own
+            inner_polynomial = find_polynomial(inner)
+            return None if inner_polynomial is None else scale * inner_polynomial
         case Composition(outer, inner):
-            first = find_polynomial(inner)
-            second = find_polynomial(outer)
-            if first is not None and second is not None:
-                whole = second(first)
-                return whole if isinstance(whole, Polynomial) else None
+            argument_polynomial = find_polynomial(inner)
+            outer_polynomial = find_polynomial(outer)
+            if argument_polynomial is not None and outer_polynomial is not None:
+                composed = outer_polynomial(argument_polynomial)
+                return composed if isinstance(composed, Polynomial) else None
     return None
 
 
-def fit_quartic(function: f.SmoothFunction, span: tuple[float, float], unit: str) -> PolynomialFit:
+def fit_quartic(
+    function: f.SmoothFunction, interval: tuple[float, float], unit: str
+) -> PolynomialFit:
     """Return the polynomial of degree 4 that is, or is nearest to, a function.
 
     The nearest one has the smallest maximum error.
@@ -75,38 +77,38 @@ def fit_quartic(function: f.SmoothFunction, span: tuple[float, float], unit: str
 
     Args:
         function: function of one argument.
-        span: range of the argument.
+        interval: range of the argument.
         unit: unit of the value, for the error.
     """
     exact = find_polynomial(function)
     if exact is not None and exact.degree() <= DEGREE:
         return PolynomialFit(tuple(exact.coef.tolist()))
-    low, high = span
-    middle, half = 0.5 * (high + low), 0.5 * (high - low)
+    lower, upper = interval
+    middle, half_width = 0.5 * (upper + lower), 0.5 * (upper - lower)
     # Chebyshev points are dense at the ends, where the error of a fit is largest.
-    x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLE_COUNT))
+    x = middle + half_width * np.cos(np.linspace(0.0, np.pi, _SAMPLE_COUNT))
     y = sample_function(function, x)
-    basis = np.polynomial.chebyshev.chebvander((x - middle) / half, DEGREE)
+    basis = np.polynomial.chebyshev.chebvander((x - middle) / half_width, DEGREE)
     weights = np.full(_SAMPLE_COUNT, 1.0 / _SAMPLE_COUNT)
     best = np.zeros(DEGREE + 1)
-    least = np.inf
+    smallest_error = np.inf
     for _ in range(60):
-        root = np.sqrt(weights)
-        result = np.linalg.lstsq(root[:, None] * basis, root * y, rcond=None)[0]
-        off = np.abs(basis @ result - y)
-        if off.max() < least:
-            best, least = result, off.max()
+        root_weights = np.sqrt(weights)
+        result = np.linalg.lstsq(root_weights[:, None] * basis, root_weights * y, rcond=None)[0]
+        errors = np.abs(basis @ result - y)
+        if errors.max() < smallest_error:
+            best, smallest_error = result, errors.max()
         # All weights of an exact fit would vanish.
-        if not off.any():
+        if not errors.any():
             break
-        weights *= off
+        weights *= errors
         weights /= weights.sum()
-    fitted = Chebyshev(best, domain=[low, high]).convert(kind=Polynomial)
+    fitted = Chebyshev(best, domain=[lower, upper]).convert(kind=Polynomial)
     # The reported error is from other points than those of the fit.
-    even = np.linspace(low, high, _SAMPLE_COUNT)
+    check_points = np.linspace(lower, upper, _SAMPLE_COUNT)
     return PolynomialFit(
         tuple(fitted.coef.tolist()),
-        Error.measure(fitted(even) - sample_function(function, even), unit),
+        Error.measure(fitted(check_points) - sample_function(function, check_points), unit),
     )
 
 
@@ -142,12 +144,12 @@ def select_span(
     Returns:
         Lower and upper end.
     """
-    low, high = limits
+    lower, upper = limits
     points = knots(function)
-    if not high - low <= _MAX_RANGE and points:
-        low = max(low, min(points))
-        high = min(high, max(points))
+    if not upper - lower <= _MAX_RANGE and points:
+        lower = max(lower, min(points))
+        upper = min(upper, max(points))
     # An empty or absurd range says nothing about the motion.
-    if not 0.0 < high - low <= _MAX_RANGE:
-        low, high = start - 1.0, start + 1.0
-    return min(low, start), max(high, start)
+    if not 0.0 < upper - lower <= _MAX_RANGE:
+        lower, upper = start - 1.0, start + 1.0
+    return min(lower, start), max(upper, start)

@@ -47,14 +47,14 @@ class Poses:
 
     def select_coordinates(self, columns: Sequence[int]) -> Poses:
         """Return the poses with some of the free coordinates, by their indices in `moving`."""
-        own = list(columns)
+        selected = list(columns)
         return Poses(
             self.q,
-            self.moving[own],
+            self.moving[selected],
             self.rotations,
             self.origins,
-            self.jacobians[..., own],
-            self.rates[..., own],
+            self.jacobians[..., selected],
+            self.rates[..., selected],
         )
 
     def locate(self, body: int, station: Array) -> Array:
@@ -66,24 +66,26 @@ class Poses:
         """
         return self.origins[body] + multiply_each_pose(station, self.rotations[body].swapaxes(1, 2))
 
-    def express(self, body: int, places: Array) -> Array:
+    def express(self, body: int, positions: Array) -> Array:
         """Return positions in the frame of a body (k, P, 3).
 
         Args:
             body: index of the body.
-            places: positions in ground (k, P, 3) (m).
+            positions: positions in ground (k, P, 3) (m).
         """
-        return multiply_each_pose(places - self.origins[body], self.rotations[body])
+        return multiply_each_pose(positions - self.origins[body], self.rotations[body])
 
-    def locate_at(self, body: int, stations: Array, at: Indices) -> Array:
+    def locate_at(self, body: int, stations: Array, pose_indices: Indices) -> Array:
         """Return positions in ground (k, 3) of stations, each in one of the poses.
 
         Args:
             body: index of the body.
             stations: stations in the body (k, 3) (m).
-            at: indices of the poses (k,).
+            pose_indices: indices of the poses (k,).
         """
-        return self.origins[body][at] + np.einsum("pij,pj->pi", self.rotations[body][at], stations)
+        return self.origins[body][pose_indices] + np.einsum(
+            "pij,pj->pi", self.rotations[body][pose_indices], stations
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,26 +117,29 @@ def multiply_each_pose(rows: Array, matrices: Array) -> Array:
     return np.asarray((rows.swapaxes(0, 1) @ matrices).swapaxes(0, 1))
 
 
-def measure_arm_errors(mechanism: Mechanism, arms: Array, truth: PathSamples) -> dict[int, Error]:
+def measure_arm_errors(mechanism: Mechanism, arms: Array, samples: PathSamples) -> dict[int, Error]:
     """Measure errors of moment arms.
 
     Args:
         mechanism: mechanism of the model.
         arms: moment arms of a tendon about the free coordinates (P, m).
-        truth: path in the same poses.
+        samples: path in the same poses.
 
     Returns:
         Error by the index of the coordinate, for coordinates about which path or tendon has a
         moment arm.
     """
     result = {}
-    for place, off, wanted in zip(
-        list_free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True
+    for index, arm_errors, model_arms in zip(
+        list_free_coordinates(mechanism), (arms - samples.arms).T, samples.arms.T, strict=True
     ):
         # A path crosses few coordinates; about the others there is nothing to compare.
-        if np.abs(off).max() > EXACT_TOLERANCE_M or np.abs(wanted).max() > EXACT_TOLERANCE_M:
-            rotational = mechanism.coordinates[place].motion_type == "rotational"
-            result[place] = Error.measure(off, "m" if rotational else "1")
+        if (
+            np.abs(arm_errors).max() > EXACT_TOLERANCE_M
+            or np.abs(model_arms).max() > EXACT_TOLERANCE_M
+        ):
+            rotational = mechanism.coordinates[index].motion_type == "rotational"
+            result[index] = Error.measure(arm_errors, "m" if rotational else "1")
     return result
 
 
@@ -148,30 +153,36 @@ def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
         count: number of poses.
         seed: seed of the random numbers.
     """
-    coupled = [item for item in mechanism.constraints if isinstance(item, Coupler)]
+    couplers = [coupler for coupler in mechanism.constraints if isinstance(coupler, Coupler)]
     values = np.tile(mechanism.values({}), (count, 1))
-    for place in list_free_coordinates(mechanism):
-        info = mechanism.coordinates[place]
-        low, high = info.range
-        if not 0.0 <= high - low < np.inf:
-            low = info.default_value - 1.0
-            high = info.default_value + 1.0
+    for index in list_free_coordinates(mechanism):
+        coordinate = mechanism.coordinates[index]
+        lower, upper = coordinate.range
+        if not 0.0 <= upper - lower < np.inf:
+            lower = coordinate.default_value - 1.0
+            upper = coordinate.default_value + 1.0
         # A generator per coordinate: locking another coordinate does not change these values.
-        values[:, place] = np.random.default_rng((seed, place)).uniform(low, high, count)
-    for item in coupled:
-        values[:, item.dependent] = [
-            item.function.evaluate(row[list(item.independent)])[0] for row in values
+        values[:, index] = np.random.default_rng((seed, index)).uniform(lower, upper, count)
+    for coupler in couplers:
+        values[:, coupler.dependent] = [
+            coupler.function.evaluate(row[list(coupler.independent)])[0] for row in values
         ]
     return values
 
 
 def list_free_coordinates(mechanism: Mechanism) -> list[int]:
     """Return the indices of coordinates that are not locked, prescribed or coupled."""
-    coupled = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
+    dependent_indices = {
+        constraint.dependent
+        for constraint in mechanism.constraints
+        if isinstance(constraint, Coupler)
+    }
     return [
         index
-        for index, info in enumerate(mechanism.coordinates)
-        if not info.locked and info.prescribed is None and index not in coupled
+        for index, coordinate in enumerate(mechanism.coordinates)
+        if not coordinate.locked
+        and coordinate.prescribed is None
+        and index not in dependent_indices
     ]
 
 
@@ -198,7 +209,10 @@ def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[
         moving,
         np.stack([state.rotations for state in states], axis=1),
         np.stack([state.origins for state in states], axis=1),
-        np.stack([state.jacobians @ own for state, own in zip(states, rates, strict=True)], axis=1),
+        np.stack(
+            [state.jacobians @ free_rates for state, free_rates in zip(states, rates, strict=True)],
+            axis=1,
+        ),
         rates,
     )
     # A copy makes the values of one path contiguous.
@@ -209,8 +223,8 @@ def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[
         .copy()
     )
     nodes = [paths.points(row) for row in values]
-    truth = {
+    samples = {
         path: PathSamples(lengths[k], arms[k], [row.get(path, ()) for row in nodes])
         for k, path in enumerate(paths.names)
     }
-    return poses, truth
+    return poses, samples

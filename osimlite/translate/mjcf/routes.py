@@ -63,30 +63,30 @@ class Router:
 
     Args:
         route: path.
-        truth: samples of the path in the poses.
+        samples: samples of the path in the poses.
         poses: poses in which tendons are compared.
         version: major version of MuJoCo.
 
     Attributes:
-        wanted: lengths and moment arms of the path (P, 1 + m).
-        touches: contact of the path with each of its surfaces.
+        target: lengths and moment arms of the path (P, 1 + m).
+        contacts: contact of the path with each of its surfaces.
     """
 
     def __init__(
-        self, route: ThroughPoints, truth: PathSamples, poses: Poses, version: int
+        self, route: ThroughPoints, samples: PathSamples, poses: Poses, version: int
     ) -> None:
         # Coordinates about which the path has no moment arm would only dilute the error.
-        columns = np.flatnonzero(np.abs(truth.arms).max(0, initial=0.0) > 1e-9)
+        columns = np.flatnonzero(np.abs(samples.arms).max(0, initial=0.0) > 1e-9)
         self.route = route
-        self.truth = truth
+        self.samples = samples
         self.poses = poses.select_coordinates(columns.tolist())
         self.version = version
-        self.wanted = np.concatenate((truth.lengths[:, None], truth.arms[:, columns]), axis=1)
-        self.touches = [self._find_touches(number) for number in range(len(route.surfaces))]
+        self.target = np.concatenate((samples.lengths[:, None], samples.arms[:, columns]), axis=1)
+        self.contacts = [self._find_touches(number) for number in range(len(route.surfaces))]
 
     def compute_residuals(self, tendon: Tendon) -> Array:
         """Return the errors of length and moment arms of a tendon (P, 1 + m) (m)."""
-        return self._measure(tendon) - self.wanted
+        return self._measure(tendon) - self.target
 
     def compute_error(self, tendon: Tendon) -> float:
         """Return the root of the sum of the mean squares of the residuals (m)."""
@@ -99,49 +99,66 @@ class Router:
         one after the other, in two rounds if there are several, because they influence one another.
         """
         slots: list[Tendon] = []
-        settle: dict[int, Callable[[Choose], Tendon]] = {}
+        choosers: dict[int, Callable[[Choose], Tendon]] = {}
         points = list(enumerate(self.route.points))
         for comes_and_goes, group in groupby(
-            points, lambda item: item[1].kind == NODE_TYPE.CONDITIONAL
+            points, lambda numbered_point: numbered_point[1].kind == NODE_TYPE.CONDITIONAL
         ):
             numbers = [number for number, _ in group]
             for run in [numbers] if comes_and_goes else [[number] for number in numbers]:
-                own = tuple(make_site(self.route.points[number]) for number in run)
+                sites = tuple(make_site(self.route.points[number]) for number in run)
                 if comes_and_goes:
-                    each = [
+                    point_options = [
                         [(point,), (), *self._make_switches(number)]
-                        for point, number in zip(own, run, strict=True)
+                        for point, number in zip(sites, run, strict=True)
                     ]
-                    ways = [*map(_join_pieces, product(*each)), *self._make_cylinders(run)]
-                    settle[len(slots)] = partial(_choose_option, ways)
-                slots.append(own)
+                    run_options = [
+                        *map(_join_pieces, product(*point_options)),
+                        *self._make_cylinders(run),
+                    ]
+                    choosers[len(slots)] = partial(_choose_option, run_options)
+                slots.append(sites)
                 if between := [
-                    k for k, touch in enumerate(self.touches) if np.isin(touch.after, run).any()
+                    k
+                    for k, contact in enumerate(self.contacts)
+                    if np.isin(contact.after, run).any()
                 ]:
-                    settle[len(slots)] = partial(self._choose_obstacles, between)
+                    choosers[len(slots)] = partial(self._choose_obstacles, between)
                     slots.append(())
-        for _ in range(2 if len(settle) > 1 else 1):
-            for place, choice in settle.items():
-                parts = _join_pieces(slots[:place]), slots[place], _join_pieces(slots[place + 1 :])
-                slots[place] = choice(partial(self._choose_best, *parts))
+        for _ in range(2 if len(choosers) > 1 else 1):
+            for slot_index, choose_slot in choosers.items():
+                parts = (
+                    _join_pieces(slots[:slot_index]),
+                    slots[slot_index],
+                    _join_pieces(slots[slot_index + 1 :]),
+                )
+                slots[slot_index] = choose_slot(partial(self._choose_best, *parts))
         return _join_pieces(slots)
 
     def _choose_best(
-        self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]
+        self, before: Tendon, current: Tendon, after: Tendon, options: Sequence[Tendon]
     ) -> Tendon:
         """Return the option for a part with which the complete tendon has the smallest error."""
-        head = before[_find_last_site(before) :]
-        tail = after[: len(after) - _find_last_site(after[::-1])]
-        rest = self.compute_residuals((*before, *now, *after)) - self._measure((*head, *now, *tail))
-        sound = [option for option in options if _is_tendon((*head, *option, *tail))]
+        last_section = before[_find_last_site(before) :]
+        first_section = after[: len(after) - _find_last_site(after[::-1])]
+        outside_residuals = self.compute_residuals((*before, *current, *after)) - self._measure(
+            (*last_section, *current, *first_section)
+        )
+        valid_options = [
+            option for option in options if _is_tendon((*last_section, *option, *first_section))
+        ]
         lengths, arms = measure_tendons(
-            [(*head, *option, *tail) for option in sound], self.poses, self.version
+            [(*last_section, *option, *first_section) for option in valid_options],
+            self.poses,
+            self.version,
         )
         errors = (
-            np.square(rest + np.concatenate((lengths[..., None], arms), axis=-1)).mean(1).sum(-1)
+            np.square(outside_residuals + np.concatenate((lengths[..., None], arms), axis=-1))
+            .mean(1)
+            .sum(-1)
         )
         # Options that differ by rounding only: take the first, so that all machines select the same.
-        return sound[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
+        return valid_options[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
 
     def make_piece_residuals(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
         """Return the residuals as a function of a replacement for a piece of a tendon.
@@ -152,8 +169,8 @@ class Router:
             tendon: complete tendon.
             piece: piece of it that will be replaced.
         """
-        rest = self.compute_residuals(tendon) - self._measure(piece)
-        return lambda other: rest + self._measure(other)
+        outside_residuals = self.compute_residuals(tendon) - self._measure(piece)
+        return lambda replacement: outside_residuals + self._measure(replacement)
 
     def _measure(self, tendon: Tendon) -> Array:
         """Return length and moment arms of a tendon (P, 1 + m)."""
@@ -162,32 +179,34 @@ class Router:
 
     def _find_touches(self, number: int) -> Touch:
         """Return the poses in which the path touches a surface, with the tangent points."""
-        one = len(self.route.points) + 2 * number
+        first_tangent_node = len(self.route.points) + 2 * number
         body = self.route.surfaces[number].tangent.body
         result = []
-        for pose, nodes in enumerate(self.truth.nodes):
+        for pose, nodes in enumerate(self.samples.nodes):
             last = 0
-            for (node, place), (_, after) in pairwise(nodes):
+            for (node, position), (_, next_position) in pairwise(nodes):
                 # Nodes below the number of points are path points, others are tangent points of
                 # surfaces.
                 last = node if node < len(self.route.points) else last
-                if node == one:
-                    result.append((pose, place, after, last))
-        poses, first, second, before = zip(*result, strict=True) if result else ((), (), (), ())
-        at = np.array(poses, dtype=int)
+                if node == first_tangent_node:
+                    result.append((pose, position, next_position, last))
+        poses, first_points, second_points, previous_points = (
+            zip(*result, strict=True) if result else ((), (), (), ())
+        )
+        pose_indices = np.array(poses, dtype=int)
         return Touch(
-            at,
-            self._express_in_body(body, at, np.array(first)),
-            self._express_in_body(body, at, np.array(second)),
-            np.array(before),
+            pose_indices,
+            self._express_in_body(body, pose_indices, np.array(first_points)),
+            self._express_in_body(body, pose_indices, np.array(second_points)),
+            np.array(previous_points),
         )
 
-    def _express_in_body(self, body: int, at: Indices, places: Array) -> Array:
+    def _express_in_body(self, body: int, pose_indices: Indices, positions: Array) -> Array:
         """Return positions in ground (k, 3), each in one pose, in the frame of a body (k, 3)."""
         return np.einsum(
             "pji,pj->pi",
-            self.poses.rotations[body][at],
-            places.reshape(-1, 3) - self.poses.origins[body][at],
+            self.poses.rotations[body][pose_indices],
+            positions.reshape(-1, 3) - self.poses.origins[body][pose_indices],
         )
 
     # ----------------------------------------------------------------------------------------------- options
@@ -203,10 +222,10 @@ class Router:
         ):
             options = [
                 (sided,)
-                for each in make_substitutes(
+                for wrap_geom in make_substitutes(
                     self.route.surfaces[number], self._find_tangent_points(number)
                 )
-                for sided in self._vary_side(number, each, SIDE_DIRECTIONS)
+                for sided in self._vary_side(number, wrap_geom, SIDE_DIRECTIONS)
             ]
             if not options:
                 continue
@@ -214,66 +233,79 @@ class Router:
             assert isinstance(result, WrapGeom)
             best[number] = result
         # Nothing is an option too: the surface may hardly be touched.
-        options = [(), *((each,) for each in best.values())]
-        for (one, first), (two, second) in combinations(best.items(), 2):
+        options = [(), *((wrap_geom,) for wrap_geom in best.values())]
+        for (first_number, first_geom), (second_number, second_geom) in combinations(
+            best.items(), 2
+        ):
             # MuJoCo needs a site between two surfaces.
-            for middle in self._place_sites_between(one, two):
-                sides = product(self._vary_side(one, first, 0), self._vary_side(two, second, 0))
-                options += [(sided, middle, other) for sided, other in sides]
+            for middle_site in self._place_sites_between(first_number, second_number):
+                sides = product(
+                    self._vary_side(first_number, first_geom, 0),
+                    self._vary_side(second_number, second_geom, 0),
+                )
+                options += [(sided, middle_site, second_sided) for sided, second_sided in sides]
         return choose(options)
 
     def _find_tangent_points(self, number: int) -> Array:
         """Return the tangent points (2 k, 3) on a surface, in its own frame (m)."""
-        touch = self.touches[number]
+        contact = self.contacts[number]
         frame = self.route.surfaces[number].tangent.frame
-        return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
+        return (np.concatenate((contact.first, contact.second)) - frame[:3, 3]) @ frame[:3, :3]
 
-    def _vary_side(self, number: int, around: WrapGeom, directions: int) -> Iterator[WrapGeom]:
+    def _vary_side(self, number: int, wrap_geom: WrapGeom, directions: int) -> Iterator[WrapGeom]:
         """Yield a geom with various side sites.
 
         They are: as it is, the side of its quadrant, the touched side, and directions all around.
         """
-        yield around
+        yield wrap_geom
         surface = self.route.surfaces[number]
-        touch = self.touches[number]
-        turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
+        contact = self.contacts[number]
+        from_surface = wrap_geom.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
         axis = int(surface.numbers[0])
         sign = surface.numbers[1]
         if sign:
-            yield around.replace_side(turned @ (sign * np.eye(3)[axis]))
-        middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
+            yield wrap_geom.replace_side(from_surface @ (sign * np.eye(3)[axis]))
+        mean_points = (
+            0.5 * (contact.first + contact.second) - wrap_geom.frame[:3, 3]
+        ) @ wrap_geom.frame[:3, :3]
         # The mean direction in which the path touches the surface.
-        yield around.replace_side(unit(middles).mean(0))
-        for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
-            yield around.replace_side(np.array((np.cos(turn), np.sin(turn), 0.0)))
-        if directions and around.kind == "sphere":
-            yield from (around.replace_side(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
+        yield wrap_geom.replace_side(unit(mean_points).mean(0))
+        for angle in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
+            yield wrap_geom.replace_side(np.array((np.cos(angle), np.sin(angle), 0.0)))
+        if directions and wrap_geom.kind == "sphere":
+            yield from (wrap_geom.replace_side(np.array((0.0, 0.0, z))) for z in (1.0, -1.0))
 
     def _find_ranks(self, number: int, numbers: Sequence[int]) -> list[int]:
         """Return the rank of a surface in the order of those that the path touches, in each pose."""
         points = len(self.route.points)
         result = []
-        for pose in self.touches[number].poses:
-            order = [(node - points) // 2 for node, _ in self.truth.nodes[pose] if node >= points]
+        for pose in self.contacts[number].poses:
+            order = [(node - points) // 2 for node, _ in self.samples.nodes[pose] if node >= points]
             result.append([k for k in dict.fromkeys(order) if k in numbers].index(number))
         return result
 
-    def _place_sites_between(self, one: int, two: int) -> Iterator[TendonSite]:
+    def _place_sites_between(self, first_number: int, second_number: int) -> Iterator[TendonSite]:
         """Yield sites between two surfaces, halfway between their tangent points.
 
         They are in the body of either surface.
         """
-        first, second = self.touches[one], self.touches[two]
-        both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
+        first_contact, second_contact = self.contacts[first_number], self.contacts[second_number]
+        common_poses, first_indices, second_indices = np.intersect1d(
+            first_contact.poses, second_contact.poses, return_indices=True
+        )
         # The path never touches both surfaces in one pose.
-        if not len(both):
+        if not len(common_poses):
             return
-        bodies = [self.route.surfaces[number].tangent.body for number in (one, two)]
-        leaves = self.poses.locate_at(bodies[0], first.second[at_one], both)
-        enters = self.poses.locate_at(bodies[1], second.first[at_two], both)
+        bodies = [
+            self.route.surfaces[number].tangent.body for number in (first_number, second_number)
+        ]
+        exits = self.poses.locate_at(bodies[0], first_contact.second[first_indices], common_poses)
+        entries = self.poses.locate_at(
+            bodies[1], second_contact.first[second_indices], common_poses
+        )
         for body in dict.fromkeys(bodies):
             yield TendonSite(
-                body, self._express_in_body(body, both, 0.5 * (leaves + enters)).mean(0)
+                body, self._express_in_body(body, common_poses, 0.5 * (exits + entries)).mean(0)
             )
 
     def _make_switches(self, number: int) -> Iterator[Tendon]:
@@ -288,25 +320,29 @@ class Router:
         """
         point = make_site(self.route.points[number])
         node = self.route.points[number]
-        low, high = node.range
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        parabola = SPECK_RADIUS_M / half**2 * np.array((middle**2, -2.0 * middle, 1.0, 0.0, 0.0))
+        lower, upper = node.range
+        range_center, half_width = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        parabola = (
+            SPECK_RADIUS_M
+            / half_width**2
+            * np.array((range_center**2, -2.0 * range_center, 1.0, 0.0, 0.0))
+        )
         # Toward a neighbouring point the sphere lies on the path and does not deflect it.
-        for other in (number - 1, number + 1):
-            if not 0 <= other < len(self.route.points):
+        for neighbour in (number - 1, number + 1):
+            if not 0 <= neighbour < len(self.route.points):
                 continue
-            at = make_site(self.route.points[other])
-            there = self.poses.locate(at.body, at.place)
+            neighbour_site = make_site(self.route.points[neighbour])
+            positions = self.poses.locate(neighbour_site.body, neighbour_site.position)
             toward = (
-                self._express_in_body(point.body, np.arange(len(there)), there).mean(0)
-                - point.place
+                self._express_in_body(point.body, np.arange(len(positions)), positions).mean(0)
+                - point.position
             )
             if not toward.any():
                 continue
             direction = toward / np.linalg.norm(toward)
             side = TendonSite(
                 point.body,
-                point.place,
+                point.position,
                 node.coordinate,
                 np.eye(5)[1],
                 np.outer(direction, parabola),
@@ -314,7 +350,7 @@ class Router:
             yield (
                 WrapGeom(
                     point.body,
-                    make_transform(None, point.place),
+                    make_transform(None, point.position),
                     "sphere",
                     SPECK_RADIUS_M,
                     side,
@@ -324,61 +360,74 @@ class Router:
 
     def _make_cylinders(self, run: Sequence[int]) -> Iterator[Tendon]:
         """Yield cylinders that carry conditional points, over whose edge the path bends."""
-        ways = []
-        for pose, nodes in enumerate(self.truth.nodes):
-            at = [k for k, (node, _) in enumerate(nodes) if node in run]
-            if at and at[0] > 0 and at[-1] + 1 < len(nodes):
+        bends = []
+        for pose, nodes in enumerate(self.samples.nodes):
+            run_indices = [k for k, (node, _) in enumerate(nodes) if node in run]
+            if run_indices and run_indices[0] > 0 and run_indices[-1] + 1 < len(nodes):
                 before, first, last, after = (
-                    nodes[k][1] for k in (at[0] - 1, at[0], at[-1], at[-1] + 1)
+                    nodes[k][1]
+                    for k in (
+                        run_indices[0] - 1,
+                        run_indices[0],
+                        run_indices[-1],
+                        run_indices[-1] + 1,
+                    )
                 )
-                ways.append((pose, first - before, after - last))
+                bends.append((pose, first - before, after - last))
         points = [make_site(self.route.points[number]) for number in run]
         body = points[0].body
-        if not ways or any(point.body != body for point in points):
+        if not bends or any(point.body != body for point in points):
             return
-        poses, before, after = (np.array(column) for column in zip(*ways, strict=True))
+        poses, before, after = (np.array(column) for column in zip(*bends, strict=True))
         # The axis about which the path turns at the points.
-        turning = np.cross(unit(before), unit(after))
-        normal, into = (
-            np.einsum("pji,pj->pi", self.poses.rotations[body][poses], way).mean(0)
-            for way in (turning, unit(after) - unit(before))
+        bend_axes = np.cross(unit(before), unit(after))
+        normal, inward = (
+            np.einsum("pji,pj->pi", self.poses.rotations[body][poses], directions).mean(0)
+            for directions in (bend_axes, unit(after) - unit(before))
         )
         # A path that does not turn needs no cylinder.
-        if not normal.any() or not into.any():
+        if not normal.any() or not inward.any():
             return
         frame = make_transform(rotate_z_to(normal))
-        chord = frame[:3, :3].T @ (points[-1].place - points[0].place)
-        into = np.array((*(frame[:3, :3].T @ into)[:2], 0.0))
+        chord = frame[:3, :3].T @ (points[-1].position - points[0].position)
+        inward = np.array((*(frame[:3, :3].T @ inward)[:2], 0.0))
         if len(run) > 1:
-            into = np.array((-chord[1], chord[0], 0.0)) * np.sign(
-                chord[0] * into[1] - chord[1] * into[0]
+            inward = np.array((-chord[1], chord[0], 0.0)) * np.sign(
+                chord[0] * inward[1] - chord[1] * inward[0]
             )
-        into /= np.linalg.norm(into)
-        frame[:3, 3] = 0.5 * (points[0].place + points[-1].place)
-        half = 0.5 * float(np.hypot(*chord[:2]))
+        inward /= np.linalg.norm(inward)
+        frame[:3, 3] = 0.5 * (points[0].position + points[-1].position)
+        half_chord = 0.5 * float(np.hypot(*chord[:2]))
         for radius in CYLINDER_RADII_M:
-            if radius > half:
-                placed = frame @ make_transform(None, np.sqrt(radius**2 - half**2) * into)
-                around = WrapGeom(
-                    body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name
+            if radius > half_chord:
+                shifted_frame = frame @ make_transform(
+                    None, np.sqrt(radius**2 - half_chord**2) * inward
+                )
+                cylinder = WrapGeom(
+                    body,
+                    shifted_frame,
+                    "cylinder",
+                    radius,
+                    length=4.0 * radius,
+                    name=points[0].name,
                 )
                 # Side sites around the outside of the bend, 1 rad to either side.
-                for turn in np.linspace(-1.0, 1.0, 5):
+                for angle in np.linspace(-1.0, 1.0, 5):
                     yield (
-                        around.replace_side(
-                            rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into
+                        cylinder.replace_side(
+                            rotation_about(np.array((0.0, 0.0, 1.0)), angle) @ -inward
                         ),
                     )
 
 
 def make_site(point: Node) -> TendonSite:
     """Return the site of a path point; a moving point slides along quartics of its coordinate."""
-    place = point.frame[:3, :3] @ point.location + point.frame[:3, 3]
+    position = point.frame[:3, :3] @ point.location + point.frame[:3, 3]
     if point.kind != NODE_TYPE.MOVING:
-        return TendonSite(point.body, place, name=point.name)
+        return TendonSite(point.body, position, name=point.name)
     drive, slides = fit_composition(point.functions, point.range)
     return TendonSite(
-        point.body, place, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name
+        point.body, position, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name
     )
 
 
@@ -389,9 +438,10 @@ def _choose_option(options: Sequence[Tendon], choose: Choose) -> Tendon:
 
 def _is_tendon(tendon: Tendon) -> bool:
     """Return whether a sequence is valid: sites at both ends and between any two surfaces."""
-    ends = isinstance(tendon[0], TendonSite) and isinstance(tendon[-1], TendonSite)
-    return ends and not any(
-        isinstance(a, WrapGeom) and isinstance(b, WrapGeom) for a, b in pairwise(tendon)
+    has_end_sites = isinstance(tendon[0], TendonSite) and isinstance(tendon[-1], TendonSite)
+    return has_end_sites and not any(
+        isinstance(previous, WrapGeom) and isinstance(following, WrapGeom)
+        for previous, following in pairwise(tendon)
     )
 
 

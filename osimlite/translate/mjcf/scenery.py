@@ -23,9 +23,9 @@ def add_shapes(draft: MjcfDraft) -> None:
     # A class without users would be a remark of MuJoCo.
     if not any(link.visuals for link in draft.robot.links):
         return
-    looks = add_element(draft.get_section("default"), "default", class_="looks")
+    shape_default = add_element(draft.get_section("default"), "default", class_="looks")
     # Shapes neither collide nor have mass: inertia is that of the bodies.
-    add_element(looks, "geom", contype=0, conaffinity=0, group=SHAPE_GROUP, mass=0)
+    add_element(shape_default, "geom", contype=0, conaffinity=0, group=SHAPE_GROUP, mass=0)
     for link, element in draft.iterate_links():
         for visual in link.visuals:
             name = draft.make_name("geom", visual.source)
@@ -47,23 +47,27 @@ def add_camera(draft: MjcfDraft) -> None:
     Up is z in MuJoCo, and y in models of OpenSim.
     """
     state = draft.mechanism.at(draft.default_state[0])
-    spots = np.array(
+    origins = np.array(
         [
             np.zeros(3),
             *(state.transform(index)[:3, 3] for index in range(len(draft.mechanism.bodies))),
         ]
     )
-    low, high = spots.min(axis=0), spots.max(axis=0)
+    lowest, highest = origins.min(axis=0), origins.max(axis=0)
     # Without gravity the axes of OpenSim are assumed.
-    fall = draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
-    fall = fall / np.abs(fall).max()
-    up = -fall / np.linalg.norm(fall)
+    gravity = (
+        draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
+    )
+    gravity = gravity / np.abs(gravity).max()
+    up = -gravity / np.linalg.norm(gravity)
     # Any horizontal axis that is not parallel to up.
     right = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     right = right - (right @ up) * up
     right /= np.linalg.norm(right)
     # Far enough to see everything in the default field of view.
-    place = 0.5 * (low + high) + (1.0 + float(np.linalg.norm(high - low))) * cross(right, up)
+    position = 0.5 * (lowest + highest) + (1.0 + float(np.linalg.norm(highest - lowest))) * cross(
+        right, up
+    )
     # MuJoCo's default headlight leaves bones dark.
     add_element(
         add_element(draft.root, "visual"),
@@ -72,7 +76,7 @@ def add_camera(draft: MjcfDraft) -> None:
         diffuse=(0.6, 0.6, 0.6),
     )
     add_element(
-        draft.get_section("worldbody"), "camera", name="side", pos=place, xyaxes=(*right, *up)
+        draft.get_section("worldbody"), "camera", name="side", pos=position, xyaxes=(*right, *up)
     )
 
 

@@ -12,51 +12,65 @@ from osimlite.simulation.elements.geometries.paths.geometry_path import Surface
 from osimlite.translate.mjcf.tendons import TendonSite, WrapGeom
 
 
-def make_substitutes(surface: Surface, touched: Array) -> Iterator[WrapGeom]:
+def make_substitutes(surface: Surface, touched_points: Array) -> Iterator[WrapGeom]:
     """Yield spheres and cylinders that can replace a surface; none if it has no size.
 
     Args:
         surface: surface of the path.
-        touched: points at which the path touches it (k, 3), in the frame of the surface (m).
+        touched_points: points at which the path touches it (k, 3), in the frame of the surface (m).
     """
     if min(surface.numbers[4:]) <= 0.0:
         return
-    own = WrapGeom(
+    base_geom = WrapGeom(
         surface.tangent.body, surface.tangent.frame, "sphere", 0.0, name=surface.tangent.name
     )
     sizes = surface.numbers[4:]
     match surface.law:
         case "wrap_sphere":
-            yield replace(own, radius=sizes[0])
+            yield replace(base_geom, radius=sizes[0])
         case "wrap_cylinder":
-            yield replace(own, kind="cylinder", radius=sizes[0], length=sizes[1])
+            yield replace(base_geom, kind="cylinder", radius=sizes[0], length=sizes[1])
         case "wrap_ellipsoid":
             # Candidates are the semi-axes and the mean distance of the touched points.
-            for radius in {*sizes, float(np.linalg.norm(touched, axis=1).mean())}:
-                yield replace(own, radius=radius)
+            for radius in {*sizes, float(np.linalg.norm(touched_points, axis=1).mean())}:
+                yield replace(base_geom, radius=radius)
             for axis in range(3):
-                across = np.delete(touched, axis, axis=1)
-                turned = own.frame @ make_transform(rotate_z_to(np.eye(3)[axis]))
+                projected = np.delete(touched_points, axis, axis=1)
+                rotated_frame = base_geom.frame @ make_transform(rotate_z_to(np.eye(3)[axis]))
                 for radius in {
                     *np.delete(sizes, axis).tolist(),
-                    float(np.linalg.norm(across, axis=1).mean()),
+                    float(np.linalg.norm(projected, axis=1).mean()),
                 }:
                     yield replace(
-                        own, kind="cylinder", frame=turned, radius=radius, length=2.0 * sizes[axis]
+                        base_geom,
+                        kind="cylinder",
+                        frame=rotated_frame,
+                        radius=radius,
+                        length=2.0 * sizes[axis],
                     )
         case "wrap_torus":
             # OpenSim's path bends around the tube at the nearest point of the ring, where the torus is
             # locally a cylinder.
-            tube, ring = sizes
-            x, y, _ = touched.mean(0)
-            out = np.array((x, y, 0.0)) / np.hypot(x, y)
-            turned = make_transform(rotate_z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
+            tube_radius, ring_radius = sizes
+            x, y, _ = touched_points.mean(0)
+            outward = np.array((x, y, 0.0)) / np.hypot(x, y)
+            rotated_frame = make_transform(
+                rotate_z_to(np.cross((0.0, 0.0, 1.0), outward)), ring_radius * outward
+            )
             yield replace(
-                own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube
+                base_geom,
+                kind="cylinder",
+                frame=base_geom.frame @ rotated_frame,
+                radius=tube_radius,
+                length=2.0 * tube_radius,
             )
             # Alternatively it passes through a sphere in the hole: MuJoCo does so if the side site is
             # inside the sphere.
-            yield replace(own, radius=ring - tube, side=TendonSite(own.body, own.frame[:3, 3]))
+            yield replace(
+                base_geom,
+                radius=ring_radius - tube_radius,
+                side=TendonSite(base_geom.body, base_geom.frame[:3, 3]),
+            )
 
 
 def rotate_z_to(axis: Array) -> Array:

@@ -23,7 +23,7 @@ class TendonSite:
 
     Attributes:
         body: index of the body.
-        place: position in the body (3,) (m).
+        position: position in the body (3,) (m).
         coordinate: index of the coordinate that moves the site, or -1.
         drive: polynomial of the coordinate (5,), constant first, whose value a helper joint has;
             None for a fixed site.
@@ -33,7 +33,7 @@ class TendonSite:
     """
 
     body: int
-    place: Array
+    position: Array
     coordinate: int = -1
     drive: Array | None = None
     slides: Array | None = None
@@ -71,11 +71,11 @@ class WrapGeom:
         """
         if direction is None or not direction.any():
             return replace(self, side=None)
-        place = (
+        position = (
             self.frame[:3, :3] @ (direction * (2.0 * self.radius / np.linalg.norm(direction)))
             + self.frame[:3, 3]
         )
-        return replace(self, side=TendonSite(self.body, place))
+        return replace(self, side=TendonSite(self.body, position))
 
     def move_to(self, frame: Array, radius: float) -> WrapGeom:
         """Return a copy with another frame and radius; the side site moves along.
@@ -88,9 +88,10 @@ class WrapGeom:
             return replace(self, frame=frame, radius=radius)
         # The direction of the side site in the frame of the surface; its distance grows with the
         # radius.
-        seen = self.frame[:3, :3].T @ (self.side.place - self.frame[:3, 3])
+        local_offset = self.frame[:3, :3].T @ (self.side.position - self.frame[:3, 3])
         side = replace(
-            self.side, place=frame[:3, :3] @ (seen * (radius / self.radius)) + frame[:3, 3]
+            self.side,
+            position=frame[:3, :3] @ (local_offset * (radius / self.radius)) + frame[:3, 3],
         )
         return replace(self, frame=frame, radius=radius, side=side)
 
@@ -127,28 +128,43 @@ def measure_tendons(tendons: Sequence[Tendon], poses: Poses, version: int) -> tu
     """
     lengths = np.zeros((len(tendons), len(poses.q)))
     arms = np.zeros((*lengths.shape, len(poses.moving)))
-    alike: dict[Any, list[tuple[int, WrapGeom | None]]] = {}
-    for place, tendon in enumerate(tendons):
-        for first, around, second in iterate_sections(tendon):
+    uses_by_section: dict[Any, list[tuple[int, WrapGeom | None]]] = {}
+    for tendon_index, tendon in enumerate(tendons):
+        for start_site, wrap_geom, end_site in iterate_sections(tendon):
             # Sections with equal sites and the same kind of surface are measured in one call.
-            side = around and around.side and (around.side.body, around.side.slides is None)
-            kind = around and (around.body, around.kind, side)
-            alike.setdefault((first, second, kind), []).append((place, around))
-    for (first, second, kind), uses in alike.items():
+            side = (
+                wrap_geom
+                and wrap_geom.side
+                and (wrap_geom.side.body, wrap_geom.side.slides is None)
+            )
+            surface_key = wrap_geom and (wrap_geom.body, wrap_geom.kind, side)
+            uses_by_section.setdefault((start_site, end_site, surface_key), []).append(
+                (tendon_index, wrap_geom)
+            )
+    for (start_site, end_site, surface_key), section_uses in uses_by_section.items():
         numbers = {
-            around: k for k, around in enumerate(dict.fromkeys(around for _, around in uses))
+            wrap_geom: k
+            for k, wrap_geom in enumerate(dict.fromkeys(wrap_geom for _, wrap_geom in section_uses))
         }
-        arounds = () if kind is None else [around for around in numbers if around is not None]
-        length, arm = _measure_section(first, arounds, second, poses, version)
-        for place, around in uses:
+        wrap_geoms = (
+            ()
+            if surface_key is None
+            else [wrap_geom for wrap_geom in numbers if wrap_geom is not None]
+        )
+        length, arm = _measure_section(start_site, wrap_geoms, end_site, poses, version)
+        for tendon_index, wrap_geom in section_uses:
             # A tendon is as long as its sections together.
-            lengths[place] += length[numbers[around]]
-            arms[place] += arm[numbers[around]]
+            lengths[tendon_index] += length[numbers[wrap_geom]]
+            arms[tendon_index] += arm[numbers[wrap_geom]]
     return lengths, arms
 
 
 def _measure_section(
-    first: TendonSite, arounds: Sequence[WrapGeom], second: TendonSite, poses: Poses, version: int
+    first: TendonSite,
+    wrap_geoms: Sequence[WrapGeom],
+    second: TendonSite,
+    poses: Poses,
+    version: int,
 ) -> tuple[Array, Array]:
     """Measure a section between two sites, straight or around each of k surfaces of one kind.
 
@@ -156,7 +172,7 @@ def _measure_section(
 
     Args:
         first: first site.
-        arounds: surfaces (k), all of one kind and in one body; none for a straight section.
+        wrap_geoms: surfaces (k), all of one kind and in one body; none for a straight section.
         second: second site.
         poses: P poses with m free coordinates.
         version: major version of MuJoCo.
@@ -164,96 +180,112 @@ def _measure_section(
     Returns:
         Lengths (k, P) (m) and moment arms (k, P, m).
     """
-    one, two = (_locate_in_ground(spot, poses)[None] for spot in (first, second))
+    first_point, second_point = (
+        _locate_in_ground(tendon_site, poses)[None] for tendon_site in (first, second)
+    )
     # Directions in which the tension pulls at either end.
-    way, back = two - one, one - two
+    forward, backward = second_point - first_point, first_point - second_point
     lengths, arms = np.zeros(()), np.zeros(())
-    chosen: Any = ...
-    if arounds:
-        body, kind = arounds[0].body, arounds[0].kind
+    selection: Any = ...
+    if wrap_geoms:
+        body, kind = wrap_geoms[0].body, wrap_geoms[0].kind
         numbers: dict[Any, int] = {}
-        keys = [(around.radius, around.frame.tobytes()) for around in arounds]
+        keys = [(wrap_geom.radius, wrap_geom.frame.tobytes()) for wrap_geom in wrap_geoms]
         # Surfaces of equal geometry share one computation.
         owners = np.array([numbers.setdefault(key, len(numbers)) for key in keys])
-        of_each = np.unique(owners, return_index=True)[1]
-        frames = np.stack([arounds[place].frame for place in of_each])
-        radii = np.array([[arounds[place].radius] for place in of_each])
+        unique_indices = np.unique(owners, return_index=True)[1]
+        frames = np.stack([wrap_geoms[index].frame for index in unique_indices])
+        radii = np.array([[wrap_geoms[index].radius] for index in unique_indices])
         rotations = frames[:, :3, :3]
-        middles = frames[:, None, :3, 3]
-        start, end = ((poses.express(body, at) - middles) @ rotations for at in (one, two))
-        sides = [
-            _locate_in_body(around.side, body, poses)
-            for around in arounds
-            if around.side is not None
-        ]
-        sites = (np.stack(sides) - middles[owners]) @ rotations[owners] if sides else None
-        result = bend_tendon(kind, radii, start, end, sites, owners, version)
-        # The first axis has all combinations of way and surface; `choice` selects from them below.
-        touches = result.touches.reshape(-1, len(poses.q))
-        leaves, returns = (
-            poses.locate(body, (middles + at @ rotations.swapaxes(1, 2)).reshape(*touches.shape, 3))
-            for at in (result.first, result.second)
+        centers = frames[:, None, :3, 3]
+        start, end = (
+            (poses.express(body, points) - centers) @ rotations
+            for points in (first_point, second_point)
         )
-        way, back = leaves - one, returns - two
-        # Where the tendon does not touch the surface, it is straight, and only `way` counts.
-        lengths = np.where(touches, result.length.reshape(touches.shape) + norm(back), 0.0)
-        for place, pull in ((leaves, way), (returns, back)):
+        sides = [
+            _locate_in_body(wrap_geom.side, body, poses)
+            for wrap_geom in wrap_geoms
+            if wrap_geom.side is not None
+        ]
+        sites = (np.stack(sides) - centers[owners]) @ rotations[owners] if sides else None
+        result = bend_tendon(kind, radii, start, end, sites, owners, version)
+        # The first axis has all combinations of direction and surface; `choice` selects from them below.
+        is_touching = result.touches.reshape(-1, len(poses.q))
+        first_tangents, second_tangents = (
+            poses.locate(
+                body, (centers + points @ rotations.swapaxes(1, 2)).reshape(*is_touching.shape, 3)
+            )
+            for points in (result.first, result.second)
+        )
+        forward, backward = first_tangents - first_point, second_tangents - second_point
+        # Where the tendon does not touch the surface, it is straight, and only `forward` counts.
+        lengths = np.where(
+            is_touching, result.length.reshape(is_touching.shape) + norm(backward), 0.0
+        )
+        for position, pull_direction in ((first_tangents, forward), (second_tangents, backward)):
             # At the surface the tendon pulls the opposite way. Virtual work makes the generalized
             # force of a unit tension the moment arm.
             arms = arms - _compute_generalized_forces(
-                body, place, np.where(touches[..., None], unit(pull), 0.0), poses
+                body, position, np.where(is_touching[..., None], unit(pull_direction), 0.0), poses
             )
-        chosen = result.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
-    for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
-        arms = arms + _compute_generalized_forces(spot.body, place, pull, poses)
+        selection = result.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
+    for tendon_site, position, pull_direction in (
+        (first, first_point, unit(forward)),
+        (second, second_point, unit(backward)),
+    ):
+        arms = arms + _compute_generalized_forces(tendon_site.body, position, pull_direction, poses)
         # A sliding site does work by its own motion, too.
-        if spot.slides is not None:
-            arms = arms + _compute_sliding_forces(spot, pull, poses)
-    return (lengths + norm(way))[chosen], arms[chosen]
+        if tendon_site.slides is not None:
+            arms = arms + _compute_sliding_forces(tendon_site, pull_direction, poses)
+    return (lengths + norm(forward))[selection], arms[selection]
 
 
 def iterate_sections(tendon: Tendon) -> Iterator[tuple[TendonSite, WrapGeom | None, TendonSite]]:
     """Yield first site, surface or None, and second site of each section of a tendon."""
-    last, around = None, None
+    last, wrap_geom = None, None
     for part in tendon:
         if isinstance(part, WrapGeom):
-            around = part
+            wrap_geom = part
         else:
             if last is not None:
-                yield last, around, part
+                yield last, wrap_geom, part
             # A surface belongs to one section only.
-            last, around = part, None
+            last, wrap_geom = part, None
 
 
-def _locate_in_ground(spot: TendonSite, poses: Poses) -> Array:
+def _locate_in_ground(tendon_site: TendonSite, poses: Poses) -> Array:
     """Return the position of a site in ground (P, 3) (m)."""
-    if spot.slides is None:
-        return poses.locate(spot.body, spot.place)
-    assert spot.drive is not None
-    helper = polyval(poses.q[:, spot.coordinate], spot.drive)
-    return poses.locate(spot.body, spot.place + polyval(helper, spot.slides.T).T)
+    if tendon_site.slides is None:
+        return poses.locate(tendon_site.body, tendon_site.position)
+    assert tendon_site.drive is not None
+    helper = polyval(poses.q[:, tendon_site.coordinate], tendon_site.drive)
+    return poses.locate(
+        tendon_site.body, tendon_site.position + polyval(helper, tendon_site.slides.T).T
+    )
 
 
-def _locate_in_body(spot: TendonSite, body: int, poses: Poses) -> Array:
+def _locate_in_body(tendon_site: TendonSite, body: int, poses: Poses) -> Array:
     """Return the position of a site in a body: (1, 3) if it is fixed there, else (P, 3) (m)."""
-    if spot.body == body and spot.slides is None:
-        return spot.place[None]
-    return poses.express(body, _locate_in_ground(spot, poses))
+    if tendon_site.body == body and tendon_site.slides is None:
+        return tendon_site.position[None]
+    return poses.express(body, _locate_in_ground(tendon_site, poses))
 
 
-def _compute_generalized_forces(body: int, places: Array, force: Array, poses: Poses) -> Array:
+def _compute_generalized_forces(body: int, positions: Array, force: Array, poses: Poses) -> Array:
     """Return the generalized forces (k, P, m) of forces (k, P, 3) on a body at positions in ground."""
-    moments = np.cross(places - poses.origins[body], force)
+    moments = np.cross(positions - poses.origins[body], force)
     return multiply_each_pose(np.concatenate((moments, force), axis=-1), poses.jacobians[body])
 
 
-def _compute_sliding_forces(spot: TendonSite, force: Array, poses: Poses) -> Array:
+def _compute_sliding_forces(tendon_site: TendonSite, force: Array, poses: Poses) -> Array:
     """Return generalized forces (k, P, m) of forces (k, P, 3) from a site's motion in its body."""
-    assert spot.slides is not None and spot.drive is not None
-    value = poses.q[:, spot.coordinate]
-    helper = polyval(value, spot.drive)
-    rate = polyval(value, polyder(spot.drive))
+    assert tendon_site.slides is not None and tendon_site.drive is not None
+    value = poses.q[:, tendon_site.coordinate]
+    helper = polyval(value, tendon_site.drive)
+    rate = polyval(value, polyder(tendon_site.drive))
     rates = np.einsum(
-        "pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate
+        "pij,jp->pi",
+        poses.rotations[tendon_site.body],
+        polyval(helper, polyder(tendon_site.slides.T)) * rate,
     )
-    return np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]
+    return np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, tendon_site.coordinate]

@@ -51,11 +51,11 @@ def choose_step(draft: MjcfDraft) -> None:
         rate = _compute_fastest_rate(draft)
     except OsimliteError as error:
         rate = 0.0
-        cannot = "springs that may be too stiff: how stiff they are cannot be computed"
+        description = "springs that may be too stiff: how stiff they are cannot be computed"
         draft.fidelity.add(
             "stiff",
             "/",
-            cannot,
+            description,
             f"steps of {DEFAULT_STEP_S:g} s, be they too long or not",
             error.message,
         )
@@ -63,21 +63,23 @@ def choose_step(draft: MjcfDraft) -> None:
         # Half of the stability limit, with one digit.
         step = float(f"{1.0 / rate:.0e}")
         next(draft.root.iter("option")).set("timestep", format_value(step))
-        cannot = f"springs too stiff for steps of {DEFAULT_STEP_S:g} s, which would end in NaN"
+        description = f"springs too stiff for steps of {DEFAULT_STEP_S:g} s, which would end in NaN"
         detail = f"{step:g} s, for a rate of {rate:.3g} 1/s about the default pose"
-        draft.fidelity.add("stiff", "/", cannot, "the file takes smaller steps", detail)
-    for path, tied in draft.tendons.items():
+        draft.fidelity.add("stiff", "/", description, "the file takes smaller steps", detail)
+    for path, path_tendon in draft.tendons.items():
         muscle, tension = draft.tree.by_path[path], 0.0
         if isinstance(muscle, Muscle):
             with suppress(OsimliteError):
-                (tension,) = compute_isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
+                (tension,) = compute_isometric_tension(
+                    muscle, np.array((path_tendon.default,)), (0.0,)
+                )[0]
             # Passive tension above the strength: the default pose is beyond the range of the
             # fibers.
             if tension > muscle.max_isometric_force:
-                cannot = "fibers that are longer in the default pose than they can bear"
-                done = "as it is: the model may run away, in smaller steps too"
+                description = "fibers that are longer in the default pose than they can bear"
+                consequence = "as it is: the model may run away, in smaller steps too"
                 detail = f"they pull {tension / muscle.max_isometric_force:.2g} times max_isometric_force at rest"
-                draft.fidelity.add("overstretched", path, cannot, done, detail)
+                draft.fidelity.add("overstretched", path, description, consequence, detail)
 
 
 def _compute_fastest_rate(draft: MjcfDraft) -> float:
@@ -88,14 +90,14 @@ def _compute_fastest_rate(draft: MjcfDraft) -> float:
     """
     mechanism, (q, u) = draft.mechanism, draft.default_state
     state = mechanism.at(q, u)
-    rows, free = np.zeros((0, len(u))), np.eye(len(u))
+    rows, free_motions = np.zeros((0, len(u))), np.eye(len(u))
     if mechanism.constraints:
         rows, _ = stack_equations(
-            [item.velocity_equations(state) for item in mechanism.constraints]
+            [constraint.velocity_equations(state) for constraint in mechanism.constraints]
         )
         # Only motions that the constraints allow.
-        _, free = solve_with_null_space(rows, np.zeros(len(rows)))
-    mass = free.T @ mechanism.mass_matrix(q) @ free
+        _, free_motions = solve_with_null_space(rows, np.zeros(len(rows)))
+    mass = free_motions.T @ mechanism.mass_matrix(q) @ free_motions
     # A motion without inertia has no finite rate.
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0
@@ -107,10 +109,10 @@ def _compute_fastest_rate(draft: MjcfDraft) -> float:
         for force, spring in zip(owners, springs, strict=True)
         if isinstance(force, BushingForce)
     ]
-    zero = np.zeros_like(free)
-    stiffness = _differentiate_forces(draft, springs, mechanism.rate_matrix(q) @ free, zero)
-    damping = _differentiate_forces(draft, bushings, zero, free)
-    rates = np.linalg.solve(mass, free.T @ np.hstack((stiffness, damping)))
+    zero = np.zeros_like(free_motions)
+    stiffness = _differentiate_forces(draft, springs, mechanism.rate_matrix(q) @ free_motions, zero)
+    damping = _differentiate_forces(draft, bushings, zero, free_motions)
+    rates = np.linalg.solve(mass, free_motions.T @ np.hstack((stiffness, damping)))
     count = len(mass)
     return float(
         np.abs(np.linalg.eigvals(np.vstack((np.eye(count, 2 * count, count), rates)))).max()
@@ -118,31 +120,35 @@ def _compute_fastest_rate(draft: MjcfDraft) -> float:
 
 
 def _differentiate_forces(
-    draft: MjcfDraft, elements: Sequence[ForceElement], along: Array, at: Array
+    draft: MjcfDraft,
+    elements: Sequence[ForceElement],
+    coordinate_changes: Array,
+    speed_changes: Array,
 ) -> Array:
     """Differentiate generalized forces by changes of coordinates and speeds.
 
     Args:
         draft: MJCF under construction.
         elements: forces.
-        along: directions of the coordinates (n, f).
-        at: directions of the speeds (n, f).
+        coordinate_changes: directions of the coordinates (n, f).
+        speed_changes: directions of the speeds (n, f).
 
     Returns:
         Derivatives (n, f).
     """
     q, u = draft.default_state
-    result = np.zeros_like(along)
+    result = np.zeros_like(coordinate_changes)
     if elements:
         system = System(draft.mechanism, Forces(tuple(elements)))
-        places = list(system.order)
+        order = list(system.order)
 
-        def forces(nudge: float, k: int) -> Array:
+        def forces(step: float, k: int) -> Array:
             row = np.zeros(len(result))
             y = system.state.pack(
-                (q + nudge * along[:, k]).tolist(), (u + nudge * at[:, k]).tolist()
+                (q + step * coordinate_changes[:, k]).tolist(),
+                (u + step * speed_changes[:, k]).tolist(),
             )
-            row[places] = system.compute_applied_forces(0.0, y)[len(places) : 2 * len(places)]
+            row[order] = system.compute_applied_forces(0.0, y)[len(order) : 2 * len(order)]
             return row
 
         for k in range(result.shape[1]):

@@ -17,10 +17,10 @@ def collect_warnings(mujoco: Any) -> Iterator[list[str]]:
         mujoco: MuJoCo's module.
     """
     texts: list[str] = []
-    before = mujoco.get_mju_user_warning()
+    previous = mujoco.get_mju_user_warning()
     # The handler is global in MuJoCo, and is restored afterwards.
     mujoco.set_mju_user_warning(lambda text: texts.append(str(text)))
     try:
         yield texts
     finally:
-        mujoco.set_mju_user_warning(before)
+        mujoco.set_mju_user_warning(previous)

@@ -58,7 +58,7 @@ def bend_tendon(
     radius: Array,
     first: Array,
     second: Array,
-    sides: Array | None,
+    side_sites: Array | None,
     owners: NDArray[np.intp],
     version: int,
 ) -> Bends:
@@ -69,28 +69,28 @@ def bend_tendon(
         radius: radii (S, 1) (m).
         first: first end in the frames of the surfaces (S, P, 3) (m).
         second: second end (S, P, 3) (m).
-        sides: side sites in the frames of their surfaces (k, P, 3) (m), or None.
+        side_sites: side sites in the frames of their surfaces (k, P, 3) (m), or None.
         owners: index of the surface of each side site (k,).
         version: major version of MuJoCo.
 
     Returns:
         Course of the tendon in all ways, and the way that it takes.
     """
-    across = None if kind == "cylinder" else _make_plane_axes(first, second)
-    p = _project_to_plane(across, first)
-    q = _project_to_plane(across, second)
+    plane_axes = None if kind == "cylinder" else _make_plane_axes(first, second)
+    p = _project_to_plane(plane_axes, first)
+    q = _project_to_plane(plane_axes, second)
     reach_p = _compute_tangent_angle(p, radius)
     reach_q = _compute_tangent_angle(q, radius)
-    between = _compute_angle(p, q)
+    end_angle = _compute_angle(p, q)
     signs = (
         np.array((0.0, 1.0, -1.0))[:, None, None]
-        if sides is not None
-        else np.where(between < 0.0, -1.0, 1.0)[None]
+        if side_sites is not None
+        else np.where(end_angle < 0.0, -1.0, 1.0)[None]
     )
     # If one end is behind the other, MuJoCo 3 with a side site winds completely around the circle.
-    least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
-    # The angle from p to q in each direction, which is at least `least`.
-    winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
+    min_winding = reach_p + reach_q if version < 4 and side_sites is not None else -ROUNDING
+    # The angle from p to q in each direction, which is at least `min_winding`.
+    winding = np.abs(signs) * (np.mod(signs * end_angle - min_winding, 2.0 * np.pi) + min_winding)
     arc = radius * (winding - reach_p - reach_q)
     at_p = _turn_on_circle(p, signs * reach_p, radius)
     at_q = _turn_on_circle(q, -signs * reach_q, radius)
@@ -99,39 +99,41 @@ def bend_tendon(
     # Otherwise the straight line passes the surface.
     touches = outside & (arc > 0.0)
     choice = np.zeros((len(owners), len(p[0])), dtype=int)
-    if sides is not None:
-        toward = _project_to_plane(None if across is None else across[owners], sides)
+    if side_sites is not None:
+        toward = _project_to_plane(None if plane_axes is None else plane_axes[owners], side_sites)
         if version >= 4:
             choice = np.where(
                 _compute_angle(p[owners], toward) + _compute_angle(toward, q[owners]) < 0.0, 2, 1
             )
         else:
             choice = _choose_side(p, q, radius, at_p[1:], at_q[1:], toward, owners)
-        if (inside := norm(sides) < radius[owners]).any():
-            through, at = _find_passage(p, q, radius)
-            touches = np.stack((*touches, outside & through))
-            arc = np.stack((*arc, 0.0 * between))
-            at_p = np.stack((*at_p, at))
-            at_q = np.stack((*at_q, at))
+        if (inside := norm(side_sites) < radius[owners]).any():
+            passes_through, passage = _find_passage(p, q, radius)
+            touches = np.stack((*touches, outside & passes_through))
+            arc = np.stack((*arc, 0.0 * end_angle))
+            at_p = np.stack((*at_p, passage))
+            at_q = np.stack((*at_q, passage))
             choice = np.where(inside, 3, choice)
-    if across is None:
+    if plane_axes is None:
         lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
         # Height changes in proportion to the length in the plane, as on an unrolled cylinder.
-        share = (second - first)[..., 2] / np.maximum(lines.sum(0), TINY)
-        heights = first[..., 2] + share * lines[0], first[..., 2] + share * (lines[0] + lines[1])
-        one, two = (
-            np.concatenate((at, z[..., None]), axis=-1)
-            for at, z in zip((at_p, at_q), heights, strict=True)
+        slope = (second - first)[..., 2] / np.maximum(lines.sum(0), TINY)
+        heights = first[..., 2] + slope * lines[0], first[..., 2] + slope * (lines[0] + lines[1])
+        first_points, second_points = (
+            np.concatenate((passage, z[..., None]), axis=-1)
+            for passage, z in zip((at_p, at_q), heights, strict=True)
         )
         # On a cylinder the tendon is a helix, whose length is the hypotenuse of arc and height.
         arc = np.hypot(arc, heights[1] - heights[0])
     else:
-        one, two = (np.einsum("spij,cspi->cspj", across, at) for at in (at_p, at_q))
-    hit = touches[..., None]
+        first_points, second_points = (
+            np.einsum("spij,cspi->cspj", plane_axes, passage) for passage in (at_p, at_q)
+        )
+    touch_mask = touches[..., None]
     return Bends(
         touches,
-        np.where(hit, one, second),
-        np.where(hit, two, first),
+        np.where(touch_mask, first_points, second),
+        np.where(touch_mask, second_points, first),
         np.where(touches, arc, 0.0),
         choice,
     )
@@ -147,15 +149,15 @@ def _choose_side(
     owners: NDArray[np.intp],
 ) -> NDArray[np.intp]:
     """Return the way of a tendon in MuJoCo 3 with each of k side sites (k, P): 0 is straight."""
-    way = q - p
-    part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
-    nearest = p + part[..., None] * way
+    segment = q - p
+    fraction = np.clip(-_dot(segment, p) / np.maximum(_dot(segment, segment), TINY), 0.0, 1.0)
+    nearest = p + fraction[..., None] * segment
     straight = (norm(nearest) > radius)[owners] & (_dot(side, nearest[owners]) >= 0.0)
     middle = unit(at_p + at_q)
     crossed: Mask = _lines_cross(p, at_p, q, at_q)
     # A way whose tangents cross is impossible.
-    good = np.where(crossed[:, owners], -np.inf, _dot(middle[:, owners], side))
-    return np.where(straight | np.all(crossed, axis=0)[owners], 0, 1 + good.argmax(0))
+    alignment = np.where(crossed[:, owners], -np.inf, _dot(middle[:, owners], side))
+    return np.where(straight | np.all(crossed, axis=0)[owners], 0, 1 + alignment.argmax(0))
 
 
 def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
@@ -171,33 +173,38 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     Returns:
         Whether the way is not straight (S, P), and its point on the circle (S, P, 2).
     """
-    way = q - p
-    part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
-    passes = norm(p + part[..., None] * way) > radius
-    between = _compute_angle(p, q)
+    segment = q - p
+    fraction = np.clip(-_dot(segment, p) / np.maximum(_dot(segment, segment), TINY), 0.0, 1.0)
+    is_free = norm(p + fraction[..., None] * segment) > radius
+    end_angle = _compute_angle(p, q)
     # As a function of the angle between p and q, the slope of the length changes its sign once: bisect.
-    low = np.zeros(between.shape)
-    high = np.ones(between.shape)
+    lower = np.zeros(end_angle.shape)
+    upper = np.ones(end_angle.shape)
     for _ in range(50):
-        middle = 0.5 * (low + high)
-        at = _turn_on_circle(p, middle * between, radius)
+        middle = 0.5 * (lower + upper)
+        passage = _turn_on_circle(p, middle * end_angle, radius)
         slope = sum(
-            _cross(at, at - end) / np.maximum(norm(at - end), TINY) for end in (p, q)
-        ) * np.sign(between)
-        low = np.where(slope < 0.0, middle, low)
-        high = np.where(slope < 0.0, high, middle)
-    return passes, _turn_on_circle(p, 0.5 * (low + high) * between, radius)
+            _cross(passage, passage - end) / np.maximum(norm(passage - end), TINY) for end in (p, q)
+        ) * np.sign(end_angle)
+        lower = np.where(slope < 0.0, middle, lower)
+        upper = np.where(slope < 0.0, upper, middle)
+    return is_free, _turn_on_circle(p, 0.5 * (lower + upper) * end_angle, radius)
 
 
-def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
+def _lines_cross(p: Array, p_end: Array, q: Array, q_end: Array) -> Mask:
     """Return whether the segments from p to one and from q to two intersect (...)."""
-    way, other, apart = one - p, two - q, q - p
-    across = _cross(way, other)
+    first_direction, second_direction, start_offset = p_end - p, q_end - q, q - p
+    determinant = _cross(first_direction, second_direction)
     # Parallel lines have no intersection; comparisons with NaN are false.
-    across = np.where(np.abs(across) < TINY, np.nan, across)
-    along = _cross(apart, other) / across
-    back = _cross(apart, way) / across
-    return (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
+    determinant = np.where(np.abs(determinant) < TINY, np.nan, determinant)
+    first_fraction = _cross(start_offset, second_direction) / determinant
+    second_fraction = _cross(start_offset, first_direction) / determinant
+    return (
+        (first_fraction >= 0.0)
+        & (first_fraction <= 1.0)
+        & (second_fraction >= 0.0)
+        & (second_fraction <= 1.0)
+    )
 
 
 def _make_plane_axes(first: Array, second: Array) -> Array:
@@ -205,22 +212,26 @@ def _make_plane_axes(first: Array, second: Array) -> Array:
 
     The first one points to the first end.
     """
-    along = first / np.maximum(norm(first), TINY)[..., None]
+    first_axis = first / np.maximum(norm(first), TINY)[..., None]
     normal = np.cross(first, second)
     size = norm(normal)[..., None]
     # Ends on a line with the centre define no plane; any plane through the line will do.
-    other = np.where(np.abs(along) < np.abs(along).max(-1, keepdims=True), 1.0, 0.0)
-    normal = np.where(size > TINY, normal, np.cross(along, other))
+    smallest_axis = np.where(
+        np.abs(first_axis) < np.abs(first_axis).max(-1, keepdims=True), 1.0, 0.0
+    )
+    normal = np.where(size > TINY, normal, np.cross(first_axis, smallest_axis))
     normal /= np.maximum(norm(normal), TINY)[..., None]
-    return np.stack((along, np.cross(normal, along)), axis=-2)
+    return np.stack((first_axis, np.cross(normal, first_axis)), axis=-2)
 
 
-def _project_to_plane(across: Array | None, points: Array) -> Array:
+def _project_to_plane(plane_axes: Array | None, points: Array) -> Array:
     """Return coordinates (..., 2) of points (..., 3) in a plane.
 
     It is the plane of two vectors (..., 2, 3), or the one normal to z.
     """
-    return points[..., :2] if across is None else np.einsum("...ij,...j->...i", across, points)
+    return (
+        points[..., :2] if plane_axes is None else np.einsum("...ij,...j->...i", plane_axes, points)
+    )
 
 
 def _dot(a: Array, b: Array) -> Array:

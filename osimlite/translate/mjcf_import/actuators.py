@@ -40,20 +40,20 @@ def add_actuators(draft: ConversionDraft) -> None:
     """Add all actuators, and the springs of tendons."""
     model, mujoco = draft.mj, draft.source.mujoco
     lengths = _sample_lengths(draft)
-    kinds = mujoco.mjtTrn
+    transmissions = mujoco.mjtTrn
     for actuator in range(model.nu):
         report_progress("converting actuators", actuator, model.nu)
         transmission = int(model.actuator_trntype[actuator])
         target = int(model.actuator_trnid[actuator, 0])
         is_muscle = int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_MUSCLE)
-        if transmission in (int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)):
+        if transmission in (int(transmissions.mjTRN_JOINT), int(transmissions.mjTRN_JOINTINPARENT)):
             if int(model.jnt_type[target]) in (FREE, BALL):
                 draft.drop("actuator", actuator, "an actuator of a ball or free joint")
             elif is_muscle:
                 _add_joint_muscle(draft, actuator, target)
             else:
                 _add_joint_actuator(draft, actuator, target)
-        elif transmission == int(kinds.mjTRN_TENDON):
+        elif transmission == int(transmissions.mjTRN_TENDON):
             path = draft.paths[target]
             # The gear of a tendon has one number that counts.
             gear = float(model.actuator_gear[actuator, 0])
@@ -65,7 +65,7 @@ def add_actuators(draft: ConversionDraft) -> None:
                     draft.model.add(muscle)
             else:
                 _add_path_actuator(draft, actuator, path, gear)
-        elif transmission == int(kinds.mjTRN_SITE) and not is_muscle:
+        elif transmission == int(transmissions.mjTRN_SITE) and not is_muscle:
             _add_site_actuator(draft, actuator, target)
         else:
             draft.drop(
@@ -110,24 +110,24 @@ def _read_gain(
 
 def _read_dynamics(draft: ConversionDraft, actuator: int) -> float | None:
     """Return the time constant (s) of an actuator, 0 without dynamics; None if it has others."""
-    model, kinds = draft.mj, draft.source.mujoco.mjtDyn
-    kind = int(model.actuator_dyntype[actuator])
-    if kind == int(kinds.mjDYN_NONE):
+    model, dynamics_types = draft.mj, draft.source.mujoco.mjtDyn
+    dynamics = int(model.actuator_dyntype[actuator])
+    if dynamics == int(dynamics_types.mjDYN_NONE):
         return 0.0
-    if kind in (int(kinds.mjDYN_FILTER), int(kinds.mjDYN_FILTEREXACT)):
+    if dynamics in (int(dynamics_types.mjDYN_FILTER), int(dynamics_types.mjDYN_FILTEREXACT)):
         return float(model.actuator_dynprm[actuator, 0])
     return None
 
 
 def _set_limits(
-    draft: ConversionDraft, actuator: int, made: ScalarActuator, gain: float, biased: bool
+    draft: ConversionDraft, actuator: int, force: ScalarActuator, gain: float, biased: bool
 ) -> None:
     """Set the range of the control, and record what a limit of the force becomes."""
     model = draft.mj
-    low, high = -np.inf, np.inf
+    lower, upper = -np.inf, np.inf
     if model.actuator_ctrllimited[actuator]:
         # No limit is infinite in OpenSim.
-        low, high = map(float, model.actuator_ctrlrange[actuator])
+        lower, upper = map(float, model.actuator_ctrlrange[actuator])
     if model.actuator_forcelimited[actuator]:
         limits = [float(value) for value in model.actuator_forcerange[actuator]]
         text = f"{limits[0]:g} to {limits[1]:g}"
@@ -137,32 +137,32 @@ def _set_limits(
             )
         else:
             # Gains may be negative, which exchanges the limits.
-            ends = sorted(limit / gain for limit in limits)
-            low, high = max(low, ends[0]), min(high, ends[1])
+            control_limits = sorted(limit / gain for limit in limits)
+            lower, upper = max(lower, control_limits[0]), min(upper, control_limits[1])
             draft.record(
                 "actuator", actuator, "a limit of the force", "a limit of the control", text
             )
-    made.min_control, made.max_control = low, high
+    force.min_control, force.max_control = lower, upper
 
 
 def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> None:
     model = draft.mj
-    read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
+    gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     gear = float(model.actuator_gear[actuator, 0])
     # A gear of 0 makes an actuator without a force.
-    if read is None or delay is None or not gear:
+    if gain_and_bias is None or delay is None or not gear:
         draft.drop(
             "actuator",
             actuator,
             "a force that is no linear function of the control, or other dynamics",
         )
         return
-    gain, (constant, by_length, by_speed) = read
+    gain, (constant, by_length, by_speed) = gain_and_bias
     coordinate = draft.coordinates[joint][0]
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
-    made: CoordinateActuator
+    force: CoordinateActuator
     if delay:
-        made = ActivationCoordinateActuator(
+        force = ActivationCoordinateActuator(
             name=name,
             coordinate=coordinate,
             optimal_force=gain * gear,
@@ -170,11 +170,11 @@ def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> No
             default_activation=0.0,
         )
     else:
-        made = CoordinateActuator(name=name, coordinate=coordinate, optimal_force=gain * gear)
+        force = CoordinateActuator(name=name, coordinate=coordinate, optimal_force=gain * gear)
     biased = any((constant, by_length, by_speed))
-    _set_limits(draft, actuator, made, gain, biased)
-    draft.model.add(made)
-    became = f"{type(made).__name__} {name}"
+    _set_limits(draft, actuator, force, gain, biased)
+    draft.model.add(force)
+    result = f"{type(force).__name__} {name}"
     if biased:
         # The force is gear (constant + by_length gear q + by_speed gear u).
         stiffness, viscosity = -by_length * gear * gear, -by_speed * gear * gear
@@ -198,24 +198,24 @@ def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> No
                     expression=(f"({gear * constant!r})-({stiffness!r})*q-({viscosity!r})*qdot"),
                 )
             )
-        became += f" and {spring}: a servo as an actuator and a passive spring"
-    draft.translated("actuator", actuator, became)
+        result += f" and {spring}: a servo as an actuator and a passive spring"
+    draft.translated("actuator", actuator, result)
 
 
 def _add_joint_muscle(draft: ConversionDraft, actuator: int, joint: int) -> None:
     """Add a muscle whose length is a multiple of a joint position."""
     model = draft.mj
     gear = float(model.actuator_gear[actuator, 0])
-    low, high = draft.made[draft.coordinates[joint][0]].range
-    least = min(gear * low, gear * high)
+    lower, upper = draft.made[draft.coordinates[joint][0]].range
+    shortest = min(gear * lower, gear * upper)
     # OpenSim's paths have positive lengths: 1 cm at least.
-    shift = max(0.0, 0.01 - least)
+    shift = max(0.0, 0.01 - shortest)
     path = FunctionBasedPath(
         name="path",
         coordinate_paths=(draft.coordinate_path(joint),),
         length_function=LinearFunction(name="length_function", coefficients=(gear, shift)),
     )
-    lengths = np.linspace(gear * low, gear * high, LENGTH_POSES) + shift
+    lengths = np.linspace(gear * lower, gear * upper, LENGTH_POSES) + shift
     muscle = make_muscle(draft, actuator, TendonPath(path, shift), 1.0, lengths)
     if muscle is not None:
         draft.model.add(muscle)
@@ -231,21 +231,21 @@ def _add_path_actuator(
     draft: ConversionDraft, actuator: int, path: TendonPath, gear: float
 ) -> None:
     """Add an actuator of a tendon; a positive force of MuJoCo lengthens it, OpenSim's shortens it."""
-    read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
-    if read is None or delay is None or not gear:
+    gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
+    if gain_and_bias is None or delay is None or not gear:
         draft.drop(
             "actuator",
             actuator,
             "a force that is no linear function of the control, or other dynamics",
         )
         return
-    gain, (constant, by_length, by_speed) = read
+    gain, (constant, by_length, by_speed) = gain_and_bias
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
-    made = PathActuator(name=name, geometry_path=_copy(path).path, optimal_force=-gain * gear)
+    force = PathActuator(name=name, geometry_path=_copy(path).path, optimal_force=-gain * gear)
     biased = any((constant, by_length, by_speed))
-    _set_limits(draft, actuator, made, gain, biased)
-    draft.model.add(made)
-    became = f"PathActuator {name}"
+    _set_limits(draft, actuator, force, gain, biased)
+    draft.model.add(force)
+    result = f"PathActuator {name}"
     if biased:
         spring = draft.unique("force", f"{name}_bias")
         draft.model.add(
@@ -261,25 +261,25 @@ def _add_path_actuator(
                 ),
             )
         )
-        became += f" and {spring}"
+        result += f" and {spring}"
     if delay:
         draft.record(
             "actuator", actuator, "a delay of the control of a tendon", LEFT_OUT, f"{delay:g} s"
         )
-    draft.translated("actuator", actuator, became)
+    draft.translated("actuator", actuator, result)
 
 
 def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None:
     """Add a force or a torque at a site."""
     model = draft.mj
-    read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
+    gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     gear = np.array(model.actuator_gear[actuator])
     force, torque = gear[:3], gear[3:]
     body = int(model.site_bodyid[site])
     if (
-        read is None
+        gain_and_bias is None
         or delay != 0.0
-        or any(read[1])
+        or any(gain_and_bias[1])
         # A reference site, or a force together with a torque, has no counterpart in one actuator.
         or int(model.actuator_trnid[actuator, 1]) >= 0
         or force.any() == torque.any()
@@ -292,37 +292,37 @@ def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None
         )
         return
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
-    turned = quaternion_matrix(model.site_quat[site])
+    rotation = quaternion_matrix(model.site_quat[site])
     frame = draft.frames[body].name
-    made: PointActuator | TorqueActuator
+    actuator_force: PointActuator | TorqueActuator
     if force.any():
         size = float(np.linalg.norm(force))
-        made = PointActuator(
+        actuator_force = PointActuator(
             name=name,
             body=frame,
             point=vector(model.site_pos[site]),
-            direction=vector(turned @ force / size),
-            optimal_force=read[0] * size,
+            direction=vector(rotation @ force / size),
+            optimal_force=gain_and_bias[0] * size,
         )
     else:
         size = float(np.linalg.norm(torque))
-        made = TorqueActuator(
+        actuator_force = TorqueActuator(
             name=name,
             bodyA=frame,
             bodyB="ground",
             torque_is_global=False,
-            axis=vector(turned @ torque / size),
-            optimal_force=read[0] * size,
+            axis=vector(rotation @ torque / size),
+            optimal_force=gain_and_bias[0] * size,
         )
-    _set_limits(draft, actuator, made, read[0], biased=False)
-    draft.model.add(made)
-    draft.translated("actuator", actuator, f"{type(made).__name__} {name}")
+    _set_limits(draft, actuator, actuator_force, gain_and_bias[0], biased=False)
+    draft.model.add(actuator_force)
+    draft.translated("actuator", actuator, f"{type(actuator_force).__name__} {name}")
 
 
 def _add_tendon_springs(draft: ConversionDraft) -> None:
     """Add the springs and dampers of tendons; a tendon without any force keeps its path."""
     model = draft.mj
-    driven = {
+    driven_tendons = {
         int(model.actuator_trnid[actuator, 0])
         for actuator in range(model.nu)
         if int(model.actuator_trntype[actuator]) == int(draft.source.mujoco.mjtTrn.mjTRN_TENDON)
@@ -336,12 +336,14 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
         )
         if stiffness or damping:
             # MuJoCo's spring has a dead band between two lengths, and pushes below it.
-            low, high = (float(value) for value in np.atleast_1d(model.tendon_lengthspring[tendon]))
+            shorter_limit, longer_limit = (
+                float(value) for value in np.atleast_1d(model.tendon_lengthspring[tendon])
+            )
             terms = []
             if stiffness:
                 terms += [
-                    f"{stiffness!r}*(s-({high!r}))*step(s-({high!r}))",
-                    f"{stiffness!r}*(s-({low!r}))*step(({low!r})-s)",
+                    f"{stiffness!r}*(s-({longer_limit!r}))*step(s-({longer_limit!r}))",
+                    f"{stiffness!r}*(s-({shorter_limit!r}))*step(({shorter_limit!r})-s)",
                 ]
             if damping:
                 terms.append(f"{damping!r}*ldot")
@@ -355,7 +357,7 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
                 )
             )
         # A PathSpring keeps the path, so that its length can be read.
-        elif tendon not in driven:
+        elif tendon not in driven_tendons:
             draft.model.add(
                 PathSpring(
                     name=draft.unique("force", name),
@@ -371,7 +373,7 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
                 "a tendon without a force",
                 "a PathSpring without stiffness, so that its length can be read",
             )
-        for what, value in (
+        for description, value in (
             ("a limit of the length of a tendon", model.tendon_limited[tendon]),
             ("dry friction of a tendon", model.tendon_frictionloss[tendon]),
             ("armature of a tendon", _optional(model, "tendon_armature", tendon)),
@@ -379,7 +381,7 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
             ("a nonlinear damper of a tendon", _optional(model, "tendon_dampingpoly", tendon)),
         ):
             if np.any(value):
-                draft.drop("tendon", tendon, what)
+                draft.drop("tendon", tendon, description)
 
 
 def _optional(model: Any, name: str, index: int) -> Any:

@@ -56,10 +56,10 @@ def add_contacts(draft: ConversionDraft) -> None:
     surfaces: dict[int, list[ContactGeometry]] = {}
     # Sorted, so that equal files give equal models.
     for geom in sorted(_find_colliding_geoms(draft)):
-        made = _make_surfaces(draft, geom)
-        if made:
-            surfaces[geom] = made
-            for surface in made:
+        geom_surfaces = _make_surfaces(draft, geom)
+        if geom_surfaces:
+            surfaces[geom] = geom_surfaces
+            for surface in geom_surfaces:
                 draft.model.add(surface)
     if draft.options.contact == "forces":
         _add_forces(draft, surfaces)
@@ -77,8 +77,8 @@ def _find_colliding_geoms(draft: ConversionDraft) -> set[int]:
     types, affinities = model.geom_contype, model.geom_conaffinity
     for geom in range(model.ngeom):
         # MuJoCo's test: the type of one and the affinity of the other, in either order.
-        others = (types[geom] & affinities) | (affinities[geom] & types)
-        if np.any(others[np.arange(model.ngeom) != geom]):
+        can_touch = (types[geom] & affinities) | (affinities[geom] & types)
+        if np.any(can_touch[np.arange(model.ngeom) != geom]):
             result.add(geom)
     return result
 
@@ -94,7 +94,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
     position = np.array(model.geom_pos[geom])
     rotation = quaternion_matrix(model.geom_quat[geom])
     size = [float(value) for value in model.geom_size[geom]]
-    kind = int(model.geom_type[geom])
+    geom_type = int(model.geom_type[geom])
 
     def sphere(center: Array, radius: float) -> ContactSphere:
         return ContactSphere(
@@ -104,7 +104,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
             radius=radius,
         )
 
-    if kind == PLANE:
+    if geom_type == PLANE:
         return [
             ContactHalfSpace(
                 name=draft.unique("contact", name),
@@ -113,12 +113,12 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
                 orientation=angles_of(rotation @ PLANE_TO_HALF_SPACE),
             )
         ]
-    if kind == SPHERE:
+    if geom_type == SPHERE:
         return [sphere(np.zeros(3), size[0])]
-    if kind == CAPSULE:
+    if geom_type == CAPSULE:
         draft.record("geom", geom, "contact of a capsule", "contact of the spheres at its ends")
         return [sphere(np.array((0.0, 0.0, end)), size[0]) for end in (-size[1], size[1])]
-    if kind == BOX:
+    if geom_type == BOX:
         # Spheres in the corners touch a plane as the box does, up to rounded corners.
         radius = CORNER_RADIUS * min(size)
         draft.record(
@@ -133,7 +133,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
             sphere(np.array(signs) * (np.array(size) - radius), radius)
             for signs in product((-1.0, 1.0), repeat=3)
         ]
-    if kind == ELLIPSOID:
+    if geom_type == ELLIPSOID:
         return [
             ContactEllipsoid(
                 name=draft.unique("contact", name),
@@ -143,7 +143,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
                 radii=vector(size),
             )
         ]
-    if kind == MESH and int(model.geom_dataid[geom]) >= 0:
+    if geom_type == MESH and int(model.geom_dataid[geom]) >= 0:
         file = write_mesh(draft, int(model.geom_dataid[geom]))
         draft.record(
             "geom",
@@ -168,28 +168,28 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
 def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry]]) -> None:
     """Add a force for each plane and what can touch it; record what else can touch."""
     model = draft.mj
-    others: dict[int, int] = {}
+    unsupported_counts: dict[int, int] = {}
     pairs = {tuple(sorted(_pair(model, pair))): pair for pair in range(model.npair)}
-    touching = [
-        (one, two)
-        for position, one in enumerate(surfaces)
-        for two in list(surfaces)[position + 1 :]
-        if (one, two) in pairs or _can_touch(draft, one, two)
+    touching_pairs = [
+        (first, second)
+        for position, first in enumerate(surfaces)
+        for second in list(surfaces)[position + 1 :]
+        if (first, second) in pairs or _can_touch(draft, first, second)
     ]
-    for one, two in touching:
-        planes = [geom for geom in (one, two) if int(model.geom_type[geom]) == PLANE]
-        round_ = [
+    for first, second in touching_pairs:
+        planes = [geom for geom in (first, second) if int(model.geom_type[geom]) == PLANE]
+        round_geoms = [
             geom
-            for geom in (one, two)
+            for geom in (first, second)
             if int(model.geom_type[geom]) in (SPHERE, CAPSULE, ELLIPSOID, BOX)
         ]
         # OpenSim's Hunt-Crossley force acts between half spaces and round shapes.
-        if len(planes) != 1 or len(round_) != 1:
-            for geom in (one, two):
-                others[geom] = others.get(geom, 0) + 1
+        if len(planes) != 1 or len(round_geoms) != 1:
+            for geom in (first, second):
+                unsupported_counts[geom] = unsupported_counts.get(geom, 0) + 1
             continue
-        _add_force(draft, surfaces, planes[0], round_[0], pairs.get((one, two)))
-    for geom, count in others.items():
+        _add_force(draft, surfaces, planes[0], round_geoms[0], pairs.get((first, second)))
+    for geom, count in unsupported_counts.items():
         draft.record(
             "geom",
             geom,
@@ -199,13 +199,13 @@ def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry
         )
 
 
-def _can_touch(draft: ConversionDraft, one: int, two: int) -> bool:
+def _can_touch(draft: ConversionDraft, first: int, second: int) -> bool:
     """Return whether MuJoCo tests two geoms for contact, without the explicit pairs of the file."""
     model = draft.mj
     types, affinities = model.geom_contype, model.geom_conaffinity
-    if not (types[one] & affinities[two] or types[two] & affinities[one]):
+    if not (types[first] & affinities[second] or types[second] & affinities[first]):
         return False
-    bodies = [int(model.body_weldid[model.geom_bodyid[geom]]) for geom in (one, two)]
+    bodies = [int(model.body_weldid[model.geom_bodyid[geom]]) for geom in (first, second)]
     parents = [int(model.body_weldid[model.body_parentid[body]]) for body in bodies]
     # Geoms of one rigid body do not move against each other.
     if bodies[0] == bodies[1]:
@@ -215,8 +215,8 @@ def _can_touch(draft: ConversionDraft, one: int, two: int) -> bool:
         return False
     # MuJoCo stores both bodies in one integer.
     signature = {
-        (int(model.geom_bodyid[one]) << 16) + int(model.geom_bodyid[two]),
-        (int(model.geom_bodyid[two]) << 16) + int(model.geom_bodyid[one]),
+        (int(model.geom_bodyid[first]) << 16) + int(model.geom_bodyid[second]),
+        (int(model.geom_bodyid[second]) << 16) + int(model.geom_bodyid[first]),
     }
     return not signature & {int(value) for value in model.exclude_signature}
 
@@ -230,14 +230,14 @@ def _add_force(
 ) -> None:
     model = draft.mj
     body = int(model.geom_bodyid[geom])
-    root = int(model.body_rootid[body])
-    mass = float(model.body_subtreemass[root])
+    root_body = int(model.body_rootid[body])
+    mass = float(model.body_subtreemass[root_body])
     if pair is None:
         # MuJoCo's mixing rule for the parameters of two geoms.
         weights = model.geom_solmix[[plane, geom]]
-        share = weights / weights.sum() if weights.sum() > 0.0 else np.array((0.5, 0.5))
-        reference = share @ model.geom_solref[[plane, geom]]
-        impedance = share @ model.geom_solimp[[plane, geom]]
+        mix = weights / weights.sum() if weights.sum() > 0.0 else np.array((0.5, 0.5))
+        reference = mix @ model.geom_solref[[plane, geom]]
+        impedance = mix @ model.geom_solimp[[plane, geom]]
         # Of two frictions MuJoCo takes the larger.
         friction = float(model.geom_friction[[plane, geom], 0].max())
     else:

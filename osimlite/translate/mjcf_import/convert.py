@@ -72,7 +72,7 @@ class Osim:
         return {
             "bodies": len(model.body_set.objects),
             "joints": len(model.joint_set.objects),
-            "coordinates": sum(len(item.coordinates) for item in model.joint_set.objects),
+            "coordinates": sum(len(joint.coordinates) for joint in model.joint_set.objects),
             "forces": len(model.force_set.objects),
             "constraints": len(model.constraint_set.objects),
         }
@@ -161,7 +161,7 @@ def from_mjcf(
         SettingError: an option has an unknown value, or `written_for` is required.
         UnsupportedError: the file has no body.
     """
-    for word, value, known in (
+    for option, value, choices in (
         ("written-for", written_for, (None, 2, 3, 4)),
         ("muscle-class", muscle_class, ("millard", "exact")),
         ("armature", armature, ("rotors", "none")),
@@ -170,9 +170,9 @@ def from_mjcf(
         ("up", up, ("y", "z")),
         ("tendon-paths", tendon_paths, ("wraps", "geodesics")),
     ):
-        if value not in known:
-            words = " or ".join(f"'{item}'" for item in known if item is not None)
-            raise SettingError(f"--{word} is {words}, not '{value}'")
+        if value not in choices:
+            allowed = " or ".join(f"'{choice}'" for choice in choices if choice is not None)
+            raise SettingError(f"--{option} is {allowed}, not '{value}'")
     options = ImportOptions(
         # Versions before 3 follow the rules of version 3.
         written_for=None if written_for is None else max(written_for, 3),
@@ -185,8 +185,8 @@ def from_mjcf(
         tendon_paths=tendon_paths,
     )
     draft = start_draft(Path(path), options)
-    for make in PASSES:
-        make(draft)
+    for run_pass in PASSES:
+        run_pass(draft)
     return Osim(
         draft.source.path.stem if name is None else name,
         draft.model,
@@ -199,9 +199,9 @@ def from_mjcf(
 def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
     """Compile a file, and return a draft without components."""
     source = load_mjcf(path)
-    compiled: Any = source.model
-    gravity = [float(value) for value in compiled.opt.gravity]
-    disabled = int(compiled.opt.disableflags)
+    mj_model: Any = source.model
+    gravity = [float(value) for value in mj_model.opt.gravity]
+    disabled = int(mj_model.opt.disableflags)
     if disabled & int(source.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         gravity = [0.0, 0.0, 0.0]
     if options.up == "y":

@@ -68,12 +68,12 @@ class CoordinateMap:
             Values by the names of the coordinates.
         """
         values: dict[str, float] = {}
-        for kind, address, rest, names in self.joints:
+        for joint_type, address, reference, names in self.joints:
             numbers: Sequence[float]
-            if kind == FREE:
+            if joint_type == FREE:
                 rotation = quaternion_matrix(qpos[address + 3 : address + 7])
-                numbers = (*angles_of(rotation @ rest.T), *qpos[address : address + 3])
-            elif kind == BALL:
+                numbers = (*angles_of(rotation @ reference.T), *qpos[address : address + 3])
+            elif joint_type == BALL:
                 numbers = angles_of(quaternion_matrix(qpos[address : address + 4]))
             else:
                 numbers = (qpos[address],)

@@ -103,9 +103,9 @@ class ConversionDraft:
         """Return a legal name that no other component of this kind has."""
         return self.names.setdefault(kind, UniqueNames())(name)
 
-    def translated(self, kind: str, index: int, became: str) -> None:
+    def translated(self, kind: str, index: int, result: str) -> None:
         """Note what an object of MuJoCo became."""
-        self.fidelity.translated[self.source.path_of(kind, index)] = became
+        self.fidelity.translated[self.source.path_of(kind, index)] = result
 
     def record(
         self,
@@ -172,11 +172,11 @@ def angles_of(rotation: Array) -> tuple[float, float, float]:
     Returns:
         The three angles, rad.
     """
-    second = np.arctan2(rotation[0, 2], np.hypot(rotation[0, 0], rotation[0, 1]))
-    third = np.arctan2(-rotation[0, 1], rotation[0, 0])
-    rest = rotation @ rotation_xyz(np.array((0.0, second, third))).T
-    first = np.arctan2(rest[2, 1], rest[1, 1])
-    return vector((first, second, third))
+    y_angle = np.arctan2(rotation[0, 2], np.hypot(rotation[0, 0], rotation[0, 1]))
+    z_angle = np.arctan2(-rotation[0, 1], rotation[0, 0])
+    x_rotation = rotation @ rotation_xyz(np.array((0.0, y_angle, z_angle))).T
+    x_angle = np.arctan2(x_rotation[2, 1], x_rotation[1, 1])
+    return vector((x_angle, y_angle, z_angle))
 
 
 def quaternion_matrix(quaternion: Array) -> Array:

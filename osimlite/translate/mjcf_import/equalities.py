@@ -28,14 +28,14 @@ SOFT = "a soft constraint, which a load opens"
 
 def add_equalities(draft: ConversionDraft) -> None:
     """Add all equality constraints that OpenSim has."""
-    model, kinds = draft.mj, draft.source.mujoco.mjtEq
+    model, equality_types = draft.mj, draft.source.mujoco.mjtEq
     for number in range(model.neq):
-        kind = int(model.eq_type[number])
-        if kind == int(kinds.mjEQ_JOINT):
+        equality_type = int(model.eq_type[number])
+        if equality_type == int(equality_types.mjEQ_JOINT):
             _couple_joints(draft, number)
-        elif kind == int(kinds.mjEQ_CONNECT):
+        elif equality_type == int(equality_types.mjEQ_CONNECT):
             _connect(draft, number)
-        elif kind == int(kinds.mjEQ_WELD):
+        elif equality_type == int(equality_types.mjEQ_WELD):
             _weld(draft, number)
         else:
             draft.drop("equality", number, "an equality of tendons, flexes or distances")
@@ -47,29 +47,29 @@ def shifted_polynomial(draft: ConversionDraft, number: int) -> Polynomial:
     MuJoCo's is q1 - ref1 = sum of c_k (q2 - ref2)^k; this one gives q1 from q2.
     """
     model = draft.mj
-    one, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
-    first = float(model.qpos0[model.jnt_qposadr[one]])
+    first_joint, second_joint = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    first_reference = float(model.qpos0[model.jnt_qposadr[first_joint]])
     coefficients = model.eq_data[number, :5]
     # Without a second joint the first one keeps a value.
-    if other < 0:
-        return Polynomial([first + float(coefficients[0])])
-    second = float(model.qpos0[model.jnt_qposadr[other]])
-    return Polynomial(coefficients)(Polynomial([-second, 1.0])) + first
+    if second_joint < 0:
+        return Polynomial([first_reference + float(coefficients[0])])
+    second_reference = float(model.qpos0[model.jnt_qposadr[second_joint]])
+    return Polynomial(coefficients)(Polynomial([-second_reference, 1.0])) + first_reference
 
 
 def _couple_joints(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
-    one, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
-    dependent = draft.coordinates[one][0]
+    first_joint, second_joint = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    dependent = draft.coordinates[first_joint][0]
     polynomial = shifted_polynomial(draft, number)
     active = bool(model.eq_active0[number])
-    if other < 0:
+    if second_joint < 0:
         coordinate = draft.made[dependent]
         value = float(polynomial.coef[0])
         coordinate.default_value, coordinate.locked = value, active
         # A clamped coordinate needs its default in the range.
-        low, high = coordinate.range
-        coordinate.range = (min(low, value), max(high, value))
+        lower, upper = coordinate.range
+        coordinate.range = (min(lower, value), max(upper, value))
         draft.record("equality", number, SOFT, f"coordinate {dependent} is locked")
         return
     coefficients = tuple(float(value) for value in polynomial.coef[::-1])
@@ -87,7 +87,7 @@ def _couple_joints(draft: ConversionDraft, number: int) -> None:
         CoordinateCouplerConstraint(
             name=name,
             coupled_coordinates_function=function,
-            independent_coordinate_names=(draft.coordinates[other][0],),
+            independent_coordinate_names=(draft.coordinates[second_joint][0],),
             dependent_coordinate_name=dependent,
             isEnforced=active,
         )
@@ -107,19 +107,19 @@ def _frames_of(draft: ConversionDraft, number: int) -> tuple[int, int, bool]:
 
 def _connect(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
-    one, two, sites = _frames_of(draft, number)
+    first, second, are_sites = _frames_of(draft, number)
     # Sites have their points themselves, bodies have them in the data.
-    if sites:
-        points = model.site_pos[one], model.site_pos[two]
-        one, two = int(model.site_bodyid[one]), int(model.site_bodyid[two])
+    if are_sites:
+        points = model.site_pos[first], model.site_pos[second]
+        first, second = int(model.site_bodyid[first]), int(model.site_bodyid[second])
     else:
         points = model.eq_data[number, :3], model.eq_data[number, 3:6]
     name = draft.unique("constraint", draft.source.name_of("equality", number))
     draft.model.add(
         PointConstraint(
             name=name,
-            socket_body_1=draft.frames[one],
-            socket_body_2=draft.frames[two],
+            socket_body_1=draft.frames[first],
+            socket_body_2=draft.frames[second],
             location_body_1=vector(points[0]),
             location_body_2=vector(points[1]),
             isEnforced=bool(model.eq_active0[number]),
@@ -130,32 +130,32 @@ def _connect(draft: ConversionDraft, number: int) -> None:
 
 def _weld(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
-    one, two, sites = _frames_of(draft, number)
-    here, straight = np.zeros(3), np.eye(3)
+    first, second, are_sites = _frames_of(draft, number)
+    origin, identity = np.zeros(3), np.eye(3)
     poses: list[tuple[Array, Array]]
-    if sites:
+    if are_sites:
         poses = [
             (np.array(model.site_pos[site]), quaternion_matrix(model.site_quat[site]))
-            for site in (one, two)
+            for site in (first, second)
         ]
-        one, two = int(model.site_bodyid[one]), int(model.site_bodyid[two])
+        first, second = int(model.site_bodyid[first]), int(model.site_bodyid[second])
     else:
         # The pose of the second body in the first, as MuJoCo stores it.
         relative = quaternion_matrix(model.eq_data[number, 6:10])
-        poses = [(np.array(model.eq_data[number, 3:6]), relative), (here, straight)]
+        poses = [(np.array(model.eq_data[number, 3:6]), relative), (origin, identity)]
         # The anchor is a point of the second body; its place in the first one is in the data.
         anchor = np.array(model.eq_data[number, :3])
-        poses[1] = (anchor, straight)
+        poses[1] = (anchor, identity)
     name = draft.unique("constraint", draft.source.name_of("equality", number))
     frames: list[PhysicalFrame] = [
         PhysicalOffsetFrame(
-            name=f"{draft.frames[body].name}_{word}",
+            name=f"{draft.frames[body].name}_{suffix}",
             socket_parent=draft.frames[body],
             translation=vector(position),
             orientation=angles_of(rotation),
         )
-        for word, body, (position, rotation) in zip(
-            ("first", "second"), (one, two), poses, strict=True
+        for suffix, body, (position, rotation) in zip(
+            ("first", "second"), (first, second), poses, strict=True
         )
     ]
     draft.model.add(

@@ -63,8 +63,8 @@ class Obstacles:
         """Return the surface of a geom."""
         if geom not in self._made:
             draft, mj = self._draft, self._draft.mj
-            kind = ContactCylinder if is_cylinder(draft, geom) else ContactSphere
-            surface = kind(
+            surface_class = ContactCylinder if is_cylinder(draft, geom) else ContactSphere
+            surface = surface_class(
                 name=draft.unique("obstacle", f"{draft.source.name_of('geom', geom)}_obstacle"),
                 radius=float(mj.geom_size[geom, 0]),
                 socket_frame=self._frames[int(mj.geom_bodyid[geom])],
@@ -92,7 +92,7 @@ def find_default_pose(draft: ConversionDraft) -> SampledPoses:
 
 
 def find_hint(
-    draft: ConversionDraft, item: TendonSegment, pose: SampledPoses, version: int
+    draft: ConversionDraft, segment: TendonSegment, pose: SampledPoses, version: int
 ) -> Array | None:
     """Return a point (3,) near the contact of a segment with its geom in the default pose.
 
@@ -101,7 +101,7 @@ def find_hint(
 
     Args:
         draft: the conversion.
-        item: the segment, with a geom.
+        segment: the segment, with a geom.
         pose: the default pose.
         version: version of MuJoCo whose rules hold.
 
@@ -109,37 +109,46 @@ def find_hint(
         The point in the frame of the geom, m; None if an end of the segment is inside of the geom,
         so that no path over the surface exists.
     """
-    radius = float(draft.mj.geom_size[item.geom, 0])
-    turn, middle = pose.turns[0, item.geom], pose.geoms[0, item.geom]
-    one, two = (turn.T @ (pose.sites[0, site] - middle) for site in (item.first, item.second))
-    across = np.array((1.0, 1.0, 0.0 if is_cylinder(draft, item.geom) else 1.0))
-    if min(np.linalg.norm(across * end) for end in (one, two)) < radius + LEAST_CLEARANCE_M:
+    radius = float(draft.mj.geom_size[segment.geom, 0])
+    rotation, center = pose.turns[0, segment.geom], pose.geoms[0, segment.geom]
+    first_point, second_point = (
+        rotation.T @ (pose.sites[0, site] - center) for site in (segment.first, segment.second)
+    )
+    axis_mask = np.array((1.0, 1.0, 0.0 if is_cylinder(draft, segment.geom) else 1.0))
+    if (
+        min(np.linalg.norm(axis_mask * end) for end in (first_point, second_point))
+        < radius + LEAST_CLEARANCE_M
+    ):
         return None
-    side = None
-    if item.side >= 0:
-        side = (turn.T @ (pose.sites[0, item.side] - middle))[None, None]
+    side_site = None
+    if segment.side >= 0:
+        side_site = (rotation.T @ (pose.sites[0, segment.side] - center))[None, None]
     bends = bend_tendon(
-        "cylinder" if across[2] == 0.0 else "sphere",
+        "cylinder" if axis_mask[2] == 0.0 else "sphere",
         np.array([[radius]]),
-        one[None, None],
-        two[None, None],
-        side,
+        first_point[None, None],
+        second_point[None, None],
+        side_site,
         np.arange(1),
         version,
     )
-    way = int(bends.choice[0, 0])
-    if bends.touches[way, 0, 0]:
-        point = 0.5 * (bends.first[way, 0, 0] + bends.second[way, 0, 0])
+    choice = int(bends.choice[0, 0])
+    if bends.touches[choice, 0, 0]:
+        point = 0.5 * (bends.first[choice, 0, 0] + bends.second[choice, 0, 0])
     else:
-        along = across * (two - one)
-        size = float(along @ along)
-        part = 0.5 if size == 0.0 else np.clip(-(across * one) @ along / size, 0.0, 1.0)
-        point = one + part * (two - one)
-    reach = float(np.linalg.norm(across * point))
-    if reach < 1e-9:
+        direction = axis_mask * (second_point - first_point)
+        size = float(direction @ direction)
+        fraction = (
+            0.5 if size == 0.0 else np.clip(-(axis_mask * first_point) @ direction / size, 0.0, 1.0)
+        )
+        point = first_point + fraction * (second_point - first_point)
+    distance = float(np.linalg.norm(axis_mask * point))
+    if distance < 1e-9:
         return None
     # A cylinder keeps the height of the point.
-    return np.asarray(across * point * (radius / reach) + (1.0 - across) * point, dtype=float)
+    return np.asarray(
+        axis_mask * point * (radius / distance) + (1.0 - axis_mask) * point, dtype=float
+    )
 
 
 def make_geodesic_path(
@@ -172,16 +181,16 @@ def make_geodesic_path(
         )
 
     elements: list[Scholz2015GeometryPathElement] = [make_point(segments[0].first, 1)]
-    for number, (item, hint) in enumerate(zip(segments, hints, strict=True), 1):
+    for number, (segment, hint) in enumerate(zip(segments, hints, strict=True), 1):
         if hint is not None:
             elements.append(
                 Scholz2015GeometryPathObstacle(
                     name=f"obstacle_{number}",
-                    socket_contact_geometry=obstacles.get(item.geom),
+                    socket_contact_geometry=obstacles.get(segment.geom),
                     contact_hint=vector(hint),
                 )
             )
-        elements.append(make_point(item.second, number + 1))
+        elements.append(make_point(segment.second, number + 1))
     return Scholz2015GeometryPath(name="path", path_elements=elements)
 
 
@@ -197,32 +206,32 @@ def find_hints(
     model = draft.mj
     ground = draft.model.ground
     hints: list[Array | None] = []
-    for item in segments:
-        owners = [int(model.site_bodyid[site]) for site in (item.first, item.second)]
-        owners += [int(model.geom_bodyid[item.geom])] if item.geom >= 0 else []
+    for segment in segments:
+        owners = [int(model.site_bodyid[site]) for site in (segment.first, segment.second)]
+        owners += [int(model.geom_bodyid[segment.geom])] if segment.geom >= 0 else []
         frames = [draft.frames[body] for body in owners]
         if not all(isinstance(frame, Body) or frame is ground for frame in frames):
             return None
-        if item.geom < 0:
+        if segment.geom < 0:
             hints.append(None)
             continue
-        hint = find_hint(draft, item, pose, version)
+        hint = find_hint(draft, segment, pose, version)
         if hint is None:
             return None
         hints.append(hint)
     return tuple(hints)
 
 
-def measure_clearance(draft: ConversionDraft, item: TendonSegment, poses: SampledPoses) -> float:
+def measure_clearance(draft: ConversionDraft, segment: TendonSegment, poses: SampledPoses) -> float:
     """Return the smallest distance (m) of the ends of a segment from its geom, negative inside."""
-    axis = poses.turns[:, item.geom, :, 2]
+    axis = poses.turns[:, segment.geom, :, 2]
     result = np.inf
-    for site in (item.first, item.second):
-        apart = poses.sites[:, site] - poses.geoms[:, item.geom]
-        if is_cylinder(draft, item.geom):
-            apart = apart - np.einsum("pi,pi->p", apart, axis)[:, None] * axis
-        result = min(result, float(norm(apart).min()))
-    return result - float(draft.mj.geom_size[item.geom, 0])
+    for site in (segment.first, segment.second):
+        offset = poses.sites[:, site] - poses.geoms[:, segment.geom]
+        if is_cylinder(draft, segment.geom):
+            offset = offset - np.einsum("pi,pi->p", offset, axis)[:, None] * axis
+        result = min(result, float(norm(offset).min()))
+    return result - float(draft.mj.geom_size[segment.geom, 0])
 
 
 def select_geodesics(
@@ -269,20 +278,22 @@ def select_geodesics(
             row: hints
             for row, hints in selected.items()
             if all(
-                measure_clearance(draft, item, poses) > 0.0
-                for item in tendons[row].segments
-                if item.geom >= 0
+                measure_clearance(draft, segment, poses) > 0.0
+                for segment in tendons[row].segments
+                if segment.geom >= 0
             )
         }
         if not selected:
             break
         lengths, _, _ = make_bench().measure(poses.qpos)
-        truth = tendon_lengths(draft.source, [tendons[row] for row in selected], poses, version)
+        target_lengths = tendon_lengths(
+            draft.source, [tendons[row] for row in selected], poses, version
+        )
         # A comparison with NaN is False, so that paths without a solution are left out.
-        good = np.all(np.abs(lengths - truth) <= CLOSE_M, axis=1).tolist()
+        is_close = np.all(np.abs(lengths - target_lengths) <= CLOSE_M, axis=1).tolist()
         selected = {
             row: hints
-            for (row, hints), is_good in zip(selected.items(), good, strict=True)
+            for (row, hints), is_good in zip(selected.items(), is_close, strict=True)
             if is_good
         }
     return selected

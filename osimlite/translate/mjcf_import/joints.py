@@ -68,8 +68,8 @@ def group_joints(draft: ConversionDraft, body: int) -> list[JointGroup]:
     hinges: list[int] = []
     first = int(model.body_jntadr[body])
     for joint in range(first, first + int(model.body_jntnum[body])):
-        kind = int(model.jnt_type[joint])
-        if kind in (FREE, BALL):
+        joint_type = int(model.jnt_type[joint])
+        if joint_type in (FREE, BALL):
             # A ball or free joint is a joint of its own.
             if slides or hinges:
                 groups.append(JointGroup(tuple(slides), tuple(hinges)))
@@ -80,7 +80,7 @@ def group_joints(draft: ConversionDraft, body: int) -> list[JointGroup]:
         # hinge needs a new joint.
         fits = (
             not hinges and len(slides) < 3 and _is_independent(model, joint, slides)
-            if kind == SLIDE
+            if joint_type == SLIDE
             else len(hinges) < 3
             and _is_independent(model, joint, hinges)
             and (not hinges or _same_anchor(model, joint, hinges[0]))
@@ -88,7 +88,7 @@ def group_joints(draft: ConversionDraft, body: int) -> list[JointGroup]:
         if not fits:
             groups.append(JointGroup(tuple(slides), tuple(hinges)))
             slides, hinges = [], []
-        (slides if kind == SLIDE else hinges).append(joint)
+        (slides if joint_type == SLIDE else hinges).append(joint)
     if slides or hinges:
         groups.append(JointGroup(tuple(slides), tuple(hinges)))
     return groups
@@ -164,10 +164,10 @@ def _make_custom_joint(draft: ConversionDraft, group: JointGroup, name: str) -> 
     model = draft.mj
     axes: dict[str, TransformAxis] = {}
     coordinates = []
-    for kind, members in (("rotation", group.hinges), ("translation", group.slides)):
+    for motion, members in (("rotation", group.hinges), ("translation", group.slides)):
         directions = _complete_axes([np.array(model.jnt_axis[joint]) for joint in members])
         for number, direction in enumerate(directions):
-            axis = TransformAxis(name=f"{kind}{number + 1}", axis=vector(direction))
+            axis = TransformAxis(name=f"{motion}{number + 1}", axis=vector(direction))
             if number < len(members):
                 joint = members[number]
                 reference = float(model.qpos0[model.jnt_qposadr[joint]])
@@ -184,24 +184,26 @@ def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordi
     """Make the coordinate of a hinge or slide."""
     model = draft.mj
     name = draft.unique("coordinate", draft.source.name_of("joint", joint))
-    rotational = int(model.jnt_type[joint]) == HINGE
-    limited = bool(model.jnt_limited[joint])
-    half = math.pi if rotational else FREE_RANGE_M
-    low, high = map(float, model.jnt_range[joint])
+    is_rotational = int(model.jnt_type[joint]) == HINGE
+    is_limited = bool(model.jnt_limited[joint])
+    half_range = math.pi if is_rotational else FREE_RANGE_M
+    lower, upper = map(float, model.jnt_range[joint])
     # A range that is not set is 0 to 0.
-    if not low < high:
-        low, high = value - half, value + half
-    if not low <= value <= high:
+    if not lower < upper:
+        lower, upper = value - half_range, value + half_range
+    if not lower <= value <= upper:
         # OpenSim moves a default value into the range of a clamped coordinate.
         draft.record(
             "joint",
             joint,
             "a default value outside of the range",
             "the range is widened to contain the default",
-            f"range {low:g} to {high:g}, default {value:g}",
+            f"range {lower:g} to {upper:g}, default {value:g}",
         )
-        low, high = min(low, value), max(high, value)
-    coordinate = Coordinate(name=name, default_value=value, range=(low, high), clamped=limited)
+        lower, upper = min(lower, value), max(upper, value)
+    coordinate = Coordinate(
+        name=name, default_value=value, range=(lower, upper), clamped=is_limited
+    )
     draft.coordinates[joint] = (name,)
     draft.made[name] = coordinate
     draft.translated("joint", joint, f"coordinate {name}")
@@ -213,30 +215,30 @@ def _make_special_joint(
 ) -> CustomJoint:
     """Make a ball or free joint as a CustomJoint of body-fixed X-Y-Z angles."""
     model = draft.mj
-    free = int(model.jnt_type[joint]) == FREE
+    is_free = int(model.jnt_type[joint]) == FREE
     base = draft.source.name_of("joint", joint)
-    words = ("rx", "ry", "rz", "tx", "ty", "tz") if free else ("rx", "ry", "rz")
+    suffixes = ("rx", "ry", "rz", "tx", "ty", "tz") if is_free else ("rx", "ry", "rz")
     values = (0.0, 0.0, 0.0, *map(float, position))
     axes, coordinates = {}, []
-    for number, word in enumerate(words):
-        half = math.pi if number < 3 else FREE_RANGE_M
+    for number, suffix in enumerate(suffixes):
+        half_range = math.pi if number < 3 else FREE_RANGE_M
         value = values[number]
         coordinate = Coordinate(
-            name=draft.unique("coordinate", f"{base}_{word}"),
+            name=draft.unique("coordinate", f"{base}_{suffix}"),
             default_value=value,
-            range=(value - half, value + half),
+            range=(value - half_range, value + half_range),
         )
         coordinates.append(coordinate)
         draft.made[coordinate.name] = coordinate
-        kind = "rotation" if number < 3 else "translation"
-        place = f"{kind}{number % 3 + 1}"
-        axes[place] = TransformAxis(
-            name=place,
+        motion = "rotation" if number < 3 else "translation"
+        axis_name = f"{motion}{number % 3 + 1}"
+        axes[axis_name] = TransformAxis(
+            name=axis_name,
             axis=vector(np.eye(3)[number % 3]),
             coordinates=(coordinate.name,),
             function=LinearFunction(name="function", coefficients=(1.0, 0.0)),
         )
-    draft.coordinates[joint] = tuple(item.name for item in coordinates)
+    draft.coordinates[joint] = tuple(each_coordinate.name for each_coordinate in coordinates)
     draft.translated("joint", joint, f"joint {name}")
     draft.record(
         "joint",
@@ -261,8 +263,8 @@ def _make_joint(
     name: str, coordinates: list[Coordinate], axes: dict[str, TransformAxis]
 ) -> CustomJoint:
     transform = SpatialTransform()
-    for place, axis in axes.items():
-        setattr(transform, place, axis)
+    for axis_name, axis in axes.items():
+        setattr(transform, axis_name, axis)
     return CustomJoint(name=name, coordinates=coordinates, spatial_transform=transform)
 
 
@@ -272,8 +274,8 @@ def add_joint_forces(draft: ConversionDraft) -> None:
     model = draft.mj
     dependent = _find_dependent_joints(draft)
     for joint in range(model.njnt):
-        kind = int(model.jnt_type[joint])
-        if kind in (FREE, BALL):
+        joint_type = int(model.jnt_type[joint])
+        if joint_type in (FREE, BALL):
             _record_special_forces(draft, joint)
             continue
         (name,) = draft.coordinates[joint]
@@ -291,31 +293,31 @@ def add_joint_forces(draft: ConversionDraft) -> None:
         if bool(model.jnt_limited[joint]) and joint not in dependent:
             _add_limit(draft, joint, name)
         if bool(model.jnt_actfrclimited[joint]):
-            low, high = map(float, model.jnt_actfrcrange[joint])
+            lower, upper = map(float, model.jnt_actfrcrange[joint])
             draft.record(
                 "joint",
                 joint,
                 "a limit of the total force of the actuators of a joint",
                 LEFT_OUT,
-                f"{low:g} to {high:g}",
+                f"{lower:g} to {upper:g}",
             )
 
 
 def _add_spring(draft: ConversionDraft, joint: int, name: str) -> None:
     model = draft.mj
     address, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-    stiffness, rest = float(model.jnt_stiffness[joint]), float(model.qpos_spring[address])
+    stiffness, rest_position = float(model.jnt_stiffness[joint]), float(model.qpos_spring[address])
     damping = float(model.dof_damping[dof])
-    springs, dampers = (
+    spring_coefficients, damper_coefficients = (
         _polynomial(model, "jnt_stiffnesspoly", joint),
         _polynomial(model, "dof_dampingpoly", dof),
     )
     # SpringGeneralizedForce has a linear spring and damper, of positive numbers.
-    if any(springs) or any(dampers) or min(stiffness, damping) < 0.0:
+    if any(spring_coefficients) or any(damper_coefficients) or min(stiffness, damping) < 0.0:
         # MuJoCo: force = -x (k + k1 |x| + k2 x^2), and the same for the speed.
-        terms = _force_expression(stiffness, springs, f"(q-({rest!r}))") + _force_expression(
-            damping, dampers, "qdot"
-        )
+        terms = _force_expression(
+            stiffness, spring_coefficients, f"(q-({rest_position!r}))"
+        ) + _force_expression(damping, damper_coefficients, "qdot")
         force = ExpressionBasedCoordinateForce(
             name=draft.unique("force", f"{name}_spring"), coordinate=name, expression=terms
         )
@@ -326,7 +328,7 @@ def _add_spring(draft: ConversionDraft, joint: int, name: str) -> None:
                 name=draft.unique("force", f"{name}_spring"),
                 coordinate=name,
                 stiffness=stiffness,
-                rest_length=rest if stiffness else 0.0,
+                rest_length=rest_position if stiffness else 0.0,
                 viscosity=damping,
             )
         )
@@ -340,10 +342,10 @@ def _polynomial(model: object, name: str, index: int) -> tuple[float, ...]:
     return tuple(float(value) for value in np.atleast_1d(rows[index]))
 
 
-def _force_expression(first: float, higher: tuple[float, ...], x: str) -> str:
+def _force_expression(linear: float, nonlinear: tuple[float, ...], x: str) -> str:
     """Return the formula of -(first x + higher_1 |x| x + higher_2 x^3 ...)."""
     text = ""
-    for power, value in enumerate((first, *higher)):
+    for power, value in enumerate((linear, *nonlinear)):
         if value:
             # Even powers need the absolute value, so that the force always resists.
             size = f"abs({x})" if power % 2 else ""
@@ -361,8 +363,8 @@ def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
     armature = float(model.dof_armature[int(model.jnt_dofadr[joint])])
     if not armature:
         return
-    rotational = int(model.jnt_type[joint]) == HINGE
-    unit = "kg m^2" if rotational else "kg"
+    is_rotational = int(model.jnt_type[joint]) == HINGE
+    unit = "kg m^2" if is_rotational else "kg"
     if draft.options.armature == "none":
         draft.record(
             "joint", joint, "armature", f"{LEFT_OUT}, as requested", f"armature {armature:g} {unit}"
@@ -375,15 +377,17 @@ def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
         inertia=(armature, armature, armature, 0.0, 0.0, 0.0),
     )
     draft.model.add(rotor)
-    turn = Coordinate(
+    rotor_coordinate = Coordinate(
         name=draft.unique("coordinate", f"{name}_rotor"),
         default_value=draft.made[name].default_value,
         range=draft.made[name].range,
         is_free_to_satisfy_constraints=True,
     )
-    draft.made[turn.name] = turn
-    draft.rotors[turn.name] = name
-    pin = PinJoint(name=draft.unique("joint", f"{name}_rotor_joint"), coordinates=[turn])
+    draft.made[rotor_coordinate.name] = rotor_coordinate
+    draft.rotors[rotor_coordinate.name] = name
+    pin = PinJoint(
+        name=draft.unique("joint", f"{name}_rotor_joint"), coordinates=[rotor_coordinate]
+    )
     draft.model.add(pin.between(draft.model.ground, rotor))
     draft.model.add(
         CoordinateCouplerConstraint(
@@ -392,7 +396,7 @@ def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
                 name="coupled_coordinates_function", coefficients=(1.0, 0.0)
             ),
             independent_coordinate_names=(name,),
-            dependent_coordinate_name=turn.name,
+            dependent_coordinate_name=rotor_coordinate.name,
         )
     )
     draft.record(
@@ -407,8 +411,8 @@ def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
 def _add_limit(draft: ConversionDraft, joint: int, name: str) -> None:
     """Add a stiff spring beyond the range of a joint."""
     model = draft.mj
-    low, high = map(float, model.jnt_range[joint])
-    text = f"range {low:g} to {high:g}"
+    lower, upper = map(float, model.jnt_range[joint])
+    text = f"range {lower:g} to {upper:g}"
     if draft.options.limits == "range":
         draft.record(
             "joint", joint, "a soft joint limit", "the range of the coordinate alone", text
@@ -418,22 +422,22 @@ def _add_limit(draft: ConversionDraft, joint: int, name: str) -> None:
     stiffness, damping = compute_softness(
         model.jnt_solref[joint], model.jnt_solimp[joint], float(model.dof_invweight0[dof])
     )
-    rotational = int(model.jnt_type[joint]) == HINGE
+    is_rotational = int(model.jnt_type[joint]) == HINGE
     # CoordinateLimitForce has degrees for rotations.
-    scale = math.pi / 180.0 if rotational else 1.0
+    scale = math.pi / 180.0 if is_rotational else 1.0
     draft.model.add(
         CoordinateLimitForce(
             name=draft.unique("force", f"{name}_limit"),
             coordinate=name,
             upper_stiffness=stiffness * scale,
-            upper_limit=high / scale,
+            upper_limit=upper / scale,
             lower_stiffness=stiffness * scale,
-            lower_limit=low / scale,
+            lower_limit=lower / scale,
             damping=damping * scale,
-            transition=LIMIT_TRANSITION["rotational" if rotational else "translational"],
+            transition=LIMIT_TRANSITION["rotational" if is_rotational else "translational"],
         )
     )
-    units = ("N m/rad", "N m s/rad") if rotational else ("N/m", "N s/m")
+    units = ("N m/rad", "N m s/rad") if is_rotational else ("N/m", "N s/m")
     draft.record(
         "joint",
         joint,
@@ -481,7 +485,7 @@ def _record_special_forces(draft: ConversionDraft, joint: int) -> None:
     first = int(model.jnt_dofadr[joint])
     count = 6 if int(model.jnt_type[joint]) == FREE else 3
     dofs = slice(first, first + count)
-    for what, values in (
+    for quantity, values in (
         ("stiffness", np.atleast_1d(model.jnt_stiffness[joint])),
         ("damping", model.dof_damping[dofs]),
         ("armature", model.dof_armature[dofs]),
@@ -491,32 +495,33 @@ def _record_special_forces(draft: ConversionDraft, joint: int) -> None:
             draft.record(
                 "joint",
                 joint,
-                f"{what} of a ball or free joint",
+                f"{quantity} of a ball or free joint",
                 LEFT_OUT,
-                f"{what} " + " ".join(f"{float(value):g}" for value in dict.fromkeys(values)),
+                f"{quantity} " + " ".join(f"{float(value):g}" for value in dict.fromkeys(values)),
             )
 
 
 def _find_dependent_joints(draft: ConversionDraft) -> set[int]:
     """Return the joints that an active equality determines."""
-    model, kinds = draft.mj, draft.source.mujoco.mjtEq
+    model, equality_types = draft.mj, draft.source.mujoco.mjtEq
     return {
         int(model.eq_obj1id[number])
         for number in range(model.neq)
-        if int(model.eq_type[number]) == int(kinds.mjEQ_JOINT) and model.eq_active0[number]
+        if int(model.eq_type[number]) == int(equality_types.mjEQ_JOINT) and model.eq_active0[number]
     }
 
 
-def _same_anchor(model: object, one: int, other: int) -> bool:
+def _same_anchor(model: object, first: int, second: int) -> bool:
     positions = model.jnt_pos  # type: ignore[attr-defined]
-    return bool(np.linalg.norm(positions[one] - positions[other]) <= SAME_ANCHOR_M)
+    return bool(np.linalg.norm(positions[first] - positions[second]) <= SAME_ANCHOR_M)
 
 
-def _is_independent(model: object, joint: int, others: list[int]) -> bool:
+def _is_independent(model: object, joint: int, other_joints: list[int]) -> bool:
     """Return whether no other axis is parallel to that of a joint."""
     axes = model.jnt_axis  # type: ignore[attr-defined]
     return all(
-        float(np.linalg.norm(np.cross(axes[joint], axes[other]))) > PARALLEL for other in others
+        float(np.linalg.norm(np.cross(axes[joint], axes[other_joint]))) > PARALLEL
+        for other_joint in other_joints
     )
 
 
@@ -528,10 +533,10 @@ def _complete_axes(axes: list[Array]) -> list[Array]:
             result.append(np.array((1.0, 0.0, 0.0)))
         elif len(result) == 1:
             # The basis vector least aligned with the axis keeps the cross product far from zero.
-            smallest = np.eye(3)[int(np.argmin(np.abs(result[0])))]
-            across = np.cross(result[0], smallest)
-            result.append(across / np.linalg.norm(across))
+            basis_vector = np.eye(3)[int(np.argmin(np.abs(result[0])))]
+            perpendicular = np.cross(result[0], basis_vector)
+            result.append(perpendicular / np.linalg.norm(perpendicular))
         else:
-            across = np.cross(result[0], result[1])
-            result.append(across / np.linalg.norm(across))
+            perpendicular = np.cross(result[0], result[1])
+            result.append(perpendicular / np.linalg.norm(perpendicular))
     return result

@@ -14,11 +14,11 @@ def add_keyframes(draft: ConversionDraft) -> None:
     """Write all keyframes into a table, and set the default pose by the one that is asked for."""
     model = draft.mj
     names = [draft.source.name_of("key", key) for key in range(model.nkey)]
-    wanted = draft.options.keyframe
-    if wanted is not None and wanted not in names:
-        known = f"; it has {', '.join(names)}" if names else "; it has no keyframes"
+    requested = draft.options.keyframe
+    if requested is not None and requested not in names:
+        known_names = f"; it has {', '.join(names)}" if names else "; it has no keyframes"
         raise SettingError(
-            f"--keyframe: the file has no keyframe '{wanted}'{suggest_name(wanted, names)}{known}"
+            f"--keyframe: the file has no keyframe '{requested}'{suggest_name(requested, names)}{known_names}"
         )
     if not names:
         return
@@ -37,33 +37,33 @@ def add_keyframes(draft: ConversionDraft) -> None:
     ]
     for key, values in enumerate(rows):
         lines.append("\t".join([str(key), *(repr(values[label]) for label in labels)]))
-        lost = [
-            what
-            for what, numbers in (
+        lost_quantities = [
+            quantity
+            for quantity, numbers in (
                 ("speeds", model.key_qvel[key]),
                 ("activations", model.key_act[key]),
                 ("controls", model.key_ctrl[key]),
             )
             if np.any(numbers)
         ]
-        if lost:
+        if lost_quantities:
             draft.record(
                 "key",
                 key,
-                f"{', '.join(lost)} of a keyframe",
+                f"{', '.join(lost_quantities)} of a keyframe",
                 f"the pose alone, in row {key} of {file}",
             )
         else:
             draft.translated("key", key, f"row {key} of {file}")
     draft.files[file] = "\n".join(lines) + "\n"
-    if wanted is not None:
-        set_default_pose(draft, rows[names.index(wanted)])
+    if requested is not None:
+        set_default_pose(draft, rows[names.index(requested)])
 
 
 def set_default_pose(draft: ConversionDraft, values: dict[str, float]) -> None:
     """Set the default values of coordinates; ranges are widened to contain them."""
     for name, value in values.items():
         coordinate = draft.made[name]
-        low, high = coordinate.range
-        coordinate.range = (min(low, value), max(high, value))
+        lower, upper = coordinate.range
+        coordinate.range = (min(lower, value), max(upper, value))
         coordinate.default_value = value

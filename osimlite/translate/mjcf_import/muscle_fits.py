@@ -64,32 +64,46 @@ class Shape(NamedTuple):
 
     def active(self, x: Array) -> Array:
         """Return the active force at normalized lengths."""
-        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
-        short = x <= 1.0
+        rising_mid, falling_mid = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        is_short = x <= 1.0
         # Widths of 0 give NaN only where another branch is selected.
         with np.errstate(divide="ignore", invalid="ignore"):
-            inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
-            outer = np.where(
-                short, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high)
+            inner_distance = np.where(
+                is_short, (1.0 - x) / (1.0 - rising_mid), (x - 1.0) / (falling_mid - 1.0)
             )
-        force = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
+            outer_distance = np.where(
+                is_short,
+                (x - self.lmin) / (rising_mid - self.lmin),
+                (self.lmax - x) / (self.lmax - falling_mid),
+            )
+        force = np.where(
+            (x < rising_mid) | (x > falling_mid),
+            0.5 * outer_distance**2,
+            1.0 - 0.5 * inner_distance**2,
+        )
         return np.where((x < self.lmin) | (x > self.lmax), 0.0, force)
 
     def velocity(self, v: Array) -> Array:
         """Return the factor of the active force at normalized velocities."""
-        y = self.fvmax - 1.0
-        lengthening = self.fvmax - (y - v) ** 2 / y if y > 0.0 else np.ones_like(v)
+        eccentric_end = self.fvmax - 1.0
+        lengthening = (
+            self.fvmax - (eccentric_end - v) ** 2 / eccentric_end
+            if eccentric_end > 0.0
+            else np.ones_like(v)
+        )
         return np.where(
             v <= -1.0,
             0.0,
-            np.where(v <= 0.0, (v + 1.0) ** 2, np.where(v <= y, lengthening, self.fvmax)),
+            np.where(
+                v <= 0.0, (v + 1.0) ** 2, np.where(v <= eccentric_end, lengthening, self.fvmax)
+            ),
         )
 
     def passive(self, x: Array) -> Array:
         """Return the passive force at normalized lengths."""
         # A parabola up to the end of the width, then a line with the slope that it has there.
-        s = np.maximum((x - self.passive_start) / self.passive_width, 0.0)
-        return np.asarray(self.fpmax * np.where(s <= 1.0, 0.5 * s**2, s - 0.5))
+        stretch = np.maximum((x - self.passive_start) / self.passive_width, 0.0)
+        return np.asarray(self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5))
 
     def formulas(self) -> tuple[str, str, str]:
         """Write the curves as formulas of OpenSim in the variable ``x``.
@@ -97,7 +111,7 @@ class Shape(NamedTuple):
         Returns:
             Active force, passive force and velocity factor.
         """
-        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        rising_mid, falling_mid = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
         y = self.fvmax - 1.0
 
         # `step` of OpenSim's expressions switches between the pieces.
@@ -106,17 +120,17 @@ class Shape(NamedTuple):
 
         active = "+".join(
             (
-                f"{between(self.lmin, low)}*0.5*((x-{_n(self.lmin)})/{_n(low - self.lmin)})^2",
-                f"{between(low, 1.0)}*(1-0.5*((1-x)/{_n(1.0 - low)})^2)",
-                f"{between(1.0, high)}*(1-0.5*((x-1)/{_n(high - 1.0)})^2)",
-                f"{between(high, self.lmax)}*0.5*(({_n(self.lmax)}-x)/{_n(self.lmax - high)})^2",
+                f"{between(self.lmin, rising_mid)}*0.5*((x-{_n(self.lmin)})/{_n(rising_mid - self.lmin)})^2",
+                f"{between(rising_mid, 1.0)}*(1-0.5*((1-x)/{_n(1.0 - rising_mid)})^2)",
+                f"{between(1.0, falling_mid)}*(1-0.5*((x-1)/{_n(falling_mid - 1.0)})^2)",
+                f"{between(falling_mid, self.lmax)}*0.5*(({_n(self.lmax)}-x)/{_n(self.lmax - falling_mid)})^2",
             )
         )
         start, end = self.passive_start, self.passive_start + self.passive_width
-        s = f"((x-{_n(start)})/{_n(self.passive_width)})"
+        stretch = f"((x-{_n(start)})/{_n(self.passive_width)})"
         passive = (
-            f"{between(start, end)}*{_n(0.5 * self.fpmax)}*{s}^2"
-            f"+step(x-{_n(end)})*{_n(self.fpmax)}*({s}-0.5)"
+            f"{between(start, end)}*{_n(0.5 * self.fpmax)}*{stretch}^2"
+            f"+step(x-{_n(end)})*{_n(self.fpmax)}*({stretch}-0.5)"
         )
         velocity = f"{between(-1.0, 0.0)}*(x+1)^2"
         if y > 0.0:
@@ -175,14 +189,14 @@ def fit_curves(shape: Shape, longest: float = 1.0) -> FittedCurves:
         longest: largest normalized length that occurs; the passive curve is fitted up to there.
     """
     # Rounded numbers let muscles of equal shape share a fit.
-    rounded = Shape(*(round(float(value), DIGITS) for value in shape))
+    rounded_shape = Shape(*(round(float(value), DIGITS) for value in shape))
     return FittedCurves(
-        _fit_active(rounded.lmin, rounded.lmax),
-        _fit_velocity(rounded.fvmax),
+        _fit_active(rounded_shape.lmin, rounded_shape.lmax),
+        _fit_velocity(rounded_shape.fvmax),
         _fit_passive(
-            rounded.passive_start,
-            rounded.passive_width,
-            rounded.fpmax,
+            rounded_shape.passive_start,
+            rounded_shape.passive_width,
+            rounded_shape.fpmax,
             round(math.ceil(longest / LENGTH_STEP) * LENGTH_STEP, DIGITS),
         ),
     )
@@ -198,8 +212,8 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
     target = Shape(lmin, lmax, 1.4).active(x)
 
     def properties(p: Array) -> dict[str, float]:
-        shortest, inside, longest, slope = map(float, p)
-        transition = shortest + inside * (1.0 - shortest)
+        shortest, transition_fraction, longest, slope = map(float, p)
+        transition = shortest + transition_fraction * (1.0 - shortest)
         return {
             "min_norm_active_fiber_length": shortest,
             "transition_norm_fiber_length": transition,
@@ -208,7 +222,7 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
             "minimum_value": 0.0,
         }
 
-    least = max(lmin, LEAST_LENGTH)
+    lower_length = max(lmin, LEAST_LENGTH)
     # The bounds keep the properties in the order that the curve requires.
     longest = max(lmax, 1.06)
     return _search(
@@ -222,8 +236,13 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
             "minimum_value": 0.0,
         },
         *(
-            (min(least + 0.1 * (1.0 - least), 0.85), inside, longest, slope)
-            for inside in (0.3, 0.45, 0.6, 0.75, 0.9)
+            (
+                min(lower_length + 0.1 * (1.0 - lower_length), 0.85),
+                transition_fraction,
+                longest,
+                slope,
+            )
+            for transition_fraction in (0.3, 0.45, 0.6, 0.75, 0.9)
             for slope in (0.1, 0.3, 0.5, 0.7)
         ),
         (LEAST_LENGTH, 0.05, 1.06, 0.02),
@@ -233,32 +252,34 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
 
 @lru_cache(maxsize=1024)
 def _fit_velocity(fvmax: float) -> dict[str, float]:
-    most = max(fvmax, LEAST_FVMAX)
+    eccentric_force = max(fvmax, LEAST_FVMAX)
     x = np.linspace(-1.05, 1.05, POINTS)
-    target = Shape(0.5, 1.6, most).velocity(x)
+    target = Shape(0.5, 1.6, eccentric_force).velocity(x)
     # The curve must be steeper at 0 than on average beyond.
-    steep = max(2.0, 2.0 * (most - 1.0))
+    max_slope = max(2.0, 2.0 * (eccentric_force - 1.0))
 
     def properties(p: Array) -> dict[str, float]:
-        near, isometric, eccentric, one, other = map(float, p)
+        near_vmax, isometric_slope, eccentric_slope, concentric_curviness, eccentric_curviness = (
+            map(float, p)
+        )
         return {
             "concentric_slope_at_vmax": 0.0,
-            "concentric_slope_near_vmax": near,
-            "isometric_slope": isometric,
+            "concentric_slope_near_vmax": near_vmax,
+            "isometric_slope": isometric_slope,
             "eccentric_slope_at_vmax": 0.0,
-            "eccentric_slope_near_vmax": eccentric * (most - 1.0),
-            "max_eccentric_velocity_force_multiplier": most,
-            "concentric_curviness": one,
-            "eccentric_curviness": other,
+            "eccentric_slope_near_vmax": eccentric_slope * (eccentric_force - 1.0),
+            "max_eccentric_velocity_force_multiplier": eccentric_force,
+            "concentric_curviness": concentric_curviness,
+            "eccentric_curviness": eccentric_curviness,
         }
 
     return _search(
         properties,
         lambda p: _evaluate(force_velocity(*p.values()), x) - target,
-        properties(np.array((0.25, steep, 0.1, 0.6, 0.9))),
-        (0.25, steep, 0.1, 0.6, 0.9),
+        properties(np.array((0.25, max_slope, 0.1, 0.6, 0.9))),
+        (0.25, max_slope, 0.1, 0.6, 0.9),
         (0.02, 1.02, 1e-3, 0.0, 0.0),
-        (0.95, 6.0 * steep, 0.9, 1.0, 1.0),
+        (0.95, 6.0 * max_slope, 0.9, 1.0, 1.0),
     )
 
 
@@ -268,20 +289,26 @@ def _fit_passive(start: float, width: float, fpmax: float, longest: float) -> di
         # A curve that begins beyond all lengths that occur.
         return {"strain_at_zero_force": 9.0, "strain_at_one_norm_force": 10.0}
     # The length at which the force is 1.
-    one = start + width * (np.sqrt(2.0 / fpmax) if fpmax >= 2.0 else 1.0 / fpmax + 0.5)
-    x = np.linspace(start - 0.1, max(max(one, 1.0) + 0.3 * (one - start), longest), POINTS)
+    length_at_unit_force = start + width * (
+        np.sqrt(2.0 / fpmax) if fpmax >= 2.0 else 1.0 / fpmax + 0.5
+    )
+    x = np.linspace(
+        start - 0.1,
+        max(max(length_at_unit_force, 1.0) + 0.3 * (length_at_unit_force - start), longest),
+        POINTS,
+    )
     target = Shape(0.5, 1.6, 1.4, start, width, fpmax).passive(x)
-    zero = start - 1.0
+    zero_strain = start - 1.0
 
     def properties(p: Array) -> dict[str, float]:
-        first, last, low, stiffness, curviness = map(float, p)
-        lower = zero + first * (one - start)
-        upper = one - 1.0 + last * (one - start)
+        first, last, low_stiffness, stiffness, curviness = map(float, p)
+        lower = zero_strain + first * (length_at_unit_force - start)
+        upper = length_at_unit_force - 1.0 + last * (length_at_unit_force - start)
         mean = 1.0 / (upper - lower)
         return {
             "strain_at_zero_force": lower,
             "strain_at_one_norm_force": upper,
-            "stiffness_at_low_force": low * mean,
+            "stiffness_at_low_force": low_stiffness * mean,
             "stiffness_at_one_norm_force": stiffness * mean,
             "curviness": curviness,
         }
@@ -289,7 +316,10 @@ def _fit_passive(start: float, width: float, fpmax: float, longest: float) -> di
     return _search(
         properties,
         lambda p: _evaluate(fiber_force_length(*p.values()), x) - target,
-        {"strain_at_zero_force": zero, "strain_at_one_norm_force": one - 1.0},
+        {
+            "strain_at_zero_force": zero_strain,
+            "strain_at_one_norm_force": length_at_unit_force - 1.0,
+        },
         (0.0, 0.0, 0.2, 2.0, 0.75),
         (-0.3, -0.2, 0.01, 1.05, 0.0),
         (0.3, 0.2, 0.95, 6.0, 1.0),
@@ -310,7 +340,7 @@ def _search(
         fallback: properties of a curve that exists, for the case that none is found.
         *numbers: numbers to start from, once or several times, then the bounds of the numbers.
     """
-    *starts, low, high = numbers
+    *starts, lower, upper = numbers
     optimize: Any = require("scipy.optimize", extra="sim", purpose="the fit of muscle curves")
 
     def errors(p: Array) -> Array:
@@ -321,20 +351,22 @@ def _search(
             return np.full(POINTS, NO_CURVE)
 
     # Starts at a bound would have no gradient.
-    begins = [np.clip(start, np.array(low) + 1e-3, np.array(high) - 1e-3) for start in starts]
-    begins.sort(key=lambda p: float(np.sum(np.square(errors(p)))))
+    initial_points = [
+        np.clip(start, np.array(lower) + 1e-3, np.array(upper) - 1e-3) for start in starts
+    ]
+    initial_points.sort(key=lambda p: float(np.sum(np.square(errors(p)))))
     solutions = [
         optimize.least_squares(
             errors,
             start,
-            bounds=(low, high),
-            x_scale=np.ptp((low, high), axis=0),
+            bounds=(lower, upper),
+            x_scale=np.ptp((lower, upper), axis=0),
             ftol=CLOSE,
             xtol=CLOSE,
         )
-        for start in begins[:SEARCHES]
+        for start in initial_points[:SEARCHES]
     ]
-    best = min(solutions, key=lambda item: float(item.cost))
+    best = min(solutions, key=lambda solution: float(solution.cost))
     if float(best.cost) >= 0.5 * POINTS * NO_CURVE**2:
         return fallback
     return properties(best.x)

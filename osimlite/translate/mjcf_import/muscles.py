@@ -76,12 +76,12 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     """
     model = draft.mj
     gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
-    low, high = map(float, model.actuator_lengthrange[actuator])
+    shortest, longest = map(float, model.actuator_lengthrange[actuator])
 
     def lengths(numbers: Array) -> tuple[float, float]:
         # Two lengths of the path, at both ends of the normalized range, give fiber and tendon.
-        fiber = (high - low) / (float(numbers[1]) - float(numbers[0]))
-        return fiber, low - float(numbers[0]) * fiber
+        fiber = (longest - shortest) / (float(numbers[1]) - float(numbers[0]))
+        return fiber, shortest - float(numbers[0]) * fiber
 
     def strength(numbers: Array) -> float:
         force = float(numbers[2])
@@ -92,14 +92,14 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     # Active and passive curves may be scaled differently.
     passive_fiber, passive_slack = lengths(bias)
     force = strength(gain)
-    middle = 0.5 * (1.0 + float(bias[5]))
+    passive_middle = 0.5 * (1.0 + float(bias[5]))
     start = (passive_slack + passive_fiber - slack) / fiber
     shape = Shape(
         float(gain[4]),
         float(gain[5]),
         float(gain[8]),
         start,
-        (middle - 1.0) * passive_fiber / fiber,
+        (passive_middle - 1.0) * passive_fiber / fiber,
         float(bias[7]) * strength(bias) / force if force else 0.0,
     )
     return MuscleData(force * gear, fiber / gear, slack / gear + shift, float(gain[6]), shape)
@@ -150,14 +150,16 @@ def make_muscle(
         detail = f"; its tendon slack length of {data.slack:.4g} m is now part of the fiber"
         data = data.with_slack(LEAST_SLACK_M)
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
-    lags = int(model.actuator_dyntype[actuator]) == int(draft.source.mujoco.mjtDyn.mjDYN_MUSCLE)
+    has_activation = int(model.actuator_dyntype[actuator]) == int(
+        draft.source.mujoco.mjtDyn.mjDYN_MUSCLE
+    )
     limits = (0.0, 1.0)
     if model.actuator_ctrllimited[actuator]:
-        low, high = map(float, model.actuator_ctrlrange[actuator])
+        lower, upper = map(float, model.actuator_ctrlrange[actuator])
         # OpenSim's muscles have controls from 0 to 1.
-        limits = max(low, 0.0), min(high, 1.0)
+        limits = max(lower, 0.0), min(upper, 1.0)
     if draft.options.muscle == "exact":
-        return _make_exact(draft, actuator, name, path, data, lags, limits, detail)
+        return _make_exact(draft, actuator, name, path, data, has_activation, limits, detail)
     # Polynomial paths can have odd lengths in single poses, which must not decide.
     longest = float(np.quantile(lengths, LONGEST_QUANTILE) - data.slack) / data.fiber
     curves = fit_curves(data.shape, min(longest, MOST_LENGTH))
@@ -171,7 +173,7 @@ def make_muscle(
         pennation_angle_at_optimal=0.0,
         max_contraction_velocity=data.vmax,
         ignore_tendon_compliance=True,
-        ignore_activation_dynamics=not lags,
+        ignore_activation_dynamics=not has_activation,
         min_control=limits[0],
         max_control=limits[1],
         fiber_damping=0.0,
@@ -182,7 +184,7 @@ def make_muscle(
         force_velocity_curve=velocity,
         fiber_force_length_curve=passive,
     )
-    if lags:
+    if has_activation:
         muscle.activation_time_constant = float(model.actuator_dynprm[actuator, 0])
         muscle.deactivation_time_constant = float(model.actuator_dynprm[actuator, 1])
     draft.record(
@@ -196,17 +198,17 @@ def make_muscle(
             **_curve_errors(data.shape, curves),
         },
     )
-    _record_dynamics(draft, actuator, lags)
+    _record_dynamics(draft, actuator, has_activation)
     return muscle
 
 
 def _curve_errors(shape: Shape, curves: FittedCurves) -> dict[str, Error]:
-    x, v = np.linspace(0.5, 1.5, 101), np.linspace(-1.0, 1.0, 101)
-    active, passive, velocity = curves.evaluate(x, v)
+    lengths, velocities = np.linspace(0.5, 1.5, 101), np.linspace(-1.0, 1.0, 101)
+    active, passive, velocity = curves.evaluate(lengths, velocities)
     return {
-        "active force-length": Error.measure(active - shape.active(x), "F0"),
-        "passive force-length": Error.measure(passive - shape.passive(x), "F0"),
-        "force-velocity": Error.measure(velocity - shape.velocity(v), "F0"),
+        "active force-length": Error.measure(active - shape.active(lengths), "F0"),
+        "passive force-length": Error.measure(passive - shape.passive(lengths), "F0"),
+        "force-velocity": Error.measure(velocity - shape.velocity(velocities), "F0"),
     }
 
 
@@ -215,9 +217,9 @@ def _compare(data: MuscleData, curves: FittedCurves, lengths: Array) -> Array:
     speeds = np.array(SPEEDS)
     active, passive, velocity = curves.evaluate((lengths - data.slack) / data.fiber, speeds)
     # Tension over the isometric force, in rows of speeds.
-    ours = active * velocity[:, None] + passive
-    theirs = [data.tension(lengths, speed, 1.0) / data.force for speed in SPEEDS]
-    return (ours - np.array(theirs)).ravel()
+    fitted_tensions = active * velocity[:, None] + passive
+    exact_tensions = [data.tension(lengths, speed, 1.0) / data.force for speed in SPEEDS]
+    return (fitted_tensions - np.array(exact_tensions)).ravel()
 
 
 def _make_exact(
@@ -226,14 +228,14 @@ def _make_exact(
     name: str,
     path: TendonPath,
     data: MuscleData,
-    lags: bool,
+    has_activation: bool,
     limits: tuple[float, float],
     detail: str,
 ) -> RigidTendonMuscle:
     """Make a muscle with MuJoCo's curves as formulas."""
     curves = [
-        ExpressionBasedFunction(name=word, expression=formula, variables=("x",))
-        for word, formula in zip(
+        ExpressionBasedFunction(name=curve_name, expression=formula, variables=("x",))
+        for curve_name, formula in zip(
             ("active_force_length_curve", "passive_force_length_curve", "force_velocity_curve"),
             data.shape.formulas(),
             strict=True,
@@ -253,14 +255,14 @@ def _make_exact(
         passive_force_length_curve=curves[1],
         force_velocity_curve=curves[2],
     )
-    if lags:
-        first, second = map(float, model_times(draft, actuator))
+    if has_activation:
+        activation_time, deactivation_time = map(float, model_times(draft, actuator))
         draft.record(
             "actuator",
             actuator,
             "activation dynamics beside MuJoCo's own curves",
             "a RigidTendonMuscle with MuJoCo's curves as formulas: its control is the activation",
-            f"time constants {first:g} and {second:g} s{detail}",
+            f"time constants {activation_time:g} and {deactivation_time:g} s{detail}",
         )
     else:
         draft.translated("actuator", actuator, f"muscle {name}")
@@ -279,9 +281,9 @@ def model_times(draft: ConversionDraft, actuator: int) -> Array:
     return np.array(draft.mj.actuator_dynprm[actuator, :2])
 
 
-def _record_dynamics(draft: ConversionDraft, actuator: int, lags: bool) -> None:
+def _record_dynamics(draft: ConversionDraft, actuator: int, has_activation: bool) -> None:
     model = draft.mj
-    if lags and model.actuator_dynprm[actuator, 2]:
+    if has_activation and model.actuator_dynprm[actuator, 2]:
         draft.record(
             "actuator",
             actuator,
@@ -289,7 +291,7 @@ def _record_dynamics(draft: ConversionDraft, actuator: int, lags: bool) -> None:
             "a change at once",
             f"width {float(model.actuator_dynprm[actuator, 2]):g}",
         )
-    if not lags and int(model.actuator_dyntype[actuator]):
+    if not has_activation and int(model.actuator_dyntype[actuator]):
         draft.record(
             "actuator", actuator, "activation dynamics other than a muscle's", "none at all"
         )

@@ -36,9 +36,9 @@ class Bench:
         self.frames: list[PhysicalFrame] = []
         for frame in draft.frames:
             path = draft.model.tree().path_of(frame)
-            found = self.model.find(path or "/ground")
-            assert isinstance(found, PhysicalFrame)
-            self.frames.append(found)
+            frame_copy = self.model.find(path or "/ground")
+            assert isinstance(frame_copy, PhysicalFrame)
+            self.frames.append(frame_copy)
         self._count = 0
 
     def add(self, path: AbstractGeometryPath) -> int:
@@ -72,11 +72,13 @@ class Bench:
         paths = Paths(self.model)
         names = list(paths.mechanism.coordinate_names)
         values = np.array([self._row(names, pose) for pose in qpos])
-        wanted = [paths.names.index(f"/forceset/candidate_{k}") for k in range(self._count)]
-        lengths = paths.system.measure_poses(values).T[wanted]
+        candidate_rows = [paths.names.index(f"/forceset/candidate_{k}") for k in range(self._count)]
+        lengths = paths.system.measure_poses(values).T[candidate_rows]
         if not arms:
             return lengths, np.empty(0), names
-        moment_arms = np.nan_to_num(paths.compute_moment_arms(values)).swapaxes(0, 1)[wanted]
+        moment_arms = np.nan_to_num(paths.compute_moment_arms(values)).swapaxes(0, 1)[
+            candidate_rows
+        ]
         return lengths, moment_arms, names
 
     def _row(self, names: Sequence[str], qpos: Array) -> list[float]:

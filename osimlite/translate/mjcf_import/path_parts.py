@@ -48,9 +48,9 @@ class Surfaces:
     """
 
     def __init__(
-        self, draft: ConversionDraft, frames: list[PhysicalFrame], reach: dict[int, float]
+        self, draft: ConversionDraft, frames: list[PhysicalFrame], max_heights: dict[int, float]
     ) -> None:
-        self._draft, self._frames, self._reach = draft, frames, reach
+        self._draft, self._frames, self._reach = draft, frames, max_heights
         self._made: dict[WrapKey, str] = {}
         self._names: set[str] = set()
 
@@ -70,10 +70,12 @@ class Surfaces:
         radius = float(model.geom_size[key.geom, 0])
         surface: WrapObject
         if int(model.geom_type[key.geom]) == 5:
-            drawn = 2.0 * float(model.geom_size[key.geom, 1])
+            drawn_length = 2.0 * float(model.geom_size[key.geom, 1])
             # Cylinders of MuJoCo have no ends, so that theirs must be beyond all paths.
-            needed = 2.0 * self._reach.get(key.geom, 0.0) + CYLINDER_MARGIN_M
-            surface = WrapCylinder(name=name, radius=radius, length=max(drawn, needed))
+            needed_length = 2.0 * self._reach.get(key.geom, 0.0) + CYLINDER_MARGIN_M
+            surface = WrapCylinder(
+                name=name, radius=radius, length=max(drawn_length, needed_length)
+            )
         else:
             surface = WrapSphere(name=name, radius=radius)
         rotation = quaternion_matrix(model.geom_quat[key.geom])
@@ -98,20 +100,20 @@ def turn_to_side(draft: ConversionDraft, key: WrapKey) -> Array:
     # Kinematics alone: no forces are needed for places.
     data = source.mujoco.MjData(model)
     source.mujoco.mj_kinematics(model, data)
-    turned = data.geom_xmat[key.geom].reshape(3, 3)
-    side = turned.T @ (data.site_xpos[key.side] - data.geom_xpos[key.geom])
+    geom_rotation = data.geom_xmat[key.geom].reshape(3, 3)
+    side_direction = geom_rotation.T @ (data.site_xpos[key.side] - data.geom_xpos[key.geom])
     # Across the axis of the cylinder.
     if int(model.geom_type[key.geom]) == 5:
-        side = np.array((side[0], side[1], 0.0))
-        up = np.array((0.0, 0.0, 1.0))
+        side_direction = np.array((side_direction[0], side_direction[1], 0.0))
+        reference = np.array((0.0, 0.0, 1.0))
     else:
-        up = np.eye(3)[int(np.argmin(np.abs(side)))]
-    length = np.linalg.norm(side)
+        reference = np.eye(3)[int(np.argmin(np.abs(side_direction)))]
+    length = np.linalg.norm(side_direction)
     # A side site in the middle gives no direction.
     if length < 1e-12:
         return np.eye(3)
-    x = side / length
-    y = np.cross(up, x)
+    x = side_direction / length
+    y = np.cross(reference, x)
     y /= np.linalg.norm(y)
     return np.column_stack((x, y, np.cross(x, y)))
 
@@ -134,16 +136,16 @@ def make_geometry_path(
             site, None not at all.
     """
     model = draft.mj
-    sites = [segments[0].first, *(item.second for item in segments)]
-    used: set[str] = set()
+    sites = [segments[0].first, *(segment.second for segment in segments)]
+    used_names: set[str] = set()
     points: list[AbstractPathPoint] = []
     for number, site in enumerate(sites):
         name = draft.source.name_of("site", site)
         # Names of path points have a limited set of characters.
         name = "".join(letter if letter.isalnum() or letter in "_.-" else "_" for letter in name)
-        if name in used:
+        if name in used_names:
             name = f"{name}_{number + 1}"
-        used.add(name)
+        used_names.add(name)
         points.append(
             PathPoint(
                 name=name,
@@ -152,10 +154,10 @@ def make_geometry_path(
             )
         )
     wraps = []
-    for number, (item, quadrant) in enumerate(zip(segments, quadrants, strict=True), 1):
-        if quadrant is None or item.geom < 0:
+    for number, (segment, quadrant) in enumerate(zip(segments, quadrants, strict=True), 1):
+        if quadrant is None or segment.geom < 0:
             continue
-        key = WrapKey(item.geom, item.side if quadrant == "+x" else -1)
+        key = WrapKey(segment.geom, segment.side if quadrant == "+x" else -1)
         wraps.append(
             PathWrap(
                 name=f"pathwrap_{number}",

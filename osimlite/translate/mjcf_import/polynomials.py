@@ -29,13 +29,13 @@ def list_exponents(count: int, order: int) -> NDArray[np.int64]:
     The last exponent changes first: 1, y, y^2, x, x y, x^2 for two arguments and order 2.
     """
 
-    def rows(left: int, most: int) -> Iterator[tuple[int, ...]]:
-        if not left:
+    def rows(remaining: int, max_order: int) -> Iterator[tuple[int, ...]]:
+        if not remaining:
             yield ()
             return
-        for power in range(most + 1):
-            for rest in rows(left - 1, most - power):
-                yield (power, *rest)
+        for power in range(max_order + 1):
+            for other_exponents in rows(remaining - 1, max_order - power):
+                yield (power, *other_exponents)
 
     return np.array(list(rows(count, order)), dtype=np.int64).reshape(-1, count)
 
@@ -44,10 +44,10 @@ def evaluate_terms(values: Array, exponents: NDArray[np.int64]) -> Array:
     """Return the terms (P, k) at values (P, n)."""
     order = int(exponents.max(initial=0))
     # Powers are computed once, and multiplied for all terms.
-    powers = values[:, None, :] ** np.arange(order + 1)[None, :, None]
+    value_powers = values[:, None, :] ** np.arange(order + 1)[None, :, None]
     result = np.ones((len(values), len(exponents)))
     for column in range(values.shape[1]):
-        result *= powers[:, exponents[:, column], column]
+        result *= value_powers[:, exponents[:, column], column]
     return result
 
 
@@ -66,7 +66,7 @@ def samples_for(count: int) -> int:
 
 
 def fit_polynomial(
-    values: Array, lengths: Array, checks: Array, expected: Array
+    values: Array, lengths: Array, checks: Array, check_lengths: Array
 ) -> tuple[MultivariatePolynomialFunction, Array]:
     """Return the polynomial of the lowest order that is near the best in other poses.
 
@@ -74,7 +74,7 @@ def fit_polynomial(
         values: values of the coordinates (P, n) in the poses of the fit.
         lengths: lengths (P,) in these poses, m.
         checks: values (Q, n) in other poses.
-        expected: lengths (Q,) in these.
+        check_lengths: lengths (Q,) in these.
 
     Returns:
         The function, and its errors (Q,) in the other poses, m.
@@ -104,7 +104,7 @@ def fit_polynomial(
             break
         solution = np.linalg.lstsq(r[:size, :size], projected[:size], rcond=SINGULAR)[0]
         solution = solution / scale[:size]
-        errors = check_terms[:, :size] @ solution - expected
+        errors = check_terms[:, :size] @ solution - check_lengths
         rms = float(np.sqrt(np.mean(errors**2)))
         # A higher order must be clearly better, since it swings between the samples.
         if best is None or rms < GAIN * best[0]:
@@ -114,11 +114,11 @@ def fit_polynomial(
     assert best is not None
     _, order, solution, errors = best
     # OpenSim has another order of terms.
-    found = dict(zip(map(tuple, exponents[: len(solution)].tolist()), solution, strict=True))
+    coefficients = dict(zip(map(tuple, exponents[: len(solution)].tolist()), solution, strict=True))
     function = MultivariatePolynomialFunction(
         name="length_function",
         coefficients=tuple(
-            float(found[tuple(row)]) for row in list_exponents(count, order).tolist()
+            float(coefficients[tuple(row)]) for row in list_exponents(count, order).tolist()
         ),
         dimension=count,
         order=order,

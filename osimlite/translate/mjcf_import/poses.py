@@ -39,42 +39,44 @@ def sample_qpos(source: MjcfSource, count: int, seed: int) -> Array:
     world; the angle of ball joints is up to 1 rad.
     """
     model = source.model
-    random = np.random.default_rng(seed)
+    generator = np.random.default_rng(seed)
     qpos = np.tile(model.qpos0, (count, 1))
     for joint in range(model.njnt):
-        kind, address = int(model.jnt_type[joint]), int(model.jnt_qposadr[joint])
-        if kind == FREE:
+        joint_type, address = int(model.jnt_type[joint]), int(model.jnt_qposadr[joint])
+        if joint_type == FREE:
             continue
-        if kind == BALL:
-            axes = random.normal(size=(count, 3))
+        if joint_type == BALL:
+            axes = generator.normal(size=(count, 3))
             axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-            half = 0.5 * random.uniform(0.0, 1.0, (count, 1))
-            qpos[:, address : address + 4] = np.hstack((np.cos(half), np.sin(half) * axes))
+            half_angle = 0.5 * generator.uniform(0.0, 1.0, (count, 1))
+            qpos[:, address : address + 4] = np.hstack(
+                (np.cos(half_angle), np.sin(half_angle) * axes)
+            )
             continue
-        low, high = map(float, model.jnt_range[joint])
-        if not low < high:
-            half_range = UNLIMITED["hinge" if kind == HINGE else "slide"]
-            low, high = (float(model.qpos0[address]) + sign * half_range for sign in (-1.0, 1.0))
-        qpos[:, address] = random.uniform(low, high, count)
+        lower, upper = map(float, model.jnt_range[joint])
+        if not lower < upper:
+            half_range = UNLIMITED["hinge" if joint_type == HINGE else "slide"]
+            lower, upper = (float(model.qpos0[address]) + sign * half_range for sign in (-1.0, 1.0))
+        qpos[:, address] = generator.uniform(lower, upper, count)
     satisfy_equalities(source, qpos)
     return qpos
 
 
 def satisfy_equalities(source: MjcfSource, qpos: Array) -> None:
     """Set the joints that active equalities determine, in positions (P, nq)."""
-    model, kinds = source.model, source.mujoco.mjtEq
+    model, equality_types = source.model, source.mujoco.mjtEq
     followers = [
         number
         for number in range(model.neq)
-        if int(model.eq_type[number]) == int(kinds.mjEQ_JOINT) and model.eq_active0[number]
+        if int(model.eq_type[number]) == int(equality_types.mjEQ_JOINT) and model.eq_active0[number]
     ]
     for _ in range(EQUALITY_ROUNDS if followers else 0):
         for number in followers:
-            one, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
-            address = int(model.jnt_qposadr[one])
+            first_joint, second_joint = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+            address = int(model.jnt_qposadr[first_joint])
             argument = np.zeros(len(qpos))
-            if other >= 0:
-                leader = int(model.jnt_qposadr[other])
+            if second_joint >= 0:
+                leader = int(model.jnt_qposadr[second_joint])
                 argument = qpos[:, leader] - model.qpos0[leader]
             value = np.polynomial.polynomial.polyval(argument, model.eq_data[number, :5])
             qpos[:, address] = model.qpos0[address] + value
@@ -87,10 +89,10 @@ def place(source: MjcfSource, qpos: Array) -> SampledPoses:
     count = len(qpos)
     sites = np.empty((count, model.nsite, 3))
     geoms = np.empty((count, model.ngeom, 3))
-    turns = np.empty((count, model.ngeom, 3, 3))
+    rotations = np.empty((count, model.ngeom, 3, 3))
     for row, values in enumerate(qpos):
         data.qpos[:] = values
         mujoco.mj_kinematics(model, data)
         sites[row], geoms[row] = data.site_xpos, data.geom_xpos
-        turns[row] = data.geom_xmat.reshape(-1, 3, 3)
-    return SampledPoses(qpos, sites, geoms, turns)
+        rotations[row] = data.geom_xmat.reshape(-1, 3, 3)
+    return SampledPoses(qpos, sites, geoms, rotations)

@@ -99,24 +99,24 @@ def _make_parts(draft: ConversionDraft, geom: int) -> list[_Part] | None:
     """Make the shapes of a geom; None if it has none, which is recorded."""
     model = draft.mj
     size = [float(value) for value in model.geom_size[geom]]
-    kind = int(model.geom_type[geom])
-    here, straight = np.zeros(3), np.eye(3)
-    if kind == SPHERE:
-        return [_Part(Sphere(radius=size[0]), here, straight)]
-    if kind == ELLIPSOID:
-        return [_Part(Ellipsoid(radii=(size[0], size[1], size[2])), here, straight)]
-    if kind == BOX:
-        return [_Part(Brick(half_lengths=(size[0], size[1], size[2])), here, straight)]
-    if kind in (CYLINDER, CAPSULE):
-        parts = [_Part(Cylinder(radius=size[0], half_height=size[1]), here, Z_TO_Y)]
-        if kind == CAPSULE:
+    geom_type = int(model.geom_type[geom])
+    origin, identity = np.zeros(3), np.eye(3)
+    if geom_type == SPHERE:
+        return [_Part(Sphere(radius=size[0]), origin, identity)]
+    if geom_type == ELLIPSOID:
+        return [_Part(Ellipsoid(radii=(size[0], size[1], size[2])), origin, identity)]
+    if geom_type == BOX:
+        return [_Part(Brick(half_lengths=(size[0], size[1], size[2])), origin, identity)]
+    if geom_type in (CYLINDER, CAPSULE):
+        parts = [_Part(Cylinder(radius=size[0], half_height=size[1]), origin, Z_TO_Y)]
+        if geom_type == CAPSULE:
             for end in (-size[1], size[1]):
-                parts.append(_Part(Sphere(radius=size[0]), np.array((0.0, 0.0, end)), straight))
+                parts.append(_Part(Sphere(radius=size[0]), np.array((0.0, 0.0, end)), identity))
         return parts
-    if kind in (MESH, SDF) and int(model.geom_dataid[geom]) >= 0:
+    if geom_type in (MESH, SDF) and int(model.geom_dataid[geom]) >= 0:
         file = write_mesh(draft, int(model.geom_dataid[geom]))
-        return [_Part(Mesh(mesh_file=file.rpartition("/")[2]), here, straight)]
-    if kind == PLANE:
+        return [_Part(Mesh(mesh_file=file.rpartition("/")[2]), origin, identity)]
+    if geom_type == PLANE:
         # A plane is endless; contact surfaces show it.
         draft.translated("geom", geom, "not drawn: a plane")
         return None
@@ -152,7 +152,7 @@ def write_mesh(draft: ConversionDraft, mesh: int) -> str:
 def record_unseen(draft: ConversionDraft) -> None:
     """Record what a viewer of MuJoCo shows, or a program reads, and OpenSim does not have."""
     model = draft.mj
-    for kind, count, what in (
+    for kind, count, description in (
         ("camera", model.ncam, "a camera"),
         ("light", model.nlight, "a light"),
         ("sensor", model.nsensor, "a sensor"),
@@ -166,12 +166,12 @@ def record_unseen(draft: ConversionDraft) -> None:
         ("tuple", model.ntuple, "a tuple for programs"),
     ):
         for index in range(int(count)):
-            draft.drop(kind, index, what)
+            draft.drop(kind, index, description)
     option = model.opt
-    for what, value in (
+    for description, value in (
         ("wind", option.wind),
         ("the density of a fluid", option.density),
         ("the viscosity of a fluid", option.viscosity),
     ):
         if np.any(value):
-            draft.fidelity.add("option", "/option", what, LEFT_OUT, f"{value}")
+            draft.fidelity.add("option", "/option", description, LEFT_OUT, f"{value}")

@@ -126,9 +126,9 @@ def _require_plausible_numbers(path: Path, model: Any) -> None:
                 f"{LARGEST_NUMBER:g}",
                 file=str(path),
             )
-    straight = np.asarray(model.jnt_type) >= 2  # slides and hinges
+    has_axis = np.asarray(model.jnt_type) >= 2  # slides and hinges
     lengths = np.linalg.norm(np.asarray(model.jnt_axis), axis=1)
-    if np.any(np.abs(lengths[straight] - 1.0) > AXIS_TOLERANCE):
+    if np.any(np.abs(lengths[has_axis] - 1.0) > AXIS_TOLERANCE):
         raise DocumentError("a joint has an axis without a direction", file=str(path))
 
 
@@ -146,7 +146,7 @@ def _try_in_another_process(path: Path) -> None:
     environment = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONIOENCODING": "utf-8"}
     try:
         with TemporaryDirectory() as folder:
-            done = subprocess.run(
+            completed = subprocess.run(
                 [sys.executable, "-c", code, str(path.absolute())],
                 capture_output=True,
                 timeout=TRIAL_SECONDS,
@@ -158,12 +158,13 @@ def _try_in_another_process(path: Path) -> None:
         raise DocumentError(
             f"MuJoCo did not compile the file within {TRIAL_SECONDS} s", file=str(path)
         ) from error
-    if done.returncode == 3:
-        text = done.stderr.decode("utf-8", "replace")
+    if completed.returncode == 3:
+        text = completed.stderr.decode("utf-8", "replace")
         raise _explain_failure(path, text.rpartition("MJCF:")[2])
-    if done.returncode < 0:
+    if completed.returncode < 0:
         raise DocumentError(
-            f"MuJoCo crashed while it compiled the file (signal {-done.returncode})", file=str(path)
+            f"MuJoCo crashed while it compiled the file (signal {-completed.returncode})",
+            file=str(path),
         )
 
 

@@ -65,14 +65,14 @@ def read_tendon(source: MjcfSource, index: int) -> Tendon:
     divisor, has_pulley = 1.0, False
     last, geom, side = -1, -1, -1
     for part in parts:
-        kind, number = int(model.wrap_type[part]), int(model.wrap_objid[part])
+        part_type, number = int(model.wrap_type[part]), int(model.wrap_objid[part])
         value = float(model.wrap_prm[part])
-        if kind == JOINT:
+        if part_type == JOINT:
             joints.append((number, value))
         # A pulley ends a branch: the next site begins a new one.
-        elif kind == PULLEY:
+        elif part_type == PULLEY:
             divisor, last, geom, has_pulley = value, -1, -1, True
-        elif kind == SITE:
+        elif part_type == SITE:
             if last >= 0:
                 # A geom between two sites belongs to the segment that the second one ends.
                 segments.append(TendonSegment(last, number, geom, side, divisor))
@@ -99,44 +99,56 @@ def segment_lengths(
         Lengths (S, P), m, and the parts of them on a surface (S, P), m.
     """
     model = source.model
-    first = poses.sites[:, [item.first for item in segments]]
-    second = poses.sites[:, [item.second for item in segments]]
+    first = poses.sites[:, [segment.first for segment in segments]]
+    second = poses.sites[:, [segment.second for segment in segments]]
     lengths = norm(second - first).T.copy()
-    touching = np.zeros_like(lengths)
+    contact_lengths = np.zeros_like(lengths)
     # Segments of one kind are computed in one call.
     groups: dict[tuple[str, bool], list[int]] = {}
-    for number, item in enumerate(segments):
-        if item.geom >= 0:
-            kind = "cylinder" if int(model.geom_type[item.geom]) == 5 else "sphere"
-            groups.setdefault((kind, item.side >= 0), []).append(number)
-    for (kind, sided), members in groups.items():
+    for number, segment in enumerate(segments):
+        if segment.geom >= 0:
+            surface_type = "cylinder" if int(model.geom_type[segment.geom]) == 5 else "sphere"
+            groups.setdefault((surface_type, segment.side >= 0), []).append(number)
+    for (surface_type, has_side), members in groups.items():
         geoms = [segments[number].geom for number in members]
-        turns, middles = poses.turns[:, geoms], poses.geoms[:, geoms]
+        rotations, centers = poses.turns[:, geoms], poses.geoms[:, geoms]
 
         # Points in the frame of each geom; the defaults bind the arrays of this round.
-        def local(points: Array, turns: Array = turns, middles: Array = middles) -> Array:
-            return np.einsum("psji,psj->spi", turns, points - middles)
+        def local(points: Array, rotations: Array = rotations, centers: Array = centers) -> Array:
+            return np.einsum("psji,psj->spi", rotations, points - centers)
 
-        one, two = local(first[:, members]), local(second[:, members])
-        sides = (
-            local(poses.sites[:, [segments[number].side for number in members]]) if sided else None
+        local_first, local_second = local(first[:, members]), local(second[:, members])
+        side_sites = (
+            local(poses.sites[:, [segments[number].side for number in members]])
+            if has_side
+            else None
         )
         radius = np.array([[float(model.geom_size[geom, 0])] for geom in geoms])
-        bends = bend_tendon(kind, radius, one, two, sides, np.arange(len(members)), version)
-        rows, columns = np.indices(bends.choice.shape)
-        select = (bends.choice, rows, columns)
-        touches = bends.touches[select]
-        total = (
-            norm(bends.first[select] - one)
-            + bends.length[select]
-            + norm(bends.second[select] - two)
+        bends = bend_tendon(
+            surface_type,
+            radius,
+            local_first,
+            local_second,
+            side_sites,
+            np.arange(len(members)),
+            version,
         )
-        lengths[members] = np.where(touches, total, lengths[members])
-        touching[members] = np.where(touches, bends.length[select], 0.0)
-        if sided:
+        rows, columns = np.indices(bends.choice.shape)
+        selection = (bends.choice, rows, columns)
+        is_touching = bends.touches[selection]
+        total = (
+            norm(bends.first[selection] - local_first)
+            + bends.length[selection]
+            + norm(bends.second[selection] - local_second)
+        )
+        lengths[members] = np.where(is_touching, total, lengths[members])
+        contact_lengths[members] = np.where(is_touching, bends.length[selection], 0.0)
+        if has_side:
             # Choice 3 leads through the inside, where OpenSim's wraps cannot follow.
-            touching[members] = np.where(touches & (bends.choice == 3), np.nan, touching[members])
-    return lengths, touching
+            contact_lengths[members] = np.where(
+                is_touching & (bends.choice == 3), np.nan, contact_lengths[members]
+            )
+    return lengths, contact_lengths
 
 
 def tendon_lengths(
@@ -151,13 +163,13 @@ def tendon_lengths(
         version: version of MuJoCo whose rules hold, 3 or 4.
     """
     model = source.model
-    segments = [item for tendon in tendons for item in tendon.segments]
+    segments = [segment for tendon in tendons for segment in tendon.segments]
     lengths = segment_lengths(source, segments, poses, version)[0]
     result = np.zeros((len(tendons), len(poses.qpos)))
     start = 0
     for row, tendon in zip(result, tendons, strict=True):
-        for offset, item in enumerate(tendon.segments):
-            row += lengths[start + offset] / item.divisor
+        for offset, segment in enumerate(tendon.segments):
+            row += lengths[start + offset] / segment.divisor
         start += len(tendon.segments)
         for joint, coefficient in tendon.joints:
             row += coefficient * poses.qpos[:, int(model.jnt_qposadr[joint])]

@@ -69,14 +69,14 @@ def find_version(draft: ConversionDraft, tendons: list[Tendon], poses: SampledPo
         return draft.options.written_for
     lengths = [tendon_lengths(draft.source, tendons, poses, version) for version in (3, 4)]
     # The versions agree on most files.
-    apart = np.abs(lengths[0] - lengths[1]).max(1, initial=0.0)
-    if not len(apart) or apart.max() <= SAME_MEANING_M:
+    differences = np.abs(lengths[0] - lengths[1]).max(1, initial=0.0)
+    if not len(differences) or differences.max() <= SAME_MEANING_M:
         return draft.source.major
-    worst = int(np.argmax(apart))
+    worst_row = int(np.argmax(differences))
     raise SettingError(
-        f"MuJoCo 3 and 4 understand side sites of this file differently: {np.sum(apart > SAME_MEANING_M)} "
-        f"tendons have other lengths, '{draft.source.name_of('tendon', tendons[worst].number)}' by up to "
-        f"{apart[worst]:.3g} m; say which version the file was written for by --written-for 3 "
+        f"MuJoCo 3 and 4 understand side sites of this file differently: {np.sum(differences > SAME_MEANING_M)} "
+        f"tendons have other lengths, '{draft.source.name_of('tendon', tendons[worst_row].number)}' by up to "
+        f"{differences[worst_row]:.3g} m; say which version the file was written for by --written-for 3 "
         "(also for older ones) or --written-for 4"
     )
 
@@ -86,11 +86,11 @@ def add_tendon_paths(draft: ConversionDraft) -> None:
     source, model = draft.source, draft.mj
     tendons = [read_tendon(source, index) for index in range(model.ntendon)]
     for tendon in tendons:
-        for item in tendon.segments:
+        for segment in tendon.segments:
             # -1 stands for no side site.
-            draft.path_sites |= {item.first, item.second, *({item.side} - {-1})}
-            if item.geom >= 0:
-                draft.wrapping_geoms.add(item.geom)
+            draft.path_sites |= {segment.first, segment.second, *({segment.side} - {-1})}
+            if segment.geom >= 0:
+                draft.wrapping_geoms.add(segment.geom)
     for site in draft.path_sites:
         draft.translated("site", site, "point of a path, or side of a wrap surface")
     for geom in draft.wrapping_geoms:
@@ -123,12 +123,13 @@ class _Selection:
     def run(self) -> None:
         """Set the paths of the draft, and record their errors."""
         draft = self.draft
-        quadrants, bad = self._select_quadrants()
+        quadrants, unwrappable = self._select_quadrants()
         routes = {
             # A pulley divides forces, which one OpenSim path cannot do.
-            row: tuple(quadrants.get(_key(item)) for item in tendon.segments)
+            row: tuple(quadrants.get(_key(segment)) for segment in tendon.segments)
             for row, tendon in enumerate(self.tendons)
-            if not tendon.has_pulley and not any(_key(item) in bad for item in tendon.segments)
+            if not tendon.has_pulley
+            and not any(_key(segment) in unwrappable for segment in tendon.segments)
         }
         # All candidates are measured in one model, which is built once.
         bench = Bench(draft)
@@ -166,10 +167,10 @@ class _Selection:
             report_progress("fitting paths", row, len(self.tendons))
             rms = _rms(errors[row]) if row in errors else np.inf
             if rms > GOOD_WRAP_M:
-                path, off = self._fit(row)
+                path, fit_errors = self._fit(row)
                 # A polynomial needs many numbers, so it must be clearly better.
-                if _rms(off) < 0.5 * rms:
-                    polynomials[row] = path, off
+                if _rms(fit_errors) < 0.5 * rms:
+                    polynomials[row] = path, fit_errors
         self._record(polynomials, routes, geodesics)
         # Names of the trial surfaces are free again.
         draft.names.pop("wrap", None)
@@ -193,39 +194,50 @@ class _Selection:
     def _select_quadrants(self) -> tuple[dict[TendonSegment, Quadrant | None], set[TendonSegment]]:
         """Return how each wrapped segment wraps, and those that only a polynomial follows."""
         segments = sorted(
-            {_key(item) for tendon in self.tendons for item in tendon.segments if item.geom >= 0}
+            {
+                _key(segment)
+                for tendon in self.tendons
+                for segment in tendon.segments
+                if segment.geom >= 0
+            }
         )
-        truth, touching = segment_lengths(self.source, segments, self.poses, self.version)
-        bad = {item for item, row in zip(segments, touching, strict=True) if np.isnan(row).any()}
+        target_lengths, contact_lengths = segment_lengths(
+            self.source, segments, self.poses, self.version
+        )
+        unwrappable = {
+            segment
+            for segment, row in zip(segments, contact_lengths, strict=True)
+            if np.isnan(row).any()
+        }
         bench = Bench(self.draft)
         surfaces = Surfaces(self.draft, bench.frames, self.reach)
         candidates: list[tuple[int, Quadrant | None, int]] = []
-        for number, item in enumerate(segments):
-            if item in bad:
+        for number, segment in enumerate(segments):
+            if segment in unwrappable:
                 continue
             # A side site inside of a geom means a path through it.
             options: tuple[Quadrant | None, ...] = ("all",)
-            if item.side >= 0:
-                options = (None,) if self._is_inside(item) else ("all", "+x")
+            if segment.side >= 0:
+                options = (None,) if self._is_inside(segment) else ("all", "+x")
             for option in options:
-                path = make_geometry_path(self.draft, bench.frames, surfaces, (item,), (option,))
+                path = make_geometry_path(self.draft, bench.frames, surfaces, (segment,), (option,))
                 candidates.append((number, option, bench.add(path)))
         result: dict[TendonSegment, Quadrant | None] = {}
         if candidates:
             lengths, _, _ = bench.measure(self.poses.qpos)
             best: dict[int, float] = {}
             for number, option, row in candidates:
-                off = _rms(lengths[row] - truth[number])
+                rms_error = _rms(lengths[row] - target_lengths[number])
                 # A tie leaves both sides open.
-                if number not in best or off < 0.99 * best[number] - 1e-12:
-                    best[number], result[segments[number]] = off, option
-        return result, bad
+                if number not in best or rms_error < 0.99 * best[number] - 1e-12:
+                    best[number], result[segments[number]] = rms_error, option
+        return result, unwrappable
 
-    def _is_inside(self, item: TendonSegment) -> bool:
+    def _is_inside(self, segment: TendonSegment) -> bool:
         """Return whether the side site is inside of the geom, so that the tendon passes through it."""
         model = self.draft.mj
-        apart = self.poses.sites[:, item.side] - self.poses.geoms[:, item.geom]
-        return bool(norm(apart).max() < float(model.geom_size[item.geom, 0]))
+        offset = self.poses.sites[:, segment.side] - self.poses.geoms[:, segment.geom]
+        return bool(norm(offset).max() < float(model.geom_size[segment.geom, 0]))
 
     def _fit(self, row: int) -> tuple[FunctionBasedPath, Array]:
         """Fit a polynomial to the length of a tendon; return its path and errors in the check poses."""
@@ -235,7 +247,7 @@ class _Selection:
         poses = place(source, sample_qpos(source, max(samples_for(len(joints)), 400), 2))
         lengths = tendon_lengths(source, [tendon], poses, self.version)[0]
         addresses = [int(draft.mj.jnt_qposadr[joint]) for joint in joints]
-        function, off = fit_polynomial(
+        function, fit_errors = fit_polynomial(
             poses.qpos[:, addresses],
             lengths,
             self.checks.qpos[:, addresses],
@@ -247,7 +259,7 @@ class _Selection:
                 coordinate_paths=tuple(draft.coordinate_path(joint) for joint in joints),
                 length_function=function,
             ),
-            off,
+            fit_errors,
         )
 
     def _find_joints(self, tendon: Tendon) -> list[int]:
@@ -271,13 +283,15 @@ class _Selection:
         ]
         arms = np.empty((len(tendons), len(qpos), len(joints)))
         for column, joint in enumerate(joints):
-            ends = []
+            shifted_lengths = []
             for sign in (-1.0, 1.0):
-                moved = qpos.copy()
-                moved[:, int(model.jnt_qposadr[joint])] += sign * STEP
-                satisfy_equalities(source, moved)
-                ends.append(tendon_lengths(source, tendons, place(source, moved), self.version))
-            arms[:, :, column] = (ends[0] - ends[1]) / (2.0 * STEP)
+                shifted = qpos.copy()
+                shifted[:, int(model.jnt_qposadr[joint])] += sign * STEP
+                satisfy_equalities(source, shifted)
+                shifted_lengths.append(
+                    tendon_lengths(source, tendons, place(source, shifted), self.version)
+                )
+            arms[:, :, column] = (shifted_lengths[0] - shifted_lengths[1]) / (2.0 * STEP)
         return arms, joints
 
     def _record(
@@ -306,18 +320,18 @@ class _Selection:
                 )
         lengths, _, _ = bench.measure(self.checks.qpos)
         qpos = self.checks.qpos[:ARM_POSES]
-        truth, joints = self._true_arms(self.tendons, qpos)
+        target_arms, joints = self._true_arms(self.tendons, qpos)
         _, arms, names = bench.measure(qpos, arms=True)
         columns = [names.index(draft.coordinates[joint][0]) for joint in joints]
-        turning = [int(model.jnt_type[joint]) == 3 for joint in joints]
+        is_rotational = [int(model.jnt_type[joint]) == 3 for joint in joints]
         for row, tendon in enumerate(self.tendons):
-            off = lengths[row] - self.truth[row]
-            errors = {"length": Error.measure(off, "m")}
-            apart = arms[row][:, columns] - truth[row]
+            length_errors = lengths[row] - self.truth[row]
+            errors = {"length": Error.measure(length_errors, "m")}
+            arm_errors = arms[row][:, columns] - target_arms[row]
             if len(joints):
-                worst = int(np.argmax(np.abs(apart).max(0)))
+                worst = int(np.argmax(np.abs(arm_errors).max(0)))
                 errors["moment arm"] = Error.measure(
-                    apart[:, worst], "m" if turning[worst] else "1"
+                    arm_errors[:, worst], "m" if is_rotational[worst] else "1"
                 )
             if row in polynomials:
                 path = polynomials[row][0]
@@ -347,33 +361,33 @@ class _Selection:
                     errors=errors,
                 )
             elif errors["length"].max > EXACT_M:
-                words = sorted({str(word) for word in routes[row] if word})
+                used_quadrants = sorted({str(quadrant) for quadrant in routes[row] if quadrant})
                 draft.record(
                     "tendon",
                     tendon.number,
                     f"the way around a geom by the rules of MuJoCo {self.version}",
                     "a GeometryPath with wrap surfaces of the quadrant that is nearest",
-                    "quadrants " + " ".join(words),
+                    "quadrants " + " ".join(used_quadrants),
                     errors,
                 )
             else:
                 draft.translated("tendon", tendon.number, "path")
 
 
-def _key(item: TendonSegment) -> TendonSegment:
-    return item._replace(divisor=1.0)
+def _key(segment: TendonSegment) -> TendonSegment:
+    return segment._replace(divisor=1.0)
 
 
-def _rms(off: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(off))))
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _dependent(draft: ConversionDraft) -> set[int]:
-    model, kinds = draft.mj, draft.source.mujoco.mjtEq
+    model, equality_types = draft.mj, draft.source.mujoco.mjtEq
     return {
         int(model.eq_obj1id[number])
         for number in range(model.neq)
-        if int(model.eq_type[number]) == int(kinds.mjEQ_JOINT) and model.eq_active0[number]
+        if int(model.eq_type[number]) == int(equality_types.mjEQ_JOINT) and model.eq_active0[number]
     }
 
 
@@ -383,26 +397,26 @@ def _find_reach(
     """Return the largest height (m) over the middle of each cylinder at which a segment ends."""
     result: dict[int, float] = {}
     for tendon in tendons:
-        for item in tendon.segments:
-            if item.geom < 0:
+        for segment in tendon.segments:
+            if segment.geom < 0:
                 continue
-            axis = poses.turns[:, item.geom, :, 2]
-            for site in (item.first, item.second):
-                apart = poses.sites[:, site] - poses.geoms[:, item.geom]
-                height = float(np.abs(np.einsum("pi,pi->p", apart, axis)).max())
-                result[item.geom] = max(result.get(item.geom, 0.0), height)
+            axis = poses.turns[:, segment.geom, :, 2]
+            for site in (segment.first, segment.second):
+                offset = poses.sites[:, site] - poses.geoms[:, segment.geom]
+                height = float(np.abs(np.einsum("pi,pi->p", offset, axis)).max())
+                result[segment.geom] = max(result.get(segment.geom, 0.0), height)
     return result
 
 
 def _make_linear_path(draft: ConversionDraft, tendon: Tendon) -> TendonPath:
     """Make the path of a fixed tendon, which is a linear function of joint positions."""
-    names, coefficients, least = [], [], 0.0
+    names, coefficients, shortest = [], [], 0.0
     for joint, coefficient in tendon.joints:
         names.append(draft.coordinate_path(joint))
         coefficients.append(coefficient)
-        low, high = draft.made[draft.coordinates[joint][0]].range
-        least += min(coefficient * low, coefficient * high)
-    shift = max(0.0, 0.01 - least)
+        lower, upper = draft.made[draft.coordinates[joint][0]].range
+        shortest += min(coefficient * lower, coefficient * upper)
+    shift = max(0.0, 0.01 - shortest)
     if shift:
         draft.record(
             "tendon",
