@@ -56,7 +56,7 @@ def test_a_cylinder_that_is_crossed_squarely_is_exact(version):
         x, y, _ = point.location
         point.location = (x, y, 0.02)
     way = router(model, version)
-    assert 20 < len(way.touches[0].poses) < 80
+    assert 20 < len(way.contacts[0].poses) < 80
     tendon = way.find_best()
     assert [type(part) for part in tendon] == [TendonSite, WrapGeom, TendonSite]
     assert way.compute_error(tendon) < 1e-12
@@ -79,7 +79,7 @@ def test_a_cylinder_that_is_crossed_squarely_is_exact(version):
 )
 def test_what_mujoco_has_not_is_near_and_nearer_if_fitted(surface, chosen, after):
     way = router(joint_with(surface))
-    assert len(way.touches[0].poses) > 10
+    assert len(way.contacts[0].poses) > 10
     tendon = way.find_best()
     before = way.compute_error(tendon)
     assert before < chosen
