@@ -78,7 +78,7 @@ class NotWellFormedError(DocumentError):
 
 
 class VersionError(DocumentError):
-    """The version of the document is missing, no number (`version` is None then), or one that is not read."""
+    """The version of the document is missing, not a number (`version` is None then), or not supported."""
 
     version: int | None = None
 

@@ -40,7 +40,7 @@ def report_progress(title: str, done: float, total: float, unit: str = "") -> No
 
 
 def report_stage(title: str) -> None:
-    """Tell the listeners what is done now, if nobody knows how long it takes.
+    """Tell the listeners which work of unknown duration begins now.
 
     Args:
         title: what is done.
@@ -59,7 +59,7 @@ def listen_to_progress(listener: Listener) -> Iterator[None]:
 
 
 def divide_rows(title: str, count: int, unit: str = " frames") -> Iterator[slice]:
-    """Yield consecutive slices of rows for calls of a kernel, and report how many rows are done.
+    """Yield consecutive slices of rows for calls of a kernel, and report the number of finished rows.
 
     Kernels cannot be interrupted and report nothing. The number of rows in a slice follows from the
     duration of the call before, so that each call takes about `CALL_S`.

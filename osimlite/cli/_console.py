@@ -308,7 +308,7 @@ def _choose_widths(rows: Sequence[Sequence[str]], width: int) -> list[int] | Non
     left -= sum(least)
     if left < 0:
         return None
-    # Equal parts of the width that is left, of which columns that need less leave the rest to others.
+    # Each column gets an equal part of the remaining width, and leaves what it does not need to the next.
     widths = [*least]
     order = sorted(range(len(cells)), key=lambda index: longest[index] - least[index])
     for number, index in enumerate(order):

@@ -45,7 +45,7 @@ class ASSEMBLY(metaclass=Record):
 
 
 class ASSEMBLY_ARRAY(metaclass=Record):
-    """Numbers of the arrays of integers, each of which has one entry per degree of freedom."""
+    """Indices of the integer arrays with one entry per degree of freedom."""
 
     HELD = 0
     """FREED, HELD_BY_USER or HELD_AT_END of `HOLD`."""

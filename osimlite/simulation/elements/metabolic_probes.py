@@ -106,7 +106,7 @@ def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any
     )
     for name in names:
         if not (getattr(item, name) or 0.0) > 0.0:
-            # A missing property is None.
+            # The reader stores None for a missing property.
             raise builder.unsupported_error(
                 probe, f" of the muscle '{item.name}', whose {name} is not positive"
             )

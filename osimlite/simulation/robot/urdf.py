@@ -76,7 +76,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
     }
     out.line('<?xml version="1.0" encoding="utf-8"?>')
     with out.element("robot", {"name": robot.name}):
-        # MuJoCo refuses massless bodies unless it is told the least mass.
+        # MuJoCo refuses massless bodies unless the file states a least mass.
         with out.element("mujoco"):
             least = number(LEAST_MASS)
             out.empty("compiler", {"boundmass": least, "boundinertia": least, "strippath": "false"})
