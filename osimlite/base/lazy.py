@@ -23,24 +23,24 @@ def make_lazy_getattr(package: str, modules: Mapping[str, str]) -> Callable[[str
     return get
 
 
-def make_notebook_repr(by: str) -> Callable[[Any], str]:
+def make_notebook_repr(function_name: str) -> Callable[[Any], str]:
     """Return the ``_repr_html_`` of a class, by which Jupyter shows its objects.
 
     Args:
-        by: name of the function in :mod:`osimlite.view.notebook` that returns the HTML.
+        function_name: name of the function in :mod:`osimlite.view.notebook` that returns the HTML.
     """
 
     def _repr_html_(self: Any) -> str:
-        return getattr(import_module("osimlite.view.notebook"), by)(self)
+        return getattr(import_module("osimlite.view.notebook"), function_name)(self)
 
     return _repr_html_
 
 
-def make_plot(by: str) -> Callable[..., Any]:
+def make_plot(function_name: str) -> Callable[..., Any]:
     """Return the ``plot`` method of a class, which draws its objects by matplotlib.
 
     Args:
-        by: name of the function in :mod:`osimlite.view.plotted` that returns the pictures.
+        function_name: name of the function in :mod:`osimlite.view.plotted` that returns the pictures.
     """
 
     def plot(self: Any, folder: Any = None) -> Any:  # noqa: D417 - `self` is not an argument
@@ -56,7 +56,7 @@ def make_plot(by: str) -> Callable[..., Any]:
             MissingDependency: matplotlib is not installed.
             OsimliteError: there is no time to draw, or the folder cannot be written.
         """
-        pages = getattr(import_module("osimlite.view.plotted"), by)(self)
+        pages = getattr(import_module("osimlite.view.plotted"), function_name)(self)
         if folder is not None:
             pages.write(folder)
         return pages

@@ -132,13 +132,13 @@ def _register_user_folder(folder: str) -> None:
     importlib.invalidate_caches()
     # Where a folder without ``__init__.py`` is, Python asks the packages around it: all are found
     # before one is forgotten.
-    known = [
+    loaded_names = [
         name
         for name, module in list(sys.modules.items())
         if _is_users_module(getattr(module, "__spec__", None))
         and not name.startswith("_osimlite_source_")
     ]
-    for name in known:
+    for name in loaded_names:
         del sys.modules[name]
 
 

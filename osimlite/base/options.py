@@ -66,8 +66,8 @@ def define_option(
 
 def list_options(options: Any) -> Iterator[OptionSpec]:
     """Yield the options of a record that the command line offers."""
-    for name, each in options.__record_fields__.items():
-        description: OptionDescription = each.option
+    for name, option_field in options.__record_fields__.items():
+        description: OptionDescription = option_field.option
         if description.help:
             owner = next(item for item in options.__mro__ if name in item.__annotations__)
             kind = description.type or eval(
@@ -79,7 +79,7 @@ def list_options(options: Any) -> Iterator[OptionSpec]:
                 kind,
                 description.help,
                 # The library can then tell that the user has not set the option.
-                None if description.shown else each.default,
+                None if description.shown else option_field.default,
                 description.unit,
                 description.shown,
                 "",
@@ -93,10 +93,12 @@ def describe_options(options: Any) -> str:
 
     lines = [
         fill(
-            f"{name}: {each.option.help} {each.option.more}".replace("  ", " ").strip(),
+            f"{name}: {option_field.option.help} {option_field.option.more}".replace(
+                "  ", " "
+            ).strip(),
             112,
             subsequent_indent="    ",
         )
-        for name, each in options.__record_fields__.items()
+        for name, option_field in options.__record_fields__.items()
     ]
     return "\n".join(" " * 8 + line.replace("\n", "\n" + " " * 8) for line in lines)

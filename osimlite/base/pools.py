@@ -144,7 +144,7 @@ class LocalPool:
         # Processes that start now inherit the blocked signal, so that Ctrl-C does not reach them.
         with _delay_interrupts(), _report_lost_workers():
             future = self._executor.submit(self._work, values)
-        future.add_done_callback(lambda done: self._done.put((tag, done)))
+        future.add_done_callback(lambda finished_future: self._done.put((tag, finished_future)))
 
     def result(self, timeout: float | None = None) -> tuple[Any, Any]:
         """Return the tag and the result of the next finished task.

@@ -29,7 +29,7 @@ def find_settings(folder: Path) -> tuple[Path, dict[str, Any]] | None:
             file = parent / name
             if not file.is_file():
                 continue
-            table = _read_settings(file, whole=name == "osimlite.toml")
+            table = _read_settings(file, is_dedicated=name == "osimlite.toml")
             if table is not None:
                 return file, table
     return None
@@ -66,8 +66,8 @@ def parse_max_file_size(file: Path, table: dict[str, Any]) -> int:
     return int(value * 1e6)
 
 
-def _read_settings(file: Path, *, whole: bool) -> dict[str, Any] | None:
-    """Return the table of osimlite in a file, which is the complete file if `whole` is true."""
+def _read_settings(file: Path, *, is_dedicated: bool) -> dict[str, Any] | None:
+    """Return the table of osimlite in a file, which is the complete file if `is_dedicated` is true."""
     import tomllib
 
     text = read_at_most(file, MAX_SETTINGS_BYTES + 1)
@@ -80,6 +80,6 @@ def _read_settings(file: Path, *, whole: bool) -> dict[str, Any] | None:
         # Deeply nested brackets exceed Python's recursion limit; the parser's message is no help.
         reason = "brackets nest too deeply" if isinstance(error, RecursionError) else error
         raise OsimliteError(f"this is not valid TOML: {reason}", file=str(file)) from None
-    for key in () if whole else ("tool", "osimlite"):
+    for key in () if is_dedicated else ("tool", "osimlite"):
         data = data.get(key) if isinstance(data, dict) else None
     return data if isinstance(data, dict) else None

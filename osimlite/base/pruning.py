@@ -72,10 +72,10 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
     entries = sorted(find_entries(os.path.realpath(folder)))
     total = sum(entry.size for entry in entries)
     # Remove a little more than necessary, so that not every run has to remove entries.
-    least = total if total <= max_bytes else 0.8 * max_bytes
+    target_bytes = total if total <= max_bytes else 0.8 * max_bytes
     removed = 0
     for entry in entries:
-        if now - entry.used <= UNUSED_DAYS * DAY_S and total <= least:
+        if now - entry.used <= UNUSED_DAYS * DAY_S and total <= target_bytes:
             break
         removed += _remove(entry)
         total -= entry.size

@@ -32,25 +32,25 @@ class Quantity(NamedTuple):
         return self.number * _SIZES.get(self.unit or "rad", 1.0)
 
 
-def describe_unit_doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
+def describe_unit_doubt(name: str, value: Quantity | None, range: tuple[float, float]) -> str:
     """Describe why the value of a rotational coordinate is probably in degrees.
 
     That is so if it has no unit, is more than a turn and is outside the range of the coordinate.
 
     Args:
         name: name of the coordinate.
-        given: value as the user wrote it.
+        value: value as the user wrote it.
         range: range of the coordinate (rad).
 
     Returns:
         A sentence, or "" for a plausible value.
     """
-    if given is None or given.unit is not None or not 2.0 * math.pi < abs(given.number) < math.inf:
+    if value is None or value.unit is not None or not 2.0 * math.pi < abs(value.number) < math.inf:
         return ""
     low, high = range
-    if low <= given.number <= high:
+    if low <= value.number <= high:
         return ""
-    number = f"{given.number:g}"
+    number = f"{value.number:g}"
     return f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
 
 

@@ -52,10 +52,10 @@ def make_missing_error(path: str | Path, *, may_be_folder: bool = False) -> Miss
         path: the missing path.
         may_be_folder: whether a path without suffix means a folder.
     """
-    written = str(path)
-    if written.endswith(("/", os.sep)) or (may_be_folder and not os.path.splitext(written)[1]):
-        return MissingFolderError("there is no such folder", file=written)
-    return MissingFileError("cannot read the file: no such file", file=written)
+    path_text = str(path)
+    if path_text.endswith(("/", os.sep)) or (may_be_folder and not os.path.splitext(path_text)[1]):
+        return MissingFolderError("there is no such folder", file=path_text)
+    return MissingFileError("cannot read the file: no such file", file=path_text)
 
 
 def read_at_most(path: str | Path, limit: int) -> bytes:
@@ -117,14 +117,14 @@ def describe_content(beginning: bytes) -> str | None:
     text = beginning.decode("utf-8", "replace").lstrip("\ufeff")
     if document := _DOCUMENT.match(text):
         return f"an OpenSim document with <{document[1]}>"
-    first = text.partition("\n")[0]
-    if first.startswith("PathFileType"):
+    first_line = text.partition("\n")[0]
+    if first_line.startswith("PathFileType"):
         return "a table of markers"
-    head, end, _ = text.partition("endheader")
-    if end and re.search(
-        r"^(version|nRows|datarows|DataType) *=", head, re.MULTILINE | re.IGNORECASE
+    header, end_mark, _ = text.partition("endheader")
+    if end_mark and re.search(
+        r"^(version|nRows|datarows|DataType) *=", header, re.MULTILINE | re.IGNORECASE
     ):
-        name = "" if "=" in first else first.strip()
+        name = "" if "=" in first_line else first_line.strip()
         return f"a table '{name}' of OpenSim"
     if _RESIDUALS.match(text):
         return "a list of residuals"

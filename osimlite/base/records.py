@@ -60,12 +60,12 @@ def field(
     return _Field(default, default_factory, init=init, repr=repr, compare=compare, option=option)
 
 
-def replace(item: T, /, **changes: Any) -> T:
+def replace(record: T, /, **changes: Any) -> T:
     """Return a copy of a record with new values of some attributes."""
-    for name, each in cast(Any, item).__record_fields__.items():
-        if each.init and name not in changes:
-            changes[name] = getattr(item, name)
-    return type(item)(**changes)
+    for name, spec in cast(Any, record).__record_fields__.items():
+        if spec.init and name not in changes:
+            changes[name] = getattr(record, name)
+    return type(record)(**changes)
 
 
 @overload
@@ -121,7 +121,7 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
             else:
                 setattr(cls, name, fields[name].default)
     if slots:
-        left = {
+        remaining = {
             name: value
             for name, value in namespace.items()
             if name not in (*annotated, "__dict__", "__weakref__")
@@ -129,7 +129,7 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
         cls = type(cls)(
             cls.__name__,
             cls.__bases__,
-            {**left, "__slots__": tuple(annotated), "__qualname__": cls.__qualname__},
+            {**remaining, "__slots__": tuple(annotated), "__qualname__": cls.__qualname__},
         )
         namespace = cls.__dict__
     methods: dict[str, Any] = {
@@ -137,7 +137,7 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
         "__repr__": _format_record,
     }
     if eq:
-        names = [name for name, each in fields.items() if each.compare]
+        names = [name for name, spec in fields.items() if spec.compare]
         methods["__record_key__"] = attrgetter(*names) if names else repr
         methods["__eq__"] = _compare_records
         if "__eq__" not in namespace:
@@ -156,7 +156,7 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
             setattr(cls, name, method)
     setattr(cls, "__record_fields__", fields)  # noqa: B010 - mypy does not know the attribute
     setattr(cls, "__dataclass_fields__", _DataclassFields())  # noqa: B010
-    setattr(cls, "__match_args__", tuple(name for name, each in fields.items() if each.init))  # noqa: B010
+    setattr(cls, "__match_args__", tuple(name for name, spec in fields.items() if spec.init))  # noqa: B010
     return cls
 
 
@@ -182,7 +182,7 @@ def _make_first_init(cls: Any, frozen: bool) -> Callable[..., None]:
 
 
 def _bind_arguments(
-    cls: Any, values: tuple[Any, ...], named: dict[str, Any]
+    cls: Any, values: tuple[Any, ...], keywords: dict[str, Any]
 ) -> list[tuple[str, Any]] | None:
     """Return the attributes that arguments of ``__init__`` give.
 
@@ -190,26 +190,26 @@ def _bind_arguments(
         Names and values in the order of the fields; None if arguments are wrong, about which the
         compiled function complains.
     """
-    bound = []
-    place = used = 0
-    for name, each in cls.__record_fields__.items():
-        if each.init and not each.kw_only and place < len(values):
-            if name in named:
+    attributes = []
+    position = used_count = 0
+    for name, spec in cls.__record_fields__.items():
+        if spec.init and not spec.kw_only and position < len(values):
+            if name in keywords:
                 return None
-            bound.append((name, values[place]))
-            place += 1
-        elif each.init and name in named:
-            bound.append((name, named[name]))
-            used += 1
-        elif each.default_factory is not _NOTHING:
-            bound.append((name, each.default_factory()))
-        elif not each.init:
+            attributes.append((name, values[position]))
+            position += 1
+        elif spec.init and name in keywords:
+            attributes.append((name, keywords[name]))
+            used_count += 1
+        elif spec.default_factory is not _NOTHING:
+            attributes.append((name, spec.default_factory()))
+        elif not spec.init:
             continue
-        elif each.default is _NOTHING:
+        elif spec.default is _NOTHING:
             return None
         else:
-            bound.append((name, each.default))
-    return bound if place == len(values) and used == len(named) else None
+            attributes.append((name, spec.default))
+    return attributes if position == len(values) and used_count == len(keywords) else None
 
 
 def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
@@ -218,26 +218,26 @@ def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
     keyword_only: list[str] = []
     lines: list[str] = []
     names: dict[str, Any] = {"_nothing": _NOTHING, "_set": object.__setattr__}
-    for name, each in cls.__record_fields__.items():
+    for name, spec in cls.__record_fields__.items():
         value = name
-        names |= {f"_default_{name}": each.default, f"_make_{name}": each.default_factory}
-        if each.default_factory is not _NOTHING:
+        names |= {f"_default_{name}": spec.default, f"_make_{name}": spec.default_factory}
+        if spec.default_factory is not _NOTHING:
             value = (
                 f"_make_{name}() if {name} is _nothing else {name}"
-                if each.init
+                if spec.init
                 else f"_make_{name}()"
             )
-        elif not each.init:
+        elif not spec.init:
             continue
-        if each.init:
+        if spec.init:
             default = (
                 ""
-                if each.default is each.default_factory is _NOTHING
+                if spec.default is spec.default_factory is _NOTHING
                 else "=_nothing"
-                if each.default is _NOTHING
+                if spec.default is _NOTHING
                 else f"=_default_{name}"
             )
-            (keyword_only if each.kw_only else positional).append(name + default)
+            (keyword_only if spec.kw_only else positional).append(name + default)
         lines.append(f'_set(self, "{name}", {value})' if frozen else f"self.{name} = {value}")
     if hasattr(cls, "__post_init__"):
         lines.append("self.__post_init__()")
@@ -252,16 +252,24 @@ def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
 class _DataclassFields:
     """Descriptor of ``__dataclass_fields__``, which creates the fields of dataclasses when needed."""
 
-    def __get__(self, item: object, cls: Any) -> dict[str, Any]:
+    def __get__(self, instance: object, cls: Any) -> dict[str, Any]:
         import dataclasses as d
 
         fields = []
-        for name, each in cls.__record_fields__.items():
+        for name, spec in cls.__record_fields__.items():
             arguments = {
-                word: getattr(each, word) for word in ("init", "repr", "compare", "kw_only")
+                attribute_name: getattr(spec, attribute_name)
+                for attribute_name in ("init", "repr", "compare", "kw_only")
             }
-            defaults = {word: getattr(each, word) for word in ("default", "default_factory")}
-            arguments |= {word: value for word, value in defaults.items() if value is not _NOTHING}
+            defaults = {
+                attribute_name: getattr(spec, attribute_name)
+                for attribute_name in ("default", "default_factory")
+            }
+            arguments |= {
+                attribute_name: value
+                for attribute_name, value in defaults.items()
+                if value is not _NOTHING
+            }
             fields.append((name, Any, d.field(**arguments)))
         result: dict[str, Any] = d.make_dataclass(cls.__name__, fields).__dict__[
             "__dataclass_fields__"
@@ -275,8 +283,8 @@ def _format_record(self: Any) -> str:
     """Return the text of ``__repr__``."""
     values = (
         f"{name}={getattr(self, name)!r}"
-        for name, each in self.__record_fields__.items()
-        if each.repr
+        for name, spec in self.__record_fields__.items()
+        if spec.repr
     )
     return f"{type(self).__qualname__}({', '.join(values)})"
 

@@ -28,14 +28,14 @@ def find_missing_packages(*packages: str) -> tuple[str, ...]:
     return tuple(name for name in packages if find_spec(name) is None)
 
 
-def require(module: str, *, extra: str, purpose: str, instead: str = "") -> ModuleType:
+def require(module: str, *, extra: str, purpose: str, alternative: str = "") -> ModuleType:
     """Import an optional package, or raise an error that names the extra of osimlite with it.
 
     Args:
         module: name to import, e.g. ``"numpy"`` or ``"matplotlib.pyplot"``.
         extra: extra of osimlite that installs it, e.g. ``"sim"``.
         purpose: what needs it, as the subject of a sentence: ``"the PyBullet engine"``.
-        instead: alternative that works without it, if any.
+        alternative: alternative that works without it, if any.
 
     Returns:
         The module.
@@ -44,24 +44,26 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
         MissingDependency: the package is not installed, or cannot be loaded.
     """
     package = module.partition(".")[0]
-    known = DISTRIBUTIONS.get(package, package)
+    distribution = DISTRIBUTIONS.get(package, package)
     if (loaded := sys.modules.get(module)) is not None:
         return loaded
-    cure = (f"use {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
+    cure = (
+        f"use {alternative}, or " if alternative else ""
+    ) + f"run: pip install 'osimlite[{extra}]'"
     try:
         with leave_current_folder():
             return import_module(module)
     except ModuleNotFoundError as error:
         if error.name == package:
             raise MissingDependency(
-                f"{purpose} needs {known}, which is not installed; {cure}"
+                f"{purpose} needs {distribution}, which is not installed; {cure}"
             ) from error
         raise MissingDependency(
-            f"{purpose} needs {known}, which is installed without its dependency {error.name}; {cure}"
+            f"{purpose} needs {distribution}, which is installed without its dependency {error.name}; {cure}"
         ) from error
     except ImportError as error:
         raise MissingDependency(
-            f"{purpose} needs {known}, which is installed but cannot be loaded ({error}); reinstall it, or {cure}"
+            f"{purpose} needs {distribution}, which is installed but cannot be loaded ({error}); reinstall it, or {cure}"
         ) from error
 
 

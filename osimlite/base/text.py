@@ -27,7 +27,10 @@ def escape_unprintable(text: str) -> str:
     return (
         text
         if text.isprintable()
-        else "".join(c if c.isprintable() else _escape_character(c) for c in text)
+        else "".join(
+            character if character.isprintable() else _escape_character(character)
+            for character in text
+        )
     )
 
 
@@ -100,17 +103,17 @@ MAX_COMPARED_NAMES = 500
 """Largest number of names compared without rapidfuzz: that takes 1 ms, the import of rapidfuzz 6 ms."""
 
 
-def find_nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | None:
+def find_nearest(word: str, candidates: Iterable[str], *, cutoff: float = 60.0) -> str | None:
     """Return the known name that is most similar to `word`, or None if none is similar.
 
     Case and a namespace before a colon are ignored.
 
     Args:
         word: the unknown name.
-        known: known names; of several that are equally similar the first one counts.
+        candidates: known names; of several that are equally similar the first one counts.
         cutoff: smallest similarity (%).
     """
-    names = list(known)
+    names = list(candidates)
     for exact in (word, word.rpartition(":")[2]):
         same_letters = [name for name in names if name.lower() == exact.lower()]
         if same_letters:
@@ -134,32 +137,32 @@ def measure_similarity(word: str) -> Callable[[str], float]:
     lengths. Bit-parallel algorithm with one bit for each character of the word (Hyyrö 2004,
     "Bit-parallel LCS-length computation revisited").
     """
-    bits: dict[str, int] = {}
+    masks: dict[str, int] = {}
     for index, character in enumerate(word):
-        bits[character] = bits.get(character, 0) | 1 << index
+        masks[character] = masks.get(character, 0) | 1 << index
     all_bits = (1 << len(word)) - 1
 
     def measure(text: str) -> float:
         total = len(word) + len(text)
         unmatched = all_bits
         for character in text:
-            matching = unmatched & bits.get(character, 0)
+            matching = unmatched & masks.get(character, 0)
             unmatched = (unmatched + matching | unmatched - matching) & all_bits
-        common = len(word) - unmatched.bit_count()
+        common_count = len(word) - unmatched.bit_count()
         # The same operations as in rapidfuzz, so that rounding gives equal results.
-        return 100.0 * (1.0 - (total - 2 * common) / total) if total else 100.0
+        return 100.0 * (1.0 - (total - 2 * common_count) / total) if total else 100.0
 
     return measure
 
 
-def suggest_name(word: str, known: Iterable[str]) -> str:
+def suggest_name(word: str, candidates: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"``, or an empty text if no known name is similar.
 
     Args:
         word: unknown word.
-        known: valid names.
+        candidates: valid names.
     """
-    result = find_nearest(word, known)
+    result = find_nearest(word, candidates)
     return f"; did you mean '{result}'?" if result else ""
 
 
@@ -173,20 +176,20 @@ def suggest_path(name: str, paths: Collection[str]) -> str:
     Returns:
         The end of a message, ``"; did you mean ...?"``; empty if nothing is similar.
     """
-    within = next((f"; did you mean '{path}'?" for path in paths if name in path.split("/")), "")
-    return within or suggest_name(name, paths)
+    hint = next((f"; did you mean '{path}'?" for path in paths if name in path.split("/")), "")
+    return hint or suggest_name(name, paths)
 
 
-def suggest_or_list(word: str, known: Iterable[str], *more: str) -> str:
+def suggest_or_list(word: str, candidates: Iterable[str], *more_candidates: str) -> str:
     """Return ``"; did you mean 'x'?"``, or ``"; there is x, y and z"`` if no known name is similar.
 
     Args:
         word: unknown word.
-        known: valid names.
-        more: further texts to list.
+        candidates: valid names.
+        more_candidates: further texts to list.
     """
-    names = list(known)
-    return suggest_name(word, names) or f"; there is {join_words([*names, *more])}"
+    names = list(candidates)
+    return suggest_name(word, names) or f"; there is {join_words([*names, *more_candidates])}"
 
 
 def format_range(low: float, high: float, form: str) -> str:
@@ -209,33 +212,35 @@ def format_count(number: int, noun: str) -> str:
         number: the number.
         noun: the noun in the singular.
     """
-    many = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
-    return f"{number} {noun if number == 1 else many}"
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    return f"{number} {noun if number == 1 else plural}"
 
 
-def make_unique_name(name: str, taken: Container[str | None], first: int = 1) -> str:
+def make_unique_name(name: str, used_names: Container[str | None], first_number: int = 1) -> str:
     """Return a name that is not taken: the name, or the name with the smallest number that makes it unique.
 
     Args:
         name: preferred name.
-        taken: names that exist.
-        first: first number to try.
+        used_names: names that exist.
+        first_number: first number to try.
     """
     return next(
-        free for free in chain((name,), (f"{name}_{k}" for k in count(first))) if free not in taken
+        candidate
+        for candidate in chain((name,), (f"{name}_{k}" for k in count(first_number)))
+        if candidate not in used_names
     )
 
 
-def join_words(words: Iterable[str], *, most: int = 8) -> str:
-    """Return words as ``"a, b and c"``; those after the first `most` are counted only.
+def join_words(words: Iterable[str], *, max_count: int = 8) -> str:
+    """Return words as ``"a, b and c"``; those after the first `max_count` are counted only.
 
     Args:
         words: the words.
-        most: number of words to list; all by default.
+        max_count: number of words to list; all by default.
     """
-    items = list(words)
-    if len(items) > most:
-        items = [*items[:most], f"{len(items) - most} more"]
-    if len(items) < 2:
-        return "".join(items)
-    return f"{', '.join(items[:-1])} and {items[-1]}"
+    texts = list(words)
+    if len(texts) > max_count:
+        texts = [*texts[:max_count], f"{len(texts) - max_count} more"]
+    if len(texts) < 2:
+        return "".join(texts)
+    return f"{', '.join(texts[:-1])} and {texts[-1]}"

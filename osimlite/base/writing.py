@@ -96,9 +96,9 @@ def _encode_text(content: str, path: str | Path) -> bytes:
         return content.encode()
     except UnicodeEncodeError as error:
         # A lone surrogate, which JSON can contain and UTF-8 cannot.
-        odd = content[max(0, error.start - 20) : error.end]
+        excerpt = content[max(0, error.start - 20) : error.end]
         raise OsimliteError(
-            f"cannot write the file: '{odd}' ends in half a character", file=str(path)
+            f"cannot write the file: '{excerpt}' ends in half a character", file=str(path)
         ) from None
 
 
@@ -141,8 +141,8 @@ def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
     """
     target = Path(os.path.realpath(folder)) / name
     _expect_regular_or_none(target)
-    there = target.lstat() if os.path.isfile(target) and not target.is_symlink() else None
-    with _open_temporary(target, there, in_place=False) as stream:
+    target_stat = target.lstat() if os.path.isfile(target) and not target.is_symlink() else None
+    with _open_temporary(target, target_stat, in_place=False) as stream:
         yield stream
 
 
@@ -287,41 +287,41 @@ class ResultWriter:
                 is not that of a result.
         """
         path = Path(path)
-        real = Path(os.path.realpath(path.parent)) / path.name
+        real_path = Path(os.path.realpath(path.parent)) / path.name
         if "\0" in str(path) or path.name in ("", ".", ".."):
             raise WriteRefusedError("a result needs the name of a file", file=str(path))
-        tree = next((tree for tree in self.trees if _is_inside(real, [tree])), None)
+        tree = next((tree for tree in self.trees if _is_inside(real_path, [tree])), None)
         if tree is None and not self.outside:
             folders = " and ".join(f"'{tree}'" for tree in self.trees)
             raise WriteRefusedError(
                 f"the document names a result outside of {folders}; to write there, use "
                 "--write-outside, or name another folder with -o",
-                file=str(real),
+                file=str(real_path),
             )
-        inner = real.relative_to(tree) if tree is not None else Path(real.name)
-        if any(part.startswith(".") for part in inner.parts):
+        relative_path = real_path.relative_to(tree) if tree is not None else Path(real_path.name)
+        if any(part.startswith(".") for part in relative_path.parts):
             raise WriteRefusedError(
                 "the document names a hidden file as a result, which is never written; use another name",
-                file=str(real),
+                file=str(real_path),
             )
         if self.overwrite:
-            return real
+            return real_path
         # os.path.islink is false, without an error, where a name is too long; writing then says so.
-        if os.path.islink(real):
+        if os.path.islink(real_path):
             raise WriteRefusedError(
                 "the document names a link as a result, and results are not written through links; "
                 "remove it, or replace it with --overwrite",
                 file=str(path),
             )
         # OpenSim gives tables of a tool that is called `v1.2` no ending: `v1.2_states`.
-        is_numbered = real.suffix[1:2].isdigit()
-        if not is_numbered and not real.name.lower().endswith(RESULT_ENDINGS):
+        is_numbered = real_path.suffix[1:2].isdigit()
+        if not is_numbered and not real_path.name.lower().endswith(RESULT_ENDINGS):
             raise WriteRefusedError(
                 f"the name of a result ends in {', '.join(RESULT_ENDINGS[:-1])} or "
                 f"{RESULT_ENDINGS[-1]}; use such a name, or --overwrite",
-                file=str(real),
+                file=str(real_path),
             )
-        return real
+        return real_path
 
     def expect_replaceable(self, path: Path, beginning: bytes) -> None:
         """Check that an existing file is a result of the same type, so that it can be replaced.
@@ -336,8 +336,8 @@ class ResultWriter:
         _expect_regular_or_none(path)
         if self.overwrite or not os.path.lexists(path):
             return
-        there, kind = read_at_most(path, BEGINNING_BYTES), describe_content(beginning)
-        if there and not _are_alike(describe_content(there), kind):
+        existing, kind = read_at_most(path, BEGINNING_BYTES), describe_content(beginning)
+        if existing and not _are_alike(describe_content(existing), kind):
             raise WriteRefusedError(
                 f"a result would replace this file, which is not {kind or 'such a text'}; move it, "
                 "let the document name another file, or replace it with --overwrite",
@@ -359,19 +359,19 @@ class ResultWriter:
             WriteRefusedError: the file may not be written.
             OsimliteError: it cannot be written.
         """
-        real = self.resolve(path)
-        parts = iter(lines)
-        first = b""
+        real_path = self.resolve(path)
+        chunks = iter(lines)
+        beginning = b""
         # The parts of a table may be its lines, and its head says what it is.
-        for part in parts:
-            first += _encode_text(part, real)
-            if len(first) >= BEGINNING_BYTES:
+        for chunk in chunks:
+            beginning += _encode_text(chunk, real_path)
+            if len(beginning) >= BEGINNING_BYTES:
                 break
-        self.expect_replaceable(real, first)
-        make_folder(real.parent)
-        with open_into(real.parent, real.name) as stream:
-            stream.write(first)
-            stream.writelines(_encode_text(part, real) for part in parts)
+        self.expect_replaceable(real_path, beginning)
+        make_folder(real_path.parent)
+        with open_into(real_path.parent, real_path.name) as stream:
+            stream.write(beginning)
+            stream.writelines(_encode_text(chunk, real_path) for chunk in chunks)
             stream.close()
             yield stream
 
@@ -414,17 +414,21 @@ def find_shared_folders() -> set[str]:
     """Return the folders that hold more than one project: home, the temporary one, and those above."""
     import tempfile
 
-    places = [os.path.expanduser("~"), tempfile.gettempdir(), os.sep]
-    return {str(part) for place in places for part in _list_ancestors(os.path.realpath(place))}
+    folders = [os.path.expanduser("~"), tempfile.gettempdir(), os.sep]
+    return {
+        str(ancestor)
+        for folder in folders
+        for ancestor in _list_ancestors(os.path.realpath(folder))
+    }
 
 
 def _find_marked_folder(folder: Path, shared: set[str]) -> str | None:
     """Return the nearest folder above that is marked as the top of a project."""
-    for place in _list_ancestors(folder):
-        if str(place) in shared:
+    for ancestor in _list_ancestors(folder):
+        if str(ancestor) in shared:
             return None
-        if any((place / mark).exists() for mark in _PROJECT_MARKS):
-            return str(place)
+        if any((ancestor / mark).exists() for mark in _PROJECT_MARKS):
+            return str(ancestor)
     return None
 
 
@@ -465,18 +469,18 @@ def _expect_regular_or_none(path: Path, *, links: bool = True) -> None:
 
 @contextmanager
 def _open_temporary(
-    target: Path, there: os.stat_result | None, *, in_place: bool = True
+    target: Path, target_stat: os.stat_result | None, *, in_place: bool = True
 ) -> Iterator[BinaryIO]:
     """Yield a stream to a temporary file that replaces the target when the context ends.
 
     Args:
         target: path of the file.
-        there: status of the present file; None without one or if it may be replaced anyway.
+        target_stat: status of the present file; None without one or if it may be replaced anyway.
         in_place: whether a file with several hard links, or whose owner cannot be copied, is
             overwritten instead of replaced.
     """
     # The mode counts too, because root may write read-only files.
-    if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
+    if target_stat is not None and not (target_stat.st_mode & 0o222 and os.access(target, os.W_OK)):
         raise OsimliteError(
             "cannot write the file: it is read-only; make it writable first", file=str(target)
         )
@@ -491,11 +495,11 @@ def _open_temporary(
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
-        if there is None:
+        if target_stat is None:
             Path(name).chmod(0o666 & ~_get_umask())
-        is_alike = there is None or _copy_attributes(name, target, there)
-        if not is_alike and not in_place and there is not None:
-            os.chmod(name, stat.S_IMODE(there.st_mode))
+        is_alike = target_stat is None or _copy_attributes(name, target, target_stat)
+        if not is_alike and not in_place and target_stat is not None:
+            os.chmod(name, stat.S_IMODE(target_stat.st_mode))
             is_alike = True
         replaces = is_alike and _replace_file(name, target)
     except OSError as error:
@@ -537,9 +541,9 @@ def make_folder(path: str | Path) -> Path:
     except OSError as error:
         file = next(
             (
-                place
-                for place in (folder, *folder.parents)
-                if os.path.exists(place) and not place.is_dir()
+                ancestor
+                for ancestor in (folder, *folder.parents)
+                if os.path.exists(ancestor) and not ancestor.is_dir()
             ),
             None,
         )
@@ -593,19 +597,19 @@ def _open_special(target: Path) -> Iterator[BinaryIO]:
         raise OsimliteError(f"cannot write the file: {reason}", file=str(target)) from None
 
 
-def _copy_attributes(name: str, target: Path, there: os.stat_result) -> bool:
+def _copy_attributes(name: str, target: Path, target_stat: os.stat_result) -> bool:
     """Copy owner, mode and extended attributes to a new file; return whether all could be copied.
 
     Returns:
         Whether all could be copied; no file with several hard links counts as copied.
     """
-    if there.st_nlink > 1:
+    if target_stat.st_nlink > 1:
         return False
     try:
-        made = os.stat(name)
-        if (made.st_uid, made.st_gid) != (there.st_uid, there.st_gid):
-            os.chown(name, there.st_uid, there.st_gid)
-        os.chmod(name, stat.S_IMODE(there.st_mode))
+        new_stat = os.stat(name)
+        if (new_stat.st_uid, new_stat.st_gid) != (target_stat.st_uid, target_stat.st_gid):
+            os.chown(name, target_stat.st_uid, target_stat.st_gid)
+        os.chmod(name, stat.S_IMODE(target_stat.st_mode))
         if sys.platform == "linux":
             for attribute in os.listxattr(target):
                 os.setxattr(name, attribute, os.getxattr(target, attribute))

@@ -24,10 +24,10 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
     result = check_mjcf(read(file), mjcf)
     print_table(_make_table(result, mjcf.name))
     if result.missing:
-        say(f"not in it: {join_words(list(result.missing), most=6)}")
+        say(f"not in it: {join_words(list(result.missing), max_count=6)}")
     if result.coordinates:
         say(
-            f"no joint has the name of {join_words(list(result.coordinates), most=6)}: it stands where it stands"
+            f"no joint has the name of {join_words(list(result.coordinates), max_count=6)}: it stands where it stands"
         )
     if result.bodies is not None:
         say(f"origins of bodies are off by {1e3 * result.bodies.rms:.2g} mm (root mean square)")

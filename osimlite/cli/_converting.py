@@ -405,7 +405,7 @@ def report(request: Request, result: Conversion) -> None:
         print_table(tabulate(result.fidelity, request.target))
     same, changed, dropped = result.fidelity.counts()
     say(f"parts: {same} exact, {changed} approximated or converted, {dropped} left out")
-    say("wrote " + join_words([str(path) for path in result.files], most=4))
+    say("wrote " + join_words([str(path) for path in result.files], max_count=4))
 
 
 def print_formats() -> None:

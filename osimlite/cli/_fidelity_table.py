@@ -38,7 +38,7 @@ def tabulate(fidelity: Fidelity, target: str) -> Any:
             table,
             group.cannot_say,
             group.done,
-            join_words(list(names), most=3),
+            join_words(list(names), max_count=3),
             *([", ".join(worst)] if measured else []),
         )
     return table

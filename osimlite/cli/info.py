@@ -47,7 +47,7 @@ def info(
         _print_table_info(file, everything)
         return
     source = Source.from_file(file)
-    document = read_document(source, of=Object)
+    document = read_document(source, expected_class=Object)
     model = document.top
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
     if not isinstance(model, Model):

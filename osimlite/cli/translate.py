@@ -140,7 +140,7 @@ def translate(
         if robot is None
         else f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move"
     )
-    say(f"{summary}; wrote " + join_words([str(path) for path in written], most=4))
+    say(f"{summary}; wrote " + join_words([str(path) for path in written], max_count=4))
     # Some formats cannot express the initial state, and say so.
     if getattr(made, "start_note", ""):
         say(made.start_note)

@@ -49,7 +49,7 @@ def upgrade(
 
     style = options.check_number_format(numbers)
     require_stated_version(Source.from_file(file))
-    document = read_document(Source.from_file(file), of=Object)
+    document = read_document(Source.from_file(file), expected_class=Object)
     is_repaired = document.fault is not None
     if document.version >= CURRENT_VERSION and output is None and not is_repaired:
         say(f"{file}: already version {document.version}, nothing to do")

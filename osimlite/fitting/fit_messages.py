@@ -69,7 +69,7 @@ def describe_fit(
     if motion.undetermined:
         yield (
             "no measurement determines "
-            f"{join_words(motion.undetermined, most=MAX_NAMED_COORDINATES)}, which stay near the "
+            f"{join_words(motion.undetermined, max_count=MAX_NAMED_COORDINATES)}, which stay near the "
             "default pose; OpenSim may find other values, such as the middle of their ranges. Lock "
             "them, or add tasks for them"
         )
@@ -97,6 +97,6 @@ def describe_unknown(model: Model, consequence: str) -> str:
     return (
         f"{consequence}: {format_count(len(parts), 'part')} of classes that osimlite does not "
         "know, "
-        f"{join_words(parts, most=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in "
+        f"{join_words(parts, max_count=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in "
         "of these classes is loaded"
     )

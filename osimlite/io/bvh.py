@@ -90,23 +90,23 @@ class BvhMotion:
         column = 0
         # Joints come depth-first, so that a parent is computed before its children.
         for index, joint in enumerate(self.joints):
-            turn = np.broadcast_to(np.eye(3), (count, 3, 3))
-            place = np.tile(joint.offset, (count, 1))
+            rotation = np.broadcast_to(np.eye(3), (count, 3, 3))
+            position = np.tile(joint.offset, (count, 1))
             for channel in joint.channels:
                 axis = "XYZ".index(channel[0])
                 if channel.endswith("position"):
                     # A position replaces the offset, as in Blender.
-                    place[:, axis] = self.values[:, column]
+                    position[:, axis] = self.values[:, column]
                 else:
                     # Channels are applied from left to right, each in the axes that the previous
                     # ones have turned.
-                    turn = turn @ _rotate(axis, np.radians(self.values[:, column]))
+                    rotation = rotation @ _rotate(axis, np.radians(self.values[:, column]))
                 column += 1
             if joint.parent >= 0:
                 above = rotations[:, joint.parent]
-                place = positions[:, joint.parent] + np.einsum("nij,nj->ni", above, place)
-                turn = above @ turn
-            rotations[:, index], positions[:, index] = turn, place
+                position = positions[:, joint.parent] + np.einsum("nij,nj->ni", above, position)
+                rotation = above @ rotation
+            rotations[:, index], positions[:, index] = rotation, position
         return rotations, positions
 
 
@@ -205,9 +205,9 @@ class _BvhReader:
         """Return the next word; raise an error if another one was expected."""
         word = self.peek()
         if not word or (expected and word.lower() != expected.lower()):
-            wanted = f"'{expected}'" if expected else "more"
-            present = f"'{word}'" if word else "the end of the file"
-            raise self.fail(f"expected {wanted}, found {present}")
+            expected_text = f"'{expected}'" if expected else "more"
+            actual_text = f"'{word}'" if word else "the end of the file"
+            raise self.fail(f"expected {expected_text}, found {actual_text}")
         self.position += 1
         return word
 
@@ -276,13 +276,13 @@ def read_bvh(path: str | Path) -> BvhMotion:
     if frame_time <= 0.0:
         raise reader.fail(f"the frame time is {frame_time:g} s; it must be positive")
     width = sum(len(joint.channels) for joint in joints)
-    rest = len(reader.words) - reader.position
+    word_count = len(reader.words) - reader.position
     # Compared before the numbers are read, so that a wrong count does not fill the memory.
-    if rest != count * width:
+    if word_count != count * width:
         raise reader.fail(
-            f"{count} frames of {width} channels are {count * width} numbers, but {rest} words follow"
+            f"{count} frames of {width} channels are {count * width} numbers, but {word_count} words follow"
         )
-    values = np.array([reader.take_number() for _ in range(rest)]).reshape(count, width)
+    values = np.array([reader.take_number() for _ in range(word_count)]).reshape(count, width)
     return BvhMotion(tuple(joints), frame_time, values, str(path))
 
 
@@ -333,9 +333,9 @@ def _take_channel_count(reader: _BvhReader) -> int:
 def _take_channel(reader: _BvhReader) -> str:
     """Read the name of a channel."""
     word = reader.peek()
-    known = {name.lower(): name for name in (*POSITIONS, *ROTATIONS)}
-    if word.lower() not in known:
+    channels = {name.lower(): name for name in (*POSITIONS, *ROTATIONS)}
+    if word.lower() not in channels:
         # Channel names are in any letter case.
-        raise reader.fail(f"unknown channel '{word}'; channels are {', '.join(known.values())}")
+        raise reader.fail(f"unknown channel '{word}'; channels are {', '.join(channels.values())}")
     reader.take()
-    return known[word.lower()]
+    return channels[word.lower()]

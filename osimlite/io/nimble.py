@@ -168,8 +168,8 @@ def list_coordinates(model: Model) -> list[Coordinate]:
     bodies = {path for path in bodies if path.rpartition("/")[2] not in OMITTED_BODIES}
     roots: list[tuple[Joint, str]] = []
     # An object of an unknown class is not a Joint.
-    parts: list[Object] = [*model.joint_set.objects]
-    for joint in parts:
+    joint_objects: list[Object] = [*model.joint_set.objects]
+    for joint in joint_objects:
         if not isinstance(joint, Joint):
             continue
         child = _find_body(tree, joint, "socket_child_frame")
@@ -182,7 +182,11 @@ def list_coordinates(model: Model) -> list[Coordinate]:
     joints = max((_walk(children, root) for root in roots), key=len, default=[])
     if model.document_version < JOINT_SET_VERSION:
         selected = {id(joint) for joint in joints}
-        joints = [each for each in parts if isinstance(each, Joint) and id(each) in selected]
+        joints = [
+            member
+            for member in joint_objects
+            if isinstance(member, Joint) and id(member) in selected
+        ]
     return [
         coordinate
         for joint in joints

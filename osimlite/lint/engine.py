@@ -54,7 +54,7 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
 
         return Table(source.data, source.file, config)
     return _make_document_subject(
-        survey_source(source, of=Object if is_document(source.file) else Model), config
+        survey_source(source, expected_class=Object if is_document(source.file) else Model), config
     )
 
 

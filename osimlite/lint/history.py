@@ -49,7 +49,7 @@ def load_later_changes(release: str) -> LaterChanges:
     )
     if release not in known["formats"]:
         raise OsimliteError(
-            f"unknown release of OpenSim '{release}'; known are {join_words(known['formats'], most=20)}"
+            f"unknown release of OpenSim '{release}'; known are {join_words(known['formats'], max_count=20)}"
         )
     numbers = _parse_release(release)
     return LaterChanges(

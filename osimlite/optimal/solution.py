@@ -141,7 +141,7 @@ def build_problem(
     if isinstance(study, MocoStudy):
         return Problem(study, folder=None if folder is None else Path(folder), scaled=scaled)
     with name_file_in_errors(study):
-        top: Any = read_document(Source.from_file(Path(study)), of=MocoStudy).top
+        top: Any = read_document(Source.from_file(Path(study)), expected_class=MocoStudy).top
         return Problem(top, Path(study), scaled=scaled)
 
 

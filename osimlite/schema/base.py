@@ -57,7 +57,10 @@ def are_equal(left: Any, right: Any) -> bool:
         return (
             isinstance(right, (tuple, list))
             and len(left) == len(right)
-            and all(are_equal(one, other) for one, other in zip(left, right, strict=True))
+            and all(
+                are_equal(left_item, right_item)
+                for left_item, right_item in zip(left, right, strict=True)
+            )
         )
     if isinstance(left, float) and isinstance(right, float):
         return left == right or (left != left and right != right)
@@ -104,12 +107,12 @@ class ObjectType(ModelMetaclass):  # noqa: D101
     @property
     def __doc__(cls) -> str | None:  # type: ignore[override]
         """Docstring of a class, followed by descriptions of its properties."""
-        own: str | None = cls.__dict__.get("__doc__")
-        if not issubclass(cls, Object) or not own:
-            return own
+        docstring: str | None = cls.__dict__.get("__doc__")
+        if not issubclass(cls, Object) or not docstring:
+            return docstring
         from osimlite.schema.descriptions import add_properties
 
-        return add_properties(cls, own)
+        return add_properties(cls, docstring)
 
 
 class Object(BaseModel, metaclass=ObjectType):
@@ -245,16 +248,16 @@ class Object(BaseModel, metaclass=ObjectType):
 
     def list_owned_objects(self) -> list[tuple[FieldSpec, Object]]:
         """Return every object that this one owns, with the property that holds it, in printing order."""
-        held: list[tuple[FieldSpec, Object]] = []
+        owned: list[tuple[FieldSpec, Object]] = []
         state = self.__dict__
         for spec, name, is_list, _ in list_holding_properties(type(self)):
             # A list that was never accessed is empty; do not create it.
             value: Any = state[name] if name in state else () if is_list else getattr(self, name)
             if is_list or isinstance(value, list):
-                held += [(spec, item) for item in value]
+                owned += [(spec, item) for item in value]
             elif value is not None:
-                held.append((spec, value))
-        return held
+                owned.append((spec, value))
+        return owned
 
     def find_contradictions(self) -> Iterable[Contradiction]:
         """Yield combinations of property values that OpenSim rejects although each value is valid.
@@ -271,7 +274,7 @@ class Object(BaseModel, metaclass=ObjectType):
             item = pending.pop()
             yield item
             if list_holding_properties(type(item)):
-                pending += [held for _, held in item.list_owned_objects()][::-1]
+                pending += [child for _, child in item.list_owned_objects()][::-1]
 
     def copy_deep(self) -> Self:
         """Return a copy that shares nothing with the original."""
@@ -351,9 +354,9 @@ class Object(BaseModel, metaclass=ObjectType):
             # inside point to the copies.
             for state, name in naming:
                 value = state[name]
-                words = value if isinstance(value, tuple) else (value,)
-                known = tuple(memo.setdefault(id(word), word) for word in words)
-                state[name] = known if isinstance(value, tuple) else known[0]
+                targets = value if isinstance(value, tuple) else (value,)
+                copies = tuple(memo.setdefault(id(target), target) for target in targets)
+                state[name] = copies if isinstance(value, tuple) else copies[0]
             del memo[_NAMING]
         return clone
 
@@ -404,8 +407,8 @@ class Component(Object, abstract=True):
     @property
     def model(self) -> Model | None:
         """Model in which this component was last seen."""
-        known = self._model
-        return known.model if type(known) is Home else cast("Model | None", known)
+        holder = self._model
+        return holder.model if type(holder) is Home else cast("Model | None", holder)
 
     @property
     def parent(self) -> Component | None:
@@ -453,11 +456,11 @@ _set = object.__setattr__
 
 def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, Any] | None:
     """Return properties in their stored form; None if pydantic has to validate or to report an error."""
-    known = make_checks(cls)
-    if known is None or not properties.keys() <= known.keys():
+    checks = make_checks(cls)
+    if checks is None or not properties.keys() <= checks.keys():
         return None
     try:
-        return {name: known[name](value) for name, value in properties.items()}
+        return {name: checks[name](value) for name, value in properties.items()}
     except ValueError:
         return None
 
@@ -484,7 +487,7 @@ def _copy_object(
         if kind in _PLAIN or (kind is tuple and _PLAIN.issuperset(map(type, value))):
             continue
         if kind is ObjectList:
-            state[name] = ObjectList(_copy_object(each, memo, naming, home) for each in value)
+            state[name] = ObjectList(_copy_object(member, memo, naming, home) for member in value)
         elif name in owned and isinstance(value, Object):
             state[name] = _copy_object(value, memo, naming, home)
         elif isinstance(value, Component) or kind is tuple:

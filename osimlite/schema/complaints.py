@@ -20,13 +20,13 @@ def describe_unknown_property(cls: type[Object], name: str) -> str:
     """
     from osimlite.base.text import suggest_name
 
-    known = [field_name for field_name in cls.model_fields]
+    field_names = [field_name for field_name in cls.model_fields]
     # Users know a socket by the middle of its attribute: ``frame`` for ``socket_frame``.
-    within = [field_name for field_name in known if f"_{name}_" in f"{field_name}_"]
+    matches = [field_name for field_name in field_names if f"_{name}_" in f"{field_name}_"]
     better = (
-        f"; did you mean '{min(within, key=len)}'?"
-        if within and len(name) > 3
-        else suggest_name(name, known)
+        f"; did you mean '{min(matches, key=len)}'?"
+        if matches and len(name) > 3
+        else suggest_name(name, field_names)
     )
     return f"{cls.__name__} has no property '{name}'{better}"
 
@@ -38,23 +38,23 @@ def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
         cls: the class.
         error: pydantic's error.
     """
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"]) or "?"
-    reason = first["msg"].removeprefix("Value error, ")
-    given = first.get("input")
-    angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", given) if isinstance(given, str) else None
+    first_error = error.errors()[0]
+    location = ".".join(str(part) for part in first_error["loc"]) or "?"
+    reason = first_error["msg"].removeprefix("Value error, ")
+    value = first_error.get("input")
+    angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", value) if isinstance(value, str) else None
     hint = (
         f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
     )
-    return f"{cls.__name__}.{place}: {reason}{hint}"
+    return f"{cls.__name__}.{location}: {reason}{hint}"
 
 
-def describe_unnamed_value(cls: type[Object], given: object) -> str:
+def describe_unnamed_value(cls: type[Object], value: object) -> str:
     """Return the message for a positional argument.
 
     Args:
         cls: the class.
-        given: the argument.
+        value: the argument.
     """
-    example = repr(given) if isinstance(given, str) else "..."
+    example = repr(value) if isinstance(value, str) else "..."
     return f"{cls.__name__} takes its properties by name, as in {cls.__name__}(name={example})"

@@ -30,14 +30,14 @@ def describe_value(spec: FieldSpec) -> str:
     """
     kind = spec.kind
     if isinstance(kind, Value):
-        words = kind.words()
+        text = kind.words()
         if kind.choices:
-            words = "one of " + ", ".join(map(str, kind.choices))
-        words += f" in {kind.unit}" if kind.unit else ""
-        return words + (f", {kind.domain}" if kind.domain else "")
+            text = "one of " + ", ".join(map(str, kind.choices))
+        text += f" in {kind.unit}" if kind.unit else ""
+        return text + (f", {kind.domain}" if kind.domain else "")
     if isinstance(kind, Reference):
-        many = kind.shape == "list"
-        return f"names of {kind.target} components" if many else f"the name of a {kind.target}"
+        is_list = kind.shape == "list"
+        return f"names of {kind.target} components" if is_list else f"the name of a {kind.target}"
     assert isinstance(kind, ObjectField) and spec.accepts is not None
     tag = spec.accepts.tag or "Object"
     return f"objects of class {tag}" if kind.form == "list" else f"one {tag}"
@@ -49,22 +49,29 @@ def describe_class(cls: type[Object]) -> str:
 
 
 @cache
-def add_properties(cls: type[Object], own: str) -> str:
+def add_properties(cls: type[Object], docstring: str) -> str:
     """Return a docstring with a section on the properties of the class, for ``help()``.
 
     Args:
         cls: the class.
-        own: its docstring.
+        docstring: its docstring.
     """
-    rows = [inspect.cleandoc(own), "", "Properties, in the order of a file:", "    name: a text"]
+    rows = [
+        inspect.cleandoc(docstring),
+        "",
+        "Properties, in the order of a file:",
+        "    name: a text",
+    ]
     for spec in get_field_specs(cls).values():
-        given = (
+        default_text = (
             ""
             if isinstance(spec.kind, ObjectField)
             else f"; {_format_property(spec.default)} by default"
         )
         meaning = " ".join(describe_property(spec).split())
-        text = f"{spec.name}: {describe_value(spec)}{given}" + (f". {meaning}" if meaning else "")
+        text = f"{spec.name}: {describe_value(spec)}{default_text}" + (
+            f". {meaning}" if meaning else ""
+        )
         rows.append(textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="        "))
     return "\n".join(rows)
 

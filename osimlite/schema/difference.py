@@ -70,23 +70,27 @@ class _Comparison:
         for path in _find_missing_paths(self.new, self.old):
             yield Difference(path, "", None, _describe_type(self.new.by_path[path]))
 
-    def _object(self, path: str, way: str, old: Object, new: Object) -> Iterator[Difference]:
-        """Compare two objects at the same position; `way` is the property that leads to them.
+    def _object(
+        self, path: str, property_path: str, old: Object, new: Object
+    ) -> Iterator[Difference]:
+        """Compare two objects at the same position; `property_path` is the property that leads to them.
 
         Yields:
             Differences of their class and properties.
         """
         if _describe_type(old) != _describe_type(new):
-            yield Difference(path, way or "class", _describe_type(old), _describe_type(new))
+            yield Difference(
+                path, property_path or "class", _describe_type(old), _describe_type(new)
+            )
             # An owned object of another class is reported as a whole. Of a component at its path
             # the properties that both classes have are compared as well.
-            if way:
+            if property_path:
                 return
         if isinstance(old, Unknown) or isinstance(new, Unknown):
             if isinstance(old, Unknown) and isinstance(new, Unknown) and old.content != new.content:
                 # The properties of an unknown class are only text. If one class is known, the
                 # difference of the classes has been reported.
-                yield from _compare_contents(path, way, old.content, new.content)
+                yield from _compare_contents(path, property_path, old.content, new.content)
             return
         # If the classes differ, compare the properties that both have.
         for spec in [
@@ -94,59 +98,68 @@ class _Comparison:
             for tag, spec in get_field_specs(type(new)).items()
             if tag in get_field_specs(type(old))
         ]:
-            place = f"{way}.{spec.tag}" if way else spec.tag
-            one, other = getattr(old, spec.name), getattr(new, spec.name)
+            child_path = f"{property_path}.{spec.tag}" if property_path else spec.tag
+            old_value, new_value = getattr(old, spec.name), getattr(new, spec.name)
             if isinstance(spec.kind, ObjectField):
                 yield from self._compare_owned(
-                    path, place, spec.kind.form == "list", _list_objects(one), _list_objects(other)
+                    path,
+                    child_path,
+                    spec.kind.form == "list",
+                    _list_objects(old_value),
+                    _list_objects(new_value),
                 )
             elif isinstance(spec.kind, Reference):
                 # References are compared by the components that they lead to: a path and a name
                 # can mean the same one.
                 names = (
-                    self._names(self.old, old, spec, one),
-                    self._names(self.new, new, spec, other),
+                    self._names(self.old, old, spec, old_value),
+                    self._names(self.new, new, spec, new_value),
                 )
                 if names[0] != names[1]:
-                    yield Difference(path, place, *names)
-            elif not _are_equal(one, other):
-                yield Difference(path, place, one, other)
+                    yield Difference(path, child_path, *names)
+            elif not _are_equal(old_value, new_value):
+                yield Difference(path, child_path, old_value, new_value)
 
     def _compare_owned(
-        self, path: str, way: str, named: bool, old: list[Object], new: list[Object]
+        self, path: str, property_path: str, are_named: bool, old: list[Object], new: list[Object]
     ) -> Iterator[Difference]:
         """Compare objects without a path; components are compared at their own path.
 
-        `named` says whether the names of the objects count.
+        `are_named` says whether the names of the objects count.
 
         Yields:
             Differences of the objects.
         """
-        before = [item for item in old if self.old is None or not isinstance(item, Component)]
-        after = [item for item in new if self.new is None or not isinstance(item, Component)]
+        old_objects = [item for item in old if self.old is None or not isinstance(item, Component)]
+        new_objects = [item for item in new if self.new is None or not isinstance(item, Component)]
         if (
             self.old is None
-            and named
-            and (old_names := _index_by_name(before))
-            and (new_names := _index_by_name(after))
+            and are_named
+            and (old_names := _index_by_name(old_objects))
+            and (new_names := _index_by_name(new_objects))
         ):
             # Outside of models members have no paths, so match them by name.
             for name in dict.fromkeys([*old_names, *new_names]):
                 yield from self._pair(
-                    path, f"{way}[{name}]", old_names.get(name), new_names.get(name)
+                    path, f"{property_path}[{name}]", old_names.get(name), new_names.get(name)
                 )
             return
         # A single object needs no number in its place; positions decide where names are missing
         # or repeated.
-        many = max(len(before), len(after)) > 1
-        for number, (one, other) in enumerate(zip_longest(before, after)):
-            place = f"{way}[{number}]" if many else way
-            if named and one is not None and other is not None and one.name != other.name:
-                yield Difference(path, f"{place}.name", one.name, other.name)
-            yield from self._pair(path, place, one, other)
+        has_several = max(len(old_objects), len(new_objects)) > 1
+        for number, (old_object, new_object) in enumerate(zip_longest(old_objects, new_objects)):
+            item_path = f"{property_path}[{number}]" if has_several else property_path
+            if (
+                are_named
+                and old_object is not None
+                and new_object is not None
+                and old_object.name != new_object.name
+            ):
+                yield Difference(path, f"{item_path}.name", old_object.name, new_object.name)
+            yield from self._pair(path, item_path, old_object, new_object)
 
     def _pair(
-        self, path: str, place: str, old: Object | None, new: Object | None
+        self, path: str, property_path: str, old: Object | None, new: Object | None
     ) -> Iterator[Difference]:
         """Compare two objects, either of which may be missing.
 
@@ -154,9 +167,11 @@ class _Comparison:
             Differences of the objects.
         """
         if old is not None and new is not None:
-            yield from self._object(path, place, old, new)
+            yield from self._object(path, property_path, old, new)
         elif old is not None or new is not None:
-            yield Difference(path, place, old and _describe_type(old), new and _describe_type(new))
+            yield Difference(
+                path, property_path, old and _describe_type(old), new and _describe_type(new)
+            )
 
     def _names(self, tree: Tree | None, holder: Object, spec: FieldSpec, value: Any) -> Any:
         """Return a reference in canonical form: the path of its component if it leads to one."""
@@ -186,18 +201,22 @@ _MARKUP = re.compile(
 _ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 
 
-def _compare_contents(path: str, way: str, old: str, new: str) -> Iterator[Difference]:
+def _compare_contents(path: str, property_path: str, old: str, new: str) -> Iterator[Difference]:
     """Yield the values that differ in the XML of two objects of an unknown class.
 
     White space around values and between elements, comments, and the spelling of numbers do not
     count.
     """
-    before, after = _flatten_content(old), _flatten_content(new)
-    for place in dict.fromkeys([*before, *after]):
-        one, other = before.get(place), after.get(place)
-        if one is None or other is None or not _have_same_words(one, other):
-            what = f"{way}.{place}" if way and place else way or place or "content"
-            yield Difference(path, what, one, other)
+    old_texts, new_texts = _flatten_content(old), _flatten_content(new)
+    for tag_path in dict.fromkeys([*old_texts, *new_texts]):
+        old_text, new_text = old_texts.get(tag_path), new_texts.get(tag_path)
+        if old_text is None or new_text is None or not _have_same_words(old_text, new_text):
+            full_path = (
+                f"{property_path}.{tag_path}"
+                if property_path and tag_path
+                else property_path or tag_path or "content"
+            )
+            yield Difference(path, full_path, old_text, new_text)
 
 
 def _flatten_content(content: str) -> dict[str, str]:
@@ -221,51 +240,51 @@ def _flatten_content(content: str) -> dict[str, str]:
             # A name identifies an element among its siblings, so that it is part of the place and
             # no value.
             name = attributes.pop("name", "")
-            place = ""
+            element_path = ""
             if levels:
-                word = f"{match['tag']}[{name}]" if name else match["tag"]
+                element_name = f"{match['tag']}[{name}]" if name else match["tag"]
                 above = levels[-1]
                 above.has_children = True
                 # Elements with equal tags and names are counted, so that each keeps a place of
                 # its own.
-                number = above.counts.get(word, 0)
-                above.counts[word] = number + 1
-                word += f"({number + 1})" if number else ""
-                place = f"{above.place}.{word}" if above.place else word
+                number = above.counts.get(element_name, 0)
+                above.counts[element_name] = number + 1
+                element_name += f"({number + 1})" if number else ""
+                element_path = f"{above.path}.{element_name}" if above.path else element_name
             for attribute, value in attributes.items():
-                result[f"{place}@{attribute}"] = value
-            levels.append(_Level(place))
+                result[f"{element_path}@{attribute}"] = value
+            levels.append(_Level(element_path))
         if (match["close"] or match["empty"]) and levels:
             level = levels.pop()
             # White space between child elements is no value. An empty element without children is
             # one.
-            if level.place and (level.text.strip() or not level.has_children):
-                result[level.place] = level.text.strip()
+            if level.path and (level.text.strip() or not level.has_children):
+                result[level.path] = level.text.strip()
     return result
 
 
 class _Level:
     """Element of an XML fragment while it is parsed."""
 
-    def __init__(self, place: str) -> None:
-        self.place = place
+    def __init__(self, path: str) -> None:
+        self.path = path
         self.text = ""
         self.has_children = False
         self.counts: dict[str, int] = {}
 
 
-def _have_same_words(one: str, other: str) -> bool:
+def _have_same_words(left: str, right: str) -> bool:
     """Return whether two texts have the same words, or numbers."""
-    words, others = one.split(), other.split()
-    return len(words) == len(others) and all(map(_are_same_word, words, others))
+    left_words, right_words = left.split(), right.split()
+    return len(left_words) == len(right_words) and all(map(_are_same_word, left_words, right_words))
 
 
-def _are_same_word(one: str, other: str) -> bool:
-    if one == other:
+def _are_same_word(left: str, right: str) -> bool:
+    if left == right:
         return True
     try:
         # 1 and 1.0 are the same number.
-        return float(one) == float(other)
+        return float(left) == float(right)
     except ValueError:
         return False
 
@@ -274,20 +293,20 @@ def _list_objects(value: Any) -> list[Object]:
     return value if isinstance(value, list) else [] if value is None else [value]
 
 
-def _index_by_name(items: list[Object]) -> dict[str, Object]:
+def _index_by_name(objects: list[Object]) -> dict[str, Object]:
     """Return objects by name; empty if a name is missing or occurs twice."""
     # A dictionary with fewer entries than items shows that a name occurs twice.
-    result = {item.name: item for item in items}
-    return result if len(result) == len(items) and "" not in result else {}
+    result = {item.name: item for item in objects}
+    return result if len(result) == len(objects) and "" not in result else {}
 
 
 def _describe_type(item: Object) -> str:
     return item.class_name if isinstance(item, Unknown) else item.tag
 
 
-def _are_equal(one: Any, other: Any) -> bool:
+def _are_equal(left: Any, right: Any) -> bool:
     # NaN differs from itself, but its text does not.
-    return bool(one == other) or repr(one) == repr(other)
+    return bool(left == right) or repr(left) == repr(right)
 
 
 def _find_missing_paths(tree: Tree, other: Tree) -> Iterator[str]:

@@ -41,9 +41,9 @@ def rename_component(model: Model, component: Component, name: str) -> None:
             f"'{name}' is not a legal name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'"
         )
     parent = tree.parent_of(component)
-    wanted = f"{'' if parent is None else path.rsplit('/', 1)[0]}/{name}"
-    taken = tree.by_path.get(wanted)
-    if parent is not None and taken is not None and taken is not component:
+    new_path = f"{'' if parent is None else path.rsplit('/', 1)[0]}/{name}"
+    occupant = tree.by_path.get(new_path)
+    if parent is not None and occupant is not None and occupant is not component:
         raise ModelError(f"cannot rename '{path}': its parent has a '{name}' already")
     texts = [
         (use, find_named_component(tree, use)) for use in tree.uses() if isinstance(use.value, str)

@@ -110,12 +110,12 @@ class Value(FieldType):
             return _check_scalar(self.scalar, value)
         if isinstance(value, str) or not isinstance(value, Iterable):
             raise ValueError(f"expected {self.words()}, got {value!r}")
-        items = tuple(_check_scalar(self.scalar, item) for item in value)
+        checked = tuple(_check_scalar(self.scalar, item) for item in value)
         size = _FIXED_SIZE.get(self.shape)
-        least, most = (size, size) if size is not None else (self.least, self.most)
-        if len(items) < least or (most is not None and len(items) > most):
-            raise ValueError(f"expected {self.words()}, got {len(items)}")
-        return items
+        min_count, max_count = (size, size) if size is not None else (self.least, self.most)
+        if len(checked) < min_count or (max_count is not None and len(checked) > max_count):
+            raise ValueError(f"expected {self.words()}, got {len(checked)}")
+        return checked
 
     def words(self) -> str:
         """Describe the expected text: ``"3 numbers"``, ``"true or false"``.
@@ -469,16 +469,16 @@ LegacyOptional = Annotated[T | None, ObjectField("optional", legacy=True)]
 
 def make_domain_test(domain: str) -> Callable[[float], bool]:
     """Return a test for a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"``."""
-    domain, _, besides = domain.partition(" or ")
-    if besides:
-        inside, alone = make_domain_test(domain), float(besides)
-        return lambda value: value == alone or inside(value)
-    between = re.fullmatch(r"(\S+) to (\S+)", domain)
-    if between:
-        low, high = float(between[1]), float(between[2])
+    domain, _, alternative = domain.partition(" or ")
+    if alternative:
+        is_in_domain, extra_value = make_domain_test(domain), float(alternative)
+        return lambda value: value == extra_value or is_in_domain(value)
+    interval = re.fullmatch(r"(\S+) to (\S+)", domain)
+    if interval:
+        low, high = float(interval[1]), float(interval[2])
         return lambda value: low <= value <= high
-    sign, _, bound = domain.partition(" ")
-    limit = float(bound)
+    sign, _, limit_text = domain.partition(" ")
+    limit = float(limit_text)
     return {
         ">": lambda value: value > limit,
         ">=": lambda value: value >= limit,

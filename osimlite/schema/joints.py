@@ -87,18 +87,18 @@ class Joint(ModelComponent, abstract=True):
                     f"'{self.name}' connects frames, such as model.ground and a Body, not {frame!r}; "
                     "give the component itself"
                 )
-        inner = PhysicalOffsetFrame(
+        parent_offset = PhysicalOffsetFrame(
             name=f"{parent.name}_offset", socket_parent=parent, translation=at, orientation=turned
         )
-        outer = PhysicalOffsetFrame(
+        child_offset = PhysicalOffsetFrame(
             name=f"{child.name}_offset",
             socket_parent=child,
             translation=child_at,
             orientation=child_turned,
         )
-        self.frames = [inner, outer]
-        self.socket_parent_frame = inner
-        self.socket_child_frame = outer
+        self.frames = [parent_offset, child_offset]
+        self.socket_parent_frame = parent_offset
+        self.socket_child_frame = child_offset
         return self
 
 

@@ -46,16 +46,20 @@ def make_json_schema(tag: str = "Model") -> dict[str, Any]:
         definitions[cls.tag] = _make_definition(cls, classes)
     for cls in {
         spec.accepts
-        for each in classes
-        for spec in get_field_specs(each).values()
+        for holder in classes
+        for spec in get_field_specs(holder).values()
         if spec.accepts is not None
     }:
         if cls.abstract:
-            held = [
-                *(_make_tagged_reference(other) for other in classes if issubclass(other, cls)),
+            alternatives = [
+                *(
+                    _make_tagged_reference(subclass)
+                    for subclass in classes
+                    if issubclass(subclass, cls)
+                ),
                 {"$ref": "#/$defs/Unknown"},
             ]
-            definitions[cls.tag] = {"description": _get_summary(cls), "anyOf": held}
+            definitions[cls.tag] = {"description": _get_summary(cls), "anyOf": alternatives}
     return {
         "$schema": DIALECT,
         "title": f"A {tag} of OpenSim 4.6 as plain data",
@@ -126,14 +130,14 @@ def _make_object_schema(
     spec: FieldSpec, kind: ObjectField, classes: list[type[Object]]
 ) -> dict[str, Any]:
     assert spec.accepts is not None
-    one = _make_reference(spec.accepts, classes)
+    schema = _make_reference(spec.accepts, classes)
     if kind.form == "list":
-        return {"type": "array", "items": one}
+        return {"type": "array", "items": schema}
     members = get_field_specs(spec.accepts).get("objects")
     if members is None:
-        return one
+        return schema
     # A set without further properties may be written as the list of its members.
-    return {"anyOf": [one, _make_content(members, classes)]}
+    return {"anyOf": [schema, _make_content(members, classes)]}
 
 
 def _make_reference(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:

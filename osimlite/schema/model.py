@@ -96,11 +96,11 @@ class Model(ModelComponent):
         """Return the index of all components by path, rebuilt after changes of the model."""
         from osimlite.schema.tree import Tree
 
-        known = getattr(self, "_tree", None)
-        if known is None or not known.is_current:
-            known = Tree(self) if known is None else known.renew()
-            object.__setattr__(self, "_tree", known)
-        return cast("Tree", known)
+        tree = getattr(self, "_tree", None)
+        if tree is None or not tree.is_current:
+            tree = Tree(self) if tree is None else tree.renew()
+            object.__setattr__(self, "_tree", tree)
+        return cast("Tree", tree)
 
     def outdate(self, *, numbers_only: bool = False) -> None:
         """Mark the index as outdated before a change of the model.
@@ -108,9 +108,9 @@ class Model(ModelComponent):
         Args:
             numbers_only: whether paths and references stay the same.
         """
-        known = getattr(self, "_tree", None)
-        if known is not None:
-            known.outdate(numbers_only=numbers_only)
+        tree = getattr(self, "_tree", None)
+        if tree is not None:
+            tree.outdate(numbers_only=numbers_only)
 
     @overload
     def components(self) -> Iterator[Component]: ...
@@ -196,21 +196,21 @@ class Model(ModelComponent):
         return components[0]
 
 
-def check_is_model(given: object) -> None:
+def check_is_model(value: object) -> None:
     """Check that a value is a model.
 
     Raises:
         OsimliteError: it is something else, most often the path of a file; the message says how to get
             a model.
     """
-    if isinstance(given, Model):
+    if isinstance(value, Model):
         return
-    if isinstance(given, str | PurePath):
+    if isinstance(value, str | PurePath):
         raise OsimliteError(
-            f"expected a Model, found a path; read the file first: osimlite.read('{given}')"
+            f"expected a Model, found a path; read the file first: osimlite.read('{value}')"
         )
     raise OsimliteError(
-        f"expected a Model, found a {type(given).__name__}; osimlite.read(path) returns a Model"
+        f"expected a Model, found a {type(value).__name__}; osimlite.read(path) returns a Model"
     )
 
 

@@ -247,10 +247,10 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     def find_contradictions(self) -> Iterator[Contradiction]:
         """Yield combinations that OpenSim rejects: simplified dynamics, a force-velocity threshold of at most 1/Flen."""
         yield from check_complete_dynamics(self)
-        if self.fv_linear_extrap_threshold <= (least := 1 / self.Flen):
+        if self.fv_linear_extrap_threshold <= (min_threshold := 1 / self.Flen):
             yield (
                 "fv_linear_extrap_threshold",
-                f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}",
+                f"its fv_linear_extrap_threshold is not above 1/Flen, {min_threshold:.4g}",
             )
         yield from _check_minimum_activation(self.minimum_activation)
 
@@ -345,8 +345,8 @@ class Millard2012EquilibriumMuscle(Muscle):
         yield from _check_minimum_activation(self.minimum_activation)
 
 
-def _check_minimum_activation(least: float) -> Iterator[Contradiction]:
-    if least == 1:
+def _check_minimum_activation(minimum_activation: float) -> Iterator[Contradiction]:
+    if minimum_activation == 1:
         yield "minimum_activation", "its minimum_activation is not less than 1"
 
 

@@ -83,26 +83,30 @@ class Pattern:
 
     def fullmatch(self, name: str) -> bool:
         """Return whether the whole of a name matches."""
-        known: dict[int, list[set[int]]] = {}
-        reached = self._lead_on([self._first], name, 0, known)
+        cached_starts: dict[int, list[set[int]]] = {}
+        reached = self._lead_on([self._first], name, 0, cached_starts)
         for index, character in enumerate(name):
             key = reached, character, index == len(name) - 1
             following = None if self._looks_around else self._steps.get(key)
             if following is None:
                 states = [self._states[number] for number in reached]
-                read = [
+                next_states = [
                     state.following[0]
                     for state in states
                     if state.test is not None and state.test(character)
                 ]
-                following = self._lead_on(read, name, index + 1, known)
+                following = self._lead_on(next_states, name, index + 1, cached_starts)
                 if not self._looks_around:
                     self._steps[key] = following
             reached = following
         return self._final in reached
 
     def _lead_on(
-        self, numbers: Iterable[int], name: str, index: int, known: dict[int, list[set[int]]]
+        self,
+        numbers: Iterable[int],
+        name: str,
+        index: int,
+        cached_starts: dict[int, list[set[int]]],
     ) -> frozenset[int]:
         """Return some states and all that they lead to without a character, before a character of a name."""
         waiting, reached = [*numbers], set[int]()
@@ -111,11 +115,15 @@ class Pattern:
             if number in reached:
                 continue
             reached.add(number)
-            if self._states[number].test is None and self._holds(number, name, index, known):
+            if self._states[number].test is None and self._holds(
+                number, name, index, cached_starts
+            ):
                 waiting += self._states[number].following
         return frozenset(reached)
 
-    def _holds(self, number: int, name: str, index: int, known: dict[int, list[set[int]]]) -> bool:
+    def _holds(
+        self, number: int, name: str, index: int, cached_starts: dict[int, list[set[int]]]
+    ) -> bool:
         """Return whether a state that reads no character leads on before a character of a name."""
         state = self._states[number]
         match state.anchor:
@@ -126,17 +134,17 @@ class Pattern:
             case "$":
                 return index == len(name)
             case "b" | "B":
-                before, after = (
+                is_word_before, is_word_after = (
                     name[max(index - 1, 0) : index] in _WORD,
                     name[index : index + 1] in _WORD,
                 )
-                return (before != after) == (state.anchor == "b")
-        if number not in known:
-            known[number] = self._find_matching_starts(state.inside[1], name, known)
-        return (state.inside[0] in known[number][index]) == (state.anchor == "=")
+                return (is_word_before != is_word_after) == (state.anchor == "b")
+        if number not in cached_starts:
+            cached_starts[number] = self._find_matching_starts(state.inside[1], name, cached_starts)
+        return (state.inside[0] in cached_starts[number][index]) == (state.anchor == "=")
 
     def _find_matching_starts(
-        self, final: int, name: str, known: dict[int, list[set[int]]]
+        self, final: int, name: str, cached_starts: dict[int, list[set[int]]]
     ) -> list[set[int]]:
         """Return, before each character of a name and at its end, the states that lead to a final one.
 
@@ -159,7 +167,8 @@ class Pattern:
                 waiting += (
                     source
                     for source in self._sources[number]
-                    if self._states[source].test is None and self._holds(source, name, index, known)
+                    if self._states[source].test is None
+                    and self._holds(source, name, index, cached_starts)
                 )
         return result
 
@@ -230,35 +239,35 @@ class _Compiler:
             end: its last state.
         """
         part_end = self.index
-        least, most = self._quantifier()
+        min_count, max_count = self._quantifier()
         self._takes("?")  # The shortest or the longest match: of whole names both are the same.
-        after = self.index
-        first = last = self._add()
-        copies = least if most is None else most
+        next_index = self.index
+        entry = tail = self._add()
+        copies = min_count if max_count is None else max_count
         pieces = [(start, end)]
         for _ in range(max(copies, 1) - 1):
             pieces.append(self._recompile(begin, part_end))
-        self.index = after
+        self.index = next_index
         skips: list[int] = []
         for number, (piece_start, piece_end) in enumerate(pieces):
-            if number >= least:
-                skips.append(last)
+            if number >= min_count:
+                skips.append(tail)
             if copies:
-                self._link(last, piece_start)
-                last = piece_end
+                self._link(tail, piece_start)
+                tail = piece_end
         finish = self._add()
-        if most is None:
+        if max_count is None:
             # The last piece may come again and again; without a least number it may also be left
             # out.
-            self._link(last, finish, pieces[-1][0])
+            self._link(tail, finish, pieces[-1][0])
         else:
-            self._link(last, finish)
-        if most is None and least == 0:
-            self._link(first, pieces[0][0], finish)
+            self._link(tail, finish)
+        if max_count is None and min_count == 0:
+            self._link(entry, pieces[0][0], finish)
             self._link(pieces[0][1], pieces[0][0], finish)
-        for skip in skips if most is not None else ():
+        for skip in skips if max_count is not None else ():
             self._link(skip, finish)
-        return first, finish
+        return entry, finish
 
     def _recompile(self, begin: int, end: int) -> tuple[int, int]:
         self.index = begin
@@ -271,17 +280,17 @@ class _Compiler:
         sign = self._take()
         if sign != "{":
             return {"*": (0, None), "+": (1, None), "?": (0, 1)}[sign]
-        least = self._number()
+        min_count = self._number()
         if self._takes("}"):
-            return least, least
+            return min_count, min_count
         if not self._takes(","):
             raise PatternError(f"a ',' or a '}}' is missing at character {self.index + 1}")
-        most = None if self._peek() == "}" else self._number()
+        max_count = None if self._peek() == "}" else self._number()
         if not self._takes("}"):
             raise PatternError(f"a '}}' is missing at character {self.index + 1}")
-        if most is not None and most < least:
-            raise PatternError(f"a repetition of {least} to {most} times is none")
-        return least, most
+        if max_count is not None and max_count < min_count:
+            raise PatternError(f"a repetition of {min_count} to {max_count} times is none")
+        return min_count, max_count
 
     def _number(self) -> int:
         digits = ""
@@ -304,16 +313,16 @@ class _Compiler:
         elif character == "[":
             state = self._add(self._bracket())
         elif character == ".":
-            state = self._add(lambda each: each not in "\n\r\u2028\u2029")
+            state = self._add(lambda letter: letter not in "\n\r\u2028\u2029")
         elif character == "\\" and self._peek() in ("b", "B"):
             return self._assert(self._take())
         elif character == "\\":
             state = self._add(self._escape())
         else:
             state = self._add(frozenset(character).__contains__)
-        after = self._add()
-        self._link(state, after)
-        return state, after
+        end_state = self._add()
+        self._link(state, end_state)
+        return state, end_state
 
     def _group(self) -> tuple[int, int]:
         assertion = ""
@@ -330,14 +339,14 @@ class _Compiler:
         self.level -= 1
         if not self._takes(")"):
             raise PatternError("a ')' is missing")
-        return self._assert(anchor=assertion, inside=part) if assertion else part
+        return self._assert(anchor=assertion, inner_part=part) if assertion else part
 
-    def _assert(self, anchor: str, inside: tuple[int, int] = (0, 0)) -> tuple[int, int]:
+    def _assert(self, anchor: str, inner_part: tuple[int, int] = (0, 0)) -> tuple[int, int]:
         """Return a part that reads nothing, and that leads on only where an assertion holds."""
-        state, after = self._add(anchor=anchor), self._add()
-        self.states[state].inside = inside
-        self._link(state, after)
-        return state, after
+        state, end_state = self._add(anchor=anchor), self._add()
+        self.states[state].inside = inner_part
+        self._link(state, end_state)
+        return state, end_state
 
     def _escape(self) -> CharacterTest:
         characters, is_negated = self._read_escaped_set()
@@ -382,7 +391,7 @@ class _Compiler:
             if high is None or high < low:
                 raise PatternError(f"the range from '{low}' ends nowhere")
             tests.append(_make_range_test(low, high))
-        return lambda each: any(test(each) for test in tests) != is_negated
+        return lambda letter: any(test(letter) for test in tests) != is_negated
 
     def _bracket_item(self, tests: list[CharacterTest]) -> str | None:
         """Return the next character of a bracket; of a class, None, and its test is added.
@@ -411,9 +420,9 @@ class _Compiler:
 
 
 def _test(characters: frozenset[str], is_negated: bool) -> CharacterTest:
-    return (lambda each: each not in characters) if is_negated else characters.__contains__
+    return (lambda letter: letter not in characters) if is_negated else characters.__contains__
 
 
 def _make_range_test(low: str, high: str) -> CharacterTest:
     """Return a test for characters from `low` to `high`, both included."""
-    return lambda each: low <= each <= high
+    return lambda letter: low <= letter <= high

@@ -220,11 +220,11 @@ def cache_by_tags(function: Callable[..., T]) -> Callable[..., T]:
 @cache_by_tags
 def find_class(tag: str) -> type[Object] | None:
     """Return the class of an XML tag; None if no class has it."""
-    further = _further.get(tag)
+    plugin_class = _further.get(tag)
     # Classes of plug-ins are in no table of modules.
-    if further is not None:
+    if plugin_class is not None:
         # Objects of an abstract class cannot stand in a file.
-        return None if further.abstract else further
+        return None if plugin_class.abstract else plugin_class
     module = MODULES.get(_TAGS.get(tag, tag))
     if module is None:
         return None
@@ -242,8 +242,8 @@ def list_tags() -> tuple[str, ...]:
         The tags.
     """
     renamed = {name: tag for tag, name in _TAGS.items()}
-    known = (renamed.get(name, name) for name in (*MODULES, *_further))
-    return tuple(sorted(tag for tag in known if find_class(tag) is not None))
+    class_names = (renamed.get(name, name) for name in (*MODULES, *_further))
+    return tuple(sorted(tag for tag in class_names if find_class(tag) is not None))
 
 
 @cache_by_tags
@@ -258,12 +258,12 @@ def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
     """
     # The word is looked for in the source text, which costs less than importing a module.
     modules = {module for module in MODULES.values() if _mentions(module, word)}
-    own = [
+    opensim_classes = [
         getattr(import_module(module), name)
         for name, module in MODULES.items()
         if module in modules
     ]
-    return (*own, *_further.values())
+    return (*opensim_classes, *_further.values())
 
 
 def _mentions(module: str, word: str) -> bool:

@@ -118,7 +118,10 @@ def _make_path_or_member_rule(*set_paths: str) -> Callable[[Tree, str, Component
             tree.walk(f"{path}{text}", "", target)
             for path in ("", *(f"{path}/" for path in set_paths))
         ]
-        return min(tried, key=lambda each: (each.target is None, each.failure != "wrong-type"))
+        return min(
+            tried,
+            key=lambda candidate: (candidate.target is None, candidate.failure != "wrong-type"),
+        )
 
     return rule
 

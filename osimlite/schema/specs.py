@@ -76,8 +76,8 @@ def get_field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
             continue
         if any(isinstance(item, Legacy) for item in info.metadata):
             kind = replace(kind, legacy=True)
-        held = isinstance(kind, ObjectField)
-        accepts = find_class(info.annotation) if held else None
+        holds_objects = isinstance(kind, ObjectField)
+        accepts = find_class(info.annotation) if holds_objects else None
         tag = (
             accepts.tag
             if accepts is not None and isinstance(kind, ObjectField) and kind.form == "unnamed"
@@ -108,13 +108,13 @@ def make_checks(cls: type[Object]) -> dict[str, Callable[[Any], Any]] | None:
         validators of its own, which only pydantic can run.
     """
     decorators = cls.__pydantic_decorators__
-    own = (
+    class_validators = (
         decorators.validators,
         decorators.field_validators,
         decorators.root_validators,
         decorators.model_validators,
     )
-    if any(own) or cls.__pydantic_post_init__ is not None:
+    if any(class_validators) or cls.__pydantic_post_init__ is not None:
         return None
     result = {
         spec.name: partial(spec.kind.check, accepts=spec.accepts)

@@ -29,9 +29,9 @@ def list_outputs(cls: type[Component]) -> dict[str, Output]:
     """
     result: dict[str, Output] = {}
     for base in cls.__mro__:
-        own = base.__dict__.get("facts")
-        for word in own.outputs.split() if own is not None else ():
-            name, _, kind = word.partition(":")
+        facts = base.__dict__.get("facts")
+        for entry in facts.outputs.split() if facts is not None else ():
+            name, _, kind = entry.partition(":")
             result[name.removesuffix("[]")] = Output(kind or "double", name.endswith("[]"))
     return result
 
@@ -39,15 +39,15 @@ def list_outputs(cls: type[Component]) -> dict[str, Output]:
 def list_states(component: Component) -> list[str]:
     """Return the names of the state variables of one component, in OpenSim's order."""
     # A class without states of its own has those of its nearest base.
-    known = (
+    state_texts = (
         base.__dict__["facts"].states
         for base in type(component).__mro__
         if "facts" in base.__dict__
     )
-    words = [word.partition("?") for word in next(filter(None, known), "").split()]
+    entries = [entry.partition("?") for entry in next(filter(None, state_texts), "").split()]
     return [
         name
-        for name, _, flag in words
+        for name, _, flag in entries
         if not flag or getattr(component, flag.lstrip("!")) != flag.startswith("!")
     ]
 
@@ -66,13 +66,13 @@ def list_motions(joint: Joint) -> dict[str, MotionType]:
         return dict(zip(names, joint.motion_types, strict=False))
     result: dict[str, MotionType] = dict.fromkeys(names, "coupled")
     transform: Any = getattr(joint, "spatial_transform", None)
-    for place, axis in transform.axes().items() if transform is not None else ():
+    for axis_name, axis in transform.axes().items() if transform is not None else ():
         if (
             type(axis.function).__name__ == "LinearFunction"
             and abs(axis.function.coefficients[0]) == 1.0
         ):
             result |= dict.fromkeys(
-                axis.names, "rotational" if place.startswith("r") else "translational"
+                axis.names, "rotational" if axis_name.startswith("r") else "translational"
             )
     return result
 

@@ -152,13 +152,13 @@ class Tree:
 
     def _claim(self, owner: Any) -> Model:
         """Return this model for an object last seen in `owner`, and note a model that shares the object."""
-        known = None if owner is None else owner.model
-        if known is not None and known is not self.model:
-            other = getattr(known, "_tree", None)
-            if other is not None:
-                self._is_renewable = other._is_renewable = False
-                if other.is_current:
-                    self._others.add(other)
+        previous_model = None if owner is None else owner.model
+        if previous_model is not None and previous_model is not self.model:
+            other_tree = getattr(previous_model, "_tree", None)
+            if other_tree is not None:
+                self._is_renewable = other_tree._is_renewable = False
+                if other_tree.is_current:
+                    self._others.add(other_tree)
         return self.model
 
     def path_of(self, component: Object) -> str | None:
@@ -193,10 +193,16 @@ class Tree:
             normalize_path(path if path.startswith("/") else "/" + path) or ""
         )
         if result is None:
-            named = [
-                known for known in self.by_path if get_last_name(known) == get_last_name(f"/{path}")
+            namesakes = [
+                component_path
+                for component_path in self.by_path
+                if get_last_name(component_path) == get_last_name(f"/{path}")
             ]
-            better = f"; did you mean '{named[0]}'?" if named else suggest_name(path, self.by_path)
+            better = (
+                f"; did you mean '{namesakes[0]}'?"
+                if namesakes
+                else suggest_name(path, self.by_path)
+            )
             raise ModelError(f"no component at '{path}'{better}")
         return result
 
@@ -224,8 +230,8 @@ class Tree:
         """
         if isinstance(use.value, str):
             return self.lookup(use.reference, use.value, use.owner)
-        known = self.path_of(use.value) is not None
-        return self._check_type(use.value if known else None, use.reference.target)
+        is_in_tree = self.path_of(use.value) is not None
+        return self._check_type(use.value if is_in_tree else None, use.reference.target)
 
     def lookup(self, reference: Reference, text: str, owner: Component) -> Resolution:
         """Resolve a text as the value of a reference.
@@ -244,10 +250,10 @@ class Tree:
             return RULES[rule](self, text, owner, target)
         # An absolute path leads to the same component from everywhere, and often hundreds of points name
         # one body, so cache the result.
-        known = self._resolved.get((rule, target, text))
-        if known is None:
-            known = self._resolved[rule, target, text] = RULES[rule](self, text, owner, target)
-        return known
+        resolution = self._resolved.get((rule, target, text))
+        if resolution is None:
+            resolution = self._resolved[rule, target, text] = RULES[rule](self, text, owner, target)
+        return resolution
 
     def target(self, owner: Component, name: str, value: str | Component) -> Component:
         """Return the component that a property leads to.
@@ -299,16 +305,16 @@ class Tree:
         if reference.rule in ("model-path", "file", "input"):
             return path
         parent = self.parent_of(component)
-        bare = path.rsplit("/", 1)[1]
-        wanted = {
+        name = path.rsplit("/", 1)[1]
+        set_names = {
             "contactgeometry-path-or-name": "contactgeometryset",
             "frame-path-or-body-name": "bodyset",
         }
-        if reference.rule in wanted and (
-            parent is None or self.path_of(parent) != "/" + wanted[reference.rule]
+        if reference.rule in set_names and (
+            parent is None or self.path_of(parent) != "/" + set_names[reference.rule]
         ):
             return path
-        return bare
+        return name
 
     @cached_property
     def by_name(self) -> dict[str, list[Component]]:
@@ -350,10 +356,10 @@ class Tree:
         if not children and not component.internal:
             return
         below = self._below[id(component)] = []
-        taken: dict[str, Component] = {}
+        siblings: dict[str, Component] = {}
         if component.internal:
             for part in self._get_internal_parts(component):
-                taken[part.name] = part
+                siblings[part.name] = part
                 below.append(part)
                 self._parents[id(part)] = component
                 self._register(part, f"{path}/{part.name}")
@@ -361,13 +367,13 @@ class Tree:
         for name, child in children:
             unique = name
             # OpenSim appends _0, _1 ... to the name of a component whose sibling has it already.
-            if name in taken:
+            if name in siblings:
                 number = counts.get(name, 0)
-                while (unique := f"{name}_{number}") in taken:
+                while (unique := f"{name}_{number}") in siblings:
                     number += 1
                 counts[name] = number + 1
-                self.renamed.append(RenamedComponent(child, unique, taken[name]))
-            taken[unique] = child
+                self.renamed.append(RenamedComponent(child, unique, siblings[name]))
+            siblings[unique] = child
             below.append(child)
             self._parents[id(child)] = component
             self._register_branch(child, f"{path}/{unique}")
@@ -388,16 +394,16 @@ class Tree:
         cls = type(holder)
         shelf = self._shelves.get(cls)
         if shelf is None:
-            items = self.by_class[cls] = []
-            shelf = self._shelves[cls] = items, _can_refer(cls), list_holding_properties(cls)
-        items, can_refer, holds = shelf
-        items.append(holder)
+            instances = self.by_class[cls] = []
+            shelf = self._shelves[cls] = instances, _can_refer(cls), list_holding_properties(cls)
+        instances, can_refer, properties = shelf
+        instances.append(holder)
         if holder is not owner:
             put_model(holder, self._claim(holder._model))
         if can_refer:
             self._referring.append((holder, owner))
         state = holder.__dict__
-        for spec, name, is_list, is_plain in holds:
+        for spec, name, is_list, is_plain in properties:
             value = state.get(name)
             if value is None:
                 # A default that was never accessed is an empty list, or a plain object without
@@ -407,12 +413,12 @@ class Tree:
                 value = getattr(holder, name)
             if isinstance(value, ObjectList):
                 value.owner = self._claim(getattr(value, "owner", None))
-            for item in value if isinstance(value, list) else (value,):
-                if item.is_component:
-                    children.append((_get_name_in_tree(spec, item), item))
+            for child in value if isinstance(value, list) else (value,):
+                if child.is_component:
+                    children.append((_get_name_in_tree(spec, child), child))
                 else:
-                    self._owners[id(item)] = owner
-                    self._register_object(item, owner, children)
+                    self._owners[id(child)] = owner
+                    self._register_object(child, owner, children)
 
     def _assign_owners(self, holder: Object, owner: Component) -> None:
         for _, item in holder.list_owned_objects():
@@ -422,12 +428,12 @@ class Tree:
 
     def _get_internal_parts(self, owner: Component) -> list[Component]:
         """Return the parts that OpenSim adds itself; the same objects for the same owner."""
-        known = self._known_parts.get(id(owner))
-        if known is None or known[0] is not owner:
-            known = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
-        self._parts[id(owner)] = known
-        self._internal.update(map(id, known[1]))
-        return known[1]
+        cached = self._known_parts.get(id(owner))
+        if cached is None or cached[0] is not owner:
+            cached = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
+        self._parts[id(owner)] = cached
+        self._internal.update(map(id, cached[1]))
+        return cached[1]
 
     def _check_type(self, component: Component | None, target: str) -> Resolution:
         if component is None:
@@ -480,7 +486,10 @@ class Tree:
         """
         return self.index_by_name(
             target,
-            lambda: ((get_last_name(self._paths[id(c)]), c) for c in self._list_instances(target)),
+            lambda: (
+                (get_last_name(self._paths[id(component)]), component)
+                for component in self._list_instances(target)
+            ),
         )
 
     def _list_instances(self, target: str) -> list[Component]:

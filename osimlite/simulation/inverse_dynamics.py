@@ -187,7 +187,7 @@ def add_forces(
             # A copy, as an object has one owner and the caller keeps theirs.
             model.force_set.objects.append(each.copy_deep())
             continue
-        more = read_document(Source.from_file(each), of=ForceSet).top
+        more = read_document(Source.from_file(each), expected_class=ForceSet).top
         assert isinstance(more, ForceSet)
         for force in list(more.objects):
             model.force_set.objects.append(force)

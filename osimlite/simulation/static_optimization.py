@@ -127,7 +127,7 @@ class SharedForces:
         sizes = np.abs(self.lacking[row])
         worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
         return join_words(
-            [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3
+            [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], max_count=3
         )
 
     def describe_unsolved(self) -> str:

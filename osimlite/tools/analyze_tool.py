@@ -140,7 +140,7 @@ def _describe_spans(times: Array, selected: BoolArray) -> str:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], selected, [False]]).astype(int)))
     spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
     words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
-    return join_words(words, most=MAX_NAMED_SPANS)
+    return join_words(words, max_count=MAX_NAMED_SPANS)
 
 
 def _read_coordinate_motion(

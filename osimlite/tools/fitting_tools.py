@@ -136,7 +136,7 @@ def run_imu_placer(job: Job, outcome: Outcome) -> None:
             job.get_output_path(setup.output_model_file), to_text(model, numbers="opensim")
         )
     outcome.summary |= placed._asdict()
-    outcome.add_message("placed", join_words(placed.names, most=100))
+    outcome.add_message("placed", join_words(placed.names, max_count=100))
     if placed.left_out:
         outcome.add_message(
             "left out", f"{join_words(placed.left_out)}: the model has no frames with these names"

@@ -99,7 +99,7 @@ class Job:
         Raises:
             DocumentError: the file is missing or holds another class.
         """
-        return read_document(Source.from_file(path), of=cls).top
+        return read_document(Source.from_file(path), expected_class=cls).top
 
     def get_output_path(self, name: str) -> Path:
         """Return the path of a result that a property of the setup names.

@@ -446,7 +446,7 @@ class ForceDistribution:
         worst = [
             f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()
         ]
-        return forces, join_words(worst, most=3)
+        return forces, join_words(worst, max_count=3)
 
 
 def refuse_controllers(job: Job, model: Model) -> None:

@@ -27,7 +27,7 @@ def layout(corpus_model: CorpusModel) -> str:
 
 def words(source: Source) -> tuple[int, str]:
     """The version of a document and what it says, white space aside, which classes of plug-ins keep."""
-    document = read_document(source, of=Object)
+    document = read_document(source, expected_class=Object)
     return document.version, re.sub(
         r"\s+", " ", re.sub(r"\s*([<>])\s*", r"\1", to_text(document.top))
     )

@@ -197,12 +197,12 @@ def check(folder: Path, name: str, data: bytes) -> None:
             assert str(error)
         return
     try:
-        top = read_document(Source(data, name), of=Object).top
+        top = read_document(Source(data, name), expected_class=Object).top
     except OsimliteError as error:
         assert str(error)
         return
     text = to_text(top)
-    again = read_document(Source(text.encode(), name), of=Object).top
+    again = read_document(Source(text.encode(), name), expected_class=Object).top
     assert to_text(again) == text and not find_differences(top, again)
     assert _unknown(again) == _unknown(top)
 

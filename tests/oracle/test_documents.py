@@ -51,7 +51,7 @@ def without_comments(text: str) -> str:
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 def test_opensim_prints_the_same(path: Path, printed: Path) -> None:
     target = printed / path.name
-    result = read_document(Source.from_file(path), of=Object)
+    result = read_document(Source.from_file(path), expected_class=Object)
     lines = osimlite.to_text(result.top, numbers="opensim", comments=False).splitlines(
         keepends=True
     )

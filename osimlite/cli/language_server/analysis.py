@@ -143,7 +143,7 @@ class DocumentAnalysis:
         between threads.
         """
         source = Source.from_text(self.text.content, self.file)
-        return run_rules(Subject(survey_source(source, of=Model), self.config))
+        return run_rules(Subject(survey_source(source, expected_class=Model), self.config))
 
     @property
     def is_checked(self) -> bool:

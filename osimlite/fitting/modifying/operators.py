@@ -299,7 +299,8 @@ def _replace_with_function_paths(
 ) -> None:
     """Replace paths by the function-based paths of a file."""
     given = read_document(
-        Source.from_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
+        Source.from_file(folder / operator.paths_file.strip()),
+        expected_class=p.FunctionBasedPathSet,
     ).top
     replace_paths(model, given.objects)
 
@@ -331,7 +332,7 @@ def replace_paths(model: Model, paths: Any) -> None:
 def _add_external_loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> None:
     """Add external loads of a file to the model."""
     file = folder / operator.filepath.strip()
-    loads = read_document(Source.from_file(file), of=ExternalLoads).top
+    loads = read_document(Source.from_file(file), expected_class=ExternalLoads).top
     assert isinstance(loads, ExternalLoads)
     loads.name = "externalloads"  # OpenSim drops the name in the file.
     # The model is in another folder than the loads.

@@ -46,14 +46,14 @@ def decode_frames(
         is_number[offset : offset + size] = True
     # The bytes between the numbers, tags and lengths, must be equal in all frames.
     structure = rows[:, ~is_number]
-    odd = np.flatnonzero((structure != structure[0]).any(axis=1))
+    differing = np.flatnonzero((structure != structure[0]).any(axis=1))
     result = {}
     for number, (offset, size) in layout.items():
         if number in names and size:
             # Protocol Buffers are little-endian.
             numbers = np.ascontiguousarray(rows[:, offset : offset + size]).view("<f8")
             result[names[number]] = numbers.astype(float)
-    for index in odd:
+    for index in differing:
         # A frame whose bytes differ may have its fields in another order.
         _replace_row(result, int(index), rows[index], layout, names)
     return result
@@ -82,11 +82,11 @@ def _replace_row(
 ) -> None:
     """Decode a frame whose fields are in other places than those of the first frame."""
     text = row.tobytes()
-    found = _find_layout(memoryview(text))
-    if {number: size for number, (_, size) in found.items()} != {
+    row_layout = _find_layout(memoryview(text))
+    if {number: size for number, (_, size) in row_layout.items()} != {
         number: size for number, (_, size) in layout.items()
     }:
         raise DamagedMessageError(f"frame {index} has other fields than the first one")
-    for number, (offset, size) in found.items():
+    for number, (offset, size) in row_layout.items():
         if number in names and size:
             result[names[number]][index] = np.frombuffer(text[offset : offset + size], "<f8")

@@ -123,8 +123,8 @@ class B3dTrial:
         reasons = np.array(self.header["missing_forces"][: self.frame_count], dtype=int)
         # Older files have no reason for some frames.
         # Nimble takes frames without a reason for frames with external forces that were not measured.
-        rest = np.full(self.frame_count - len(reasons), 2)
-        return np.concatenate([reasons, rest])
+        default_reasons = np.full(self.frame_count - len(reasons), 2)
+        return np.concatenate([reasons, default_reasons])
 
     @property
     def type(self) -> str:
@@ -152,12 +152,12 @@ class B3dTrial:
         """
         if processing_pass is None:
             # Dynamics is the last step that adds forces; later passes only filter.
-            types = [each.type for each in self.passes]
+            types = [candidate.type for candidate in self.passes]
             indices = [index for index, kind in enumerate(types) if kind == DYNAMICS]
             if not types:
                 raise SettingError(f"the trial '{self.name}' has no processing passes")
             return indices[-1] if indices else len(types) - 1
-        names = [each.name for each in self.passes]
+        names = [candidate.name for candidate in self.passes]
         if isinstance(processing_pass, str):
             # Of passes of one type the last one counts.
             if processing_pass in names:
@@ -261,7 +261,7 @@ class B3dTrial:
         index = self.find_pass(processing_pass)
         names = self.subject.list_coordinate_names(index)
         rows = self.read_arrays(index).get(name, np.zeros((self.frame_count, len(names))))
-        labels = tuple(f"{each}{ending}" for each in names)
+        labels = tuple(f"{coordinate_name}{ending}" for coordinate_name in names)
         return StoTable(self.name or "trial", self.times, labels, rows, file=str(self.subject.path))
 
     def read_markers(self) -> tuple[tuple[str, ...], Array]:
@@ -400,7 +400,7 @@ class B3dSubject:
         Returns:
             Names of the types in words, one for each pass.
         """
-        return tuple(_get_name(PASS_TYPES, each["type"]) for each in self.header["passes"])
+        return tuple(_get_name(PASS_TYPES, entry["type"]) for entry in self.header["passes"])
 
     @property
     def model_texts(self) -> tuple[str, ...]:
@@ -409,7 +409,7 @@ class B3dSubject:
         Returns:
             One text per pass, in the order of `pass_types`.
         """
-        return tuple(each["model_text"] for each in self.header["passes"])
+        return tuple(entry["model_text"] for entry in self.header["passes"])
 
     @property
     def contact_bodies(self) -> tuple[str, ...]:
@@ -483,7 +483,9 @@ class B3dSubject:
         Raises:
             DocumentError: the model cannot be read, or has another number of coordinates.
         """
-        names = tuple(each.name for each in list_coordinates(self.read_model(processing_pass)))
+        names = tuple(
+            coordinate.name for coordinate in list_coordinates(self.read_model(processing_pass))
+        )
         if len(names) != self.header["dof_count"]:
             raise DocumentError(
                 f"the frames have {self.header['dof_count']} coordinates, but the model of the pass has {len(names)}",
@@ -533,9 +535,9 @@ def read_b3d(path: str | Path) -> B3dSubject:
     file = str(path)
     with open_file(path) as stream:
         size = os.fstat(stream.fileno()).st_size
-        start = _read_at(stream, 0, min(size, LENGTH_BYTES), Path(path))
-        length = int.from_bytes(start, "little", signed=True)
-        if len(start) < LENGTH_BYTES or not 0 < length <= size - LENGTH_BYTES:
+        length_bytes = _read_at(stream, 0, min(size, LENGTH_BYTES), Path(path))
+        length = int.from_bytes(length_bytes, "little", signed=True)
+        if len(length_bytes) < LENGTH_BYTES or not 0 < length <= size - LENGTH_BYTES:
             raise DocumentError(
                 "this is not a .b3d file, or it was cut off within its header", file=file
             )
@@ -554,7 +556,7 @@ def read_b3d(path: str | Path) -> B3dSubject:
     offset = LENGTH_BYTES + length
     _expect_plausible(header, file)
     for values in header["trials"]:
-        passes = tuple(B3dPass(each["type"], each) for each in values["passes"])
+        passes = tuple(B3dPass(entry["type"], entry) for entry in values["passes"])
         count = values["frame_count"]
         trials.append(
             B3dTrial(subject, values["name"], count, values["time_step"], passes, values, offset)
@@ -573,16 +575,20 @@ def read_b3d(path: str | Path) -> B3dSubject:
 def _expect_version(data: memoryview, file: str) -> None:
     """Raise an error unless a header has the field numbers of version 4."""
     versions, has_other_numbers = [], False
-    for each in split_message(data):
-        if each.number == 10:
+    for message_field in split_message(data):
+        if message_field.number == 10:
             # In versions 1 and 2 field 10 holds the names of the trials, and 13 the version.
-            has_other_numbers |= each.wire_type == BYTES
-            versions += [each.value] if isinstance(each.value, int) else []
-        elif each.number == 17 and each.wire_type == FIXED64:
+            has_other_numbers |= message_field.wire_type == BYTES
+            versions += [message_field.value] if isinstance(message_field.value, int) else []
+        elif message_field.number == 17 and message_field.wire_type == FIXED64:
             # In version 3 field 17 is the mass; in version 4 the name of a marker.
             versions = [3]
-        elif each.number == 13 and each.wire_type == VARINT and isinstance(each.value, int):
-            versions, has_other_numbers = [each.value], True
+        elif (
+            message_field.number == 13
+            and message_field.wire_type == VARINT
+            and isinstance(message_field.value, int)
+        ):
+            versions, has_other_numbers = [message_field.value], True
     version = versions[-1] if versions else None
     if version == VERSION and not has_other_numbers:
         return
@@ -663,15 +669,19 @@ def find_pressure_centers(torques: Array, forces: Array, height: float) -> Array
     loaded = np.flatnonzero(np.abs(forces[:, 1]) > MIN_PRESSURE_FORCE_N)
     if not len(loaded):
         return points
-    up = forces[loaded, 1]
-    points[loaded, 0] = (torques[loaded, 2] + height * forces[loaded, 0]) / up
+    vertical_forces = forces[loaded, 1]
+    points[loaded, 0] = (torques[loaded, 2] + height * forces[loaded, 0]) / vertical_forces
     points[loaded, 1] = height
-    points[loaded, 2] = (height * forces[loaded, 2] - torques[loaded, 0]) / up
+    points[loaded, 2] = (height * forces[loaded, 2] - torques[loaded, 0]) / vertical_forces
     frames = np.arange(len(forces))
     # Frames without load take the point of the nearest loaded frame, so that the curve has no jumps
     # to the origin.
-    after = np.clip(np.searchsorted(loaded, frames), 0, len(loaded) - 1)
-    before = np.clip(after - 1, 0, len(loaded) - 1)
-    is_nearer = frames - loaded[before] <= np.abs(loaded[after] - frames)
-    nearest = np.where(is_nearer & (loaded[before] <= frames), loaded[before], loaded[after])
+    next_loaded = np.clip(np.searchsorted(loaded, frames), 0, len(loaded) - 1)
+    previous_loaded = np.clip(next_loaded - 1, 0, len(loaded) - 1)
+    is_nearer = frames - loaded[previous_loaded] <= np.abs(loaded[next_loaded] - frames)
+    nearest = np.where(
+        is_nearer & (loaded[previous_loaded] <= frames),
+        loaded[previous_loaded],
+        loaded[next_loaded],
+    )
     return points[nearest]

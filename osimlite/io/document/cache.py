@@ -45,19 +45,19 @@ class FileCache(Generic[T]):
         if stamp is None:
             return None
         # Removed and added again: the dictionary keeps the order of use.
-        known = self._cached.pop(key, None)
-        if known is None or known[0] != stamp:
-            known = stamp, self._make(path)
-        self._cached[key] = known
+        entry = self._cached.pop(key, None)
+        if entry is None or entry[0] != stamp:
+            entry = stamp, self._make(path)
+        self._cached[key] = entry
         if len(self._cached) > self._size:
             # The first key is the one that was used longest ago.
             del self._cached[next(iter(self._cached))]
-        return known[1]
+        return entry[1]
 
     def has(self, path: str) -> bool:
         """Return whether the cache has a valid result for a file."""
-        known = self._cached.get(os.path.abspath(path))
-        return known is not None and known[0] == get_file_stamp(path)
+        entry = self._cached.get(os.path.abspath(path))
+        return entry is not None and entry[0] == get_file_stamp(path)
 
     def keep(self, path: str, result: T) -> None:
         """Store a result that was computed elsewhere for the present file.
@@ -85,7 +85,7 @@ def cache_by_file(size: int) -> Callable[[Callable[[str], T]], FileCache[T]]:
 def get_object(path: str) -> Object | None:
     """Return the object of a document; None if it cannot be read."""
     try:
-        return read_document(Source.from_file(path), of=Object).top
+        return read_document(Source.from_file(path), expected_class=Object).top
     # A caller that needs the reason reads the document itself.
     except (OsimliteError, ValueError, RecursionError):
         return None
@@ -100,12 +100,12 @@ def _has_no_include(path: str) -> bool:
     )
 
 
-def read_copy(path: str | Path, of: type[Top]) -> Top:
+def read_copy(path: str | Path, expected_class: type[Top]) -> Top:
     """Return the object of a document as a copy that the caller may change.
 
     Args:
         path: the file.
-        of: class of the object.
+        expected_class: class of the object.
 
     Raises:
         DocumentError: the file is missing or has an object of another class; with line and column.
@@ -116,9 +116,9 @@ def read_copy(path: str | Path, of: type[Top]) -> Top:
     # Plug-in classes of the caller are not those of the cached document.
     with classes_in_use(()):
         top = get_object(file) if get_object.has(file) and _has_no_include(file) else None
-        if not isinstance(top, of):
-            document = read_document(Source.from_file(path), of=of)
-            assert isinstance(document.top, of)
+        if not isinstance(top, expected_class):
+            document = read_document(Source.from_file(path), expected_class=expected_class)
+            assert isinstance(document.top, expected_class)
             return document.top
         copied = top.copy_deep()
         # Relative names in the document are resolved from its file.
@@ -142,16 +142,16 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
         DocumentError: the file is missing, has an object of another class, or has a misspelt
             property; with line and column.
     """
-    document = read_document(Source.from_file(path), of=cls)
+    document = read_document(Source.from_file(path), expected_class=cls)
     for note in document.notes:
         # Many files have properties of old versions; a name similar to a present one is a
         # spelling mistake.
         if (
             note.kind == "unknown-tag"
             and note.owner
-            and (near := find_nearest(note.word, get_field_specs(type(note.owner))))
+            and (suggestion := find_nearest(note.word, get_field_specs(type(note.owner))))
         ):
-            message = f"<{note.word}> is unknown in this document; did you mean <{near}>?"
+            message = f"<{note.word}> is unknown in this document; did you mean <{suggestion}>?"
             raise document.source.fault(
                 DocumentError, message, document.source.locate_tag(note.number)
             )

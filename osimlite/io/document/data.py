@@ -49,12 +49,14 @@ def read_data(path: str | Path) -> Model:
         MissingDependency: the file is YAML and PyYAML is not installed.
         ModelError: the data does not describe a model; with the position in the data.
     """
-    place = Path(path)
+    data_path = Path(path)
     try:
-        text = read_file(place).decode()
+        text = read_file(data_path).decode()
     except UnicodeDecodeError as error:
         raise MissingFileError(f"cannot read the file: {error}", file=str(path)) from None
-    data = _parse_json(text, str(path)) if place.suffix == ".json" else parse_yaml(text, str(path))
+    data = (
+        _parse_json(text, str(path)) if data_path.suffix == ".json" else parse_yaml(text, str(path))
+    )
     try:
         return from_data(data)
     except ModelError as error:
@@ -199,7 +201,7 @@ class _Reader:
         self.count = 0
 
     def convert_object(
-        self, data: Any, accepts: type[Object], where: str, name: str = ""
+        self, data: Any, accepts: type[Object], location: str, name: str = ""
     ) -> Object:
         """Return the object that `data` describes, where a property accepts the class `accepts`."""
         # The count limits what the aliases of YAML can expand to.
@@ -209,51 +211,51 @@ class _Reader:
             data = {"objects": data}
         if not isinstance(data, Mapping):
             raise ModelError(
-                f"{where}: expected a mapping that describes a {accepts.tag}, not {_describe_type(data)}"
+                f"{location}: expected a mapping that describes a {accepts.tag}, not {_describe_type(data)}"
             )
-        cls = self._find_class(data, accepts, where)
+        cls = self._find_class(data, accepts, location)
         specs = get_field_specs(cls)
         by_name = {spec.name: spec for spec in specs.values()}
         values: dict[str, Any] = {}
         for key, value in data.items():
-            place = f"{where}.{key}"
+            key_location = f"{location}.{key}"
             if key in ("class", "unknown"):
                 continue
             if key == "name" or (cls is Unknown and key in ("class_name", "content")):
                 if not isinstance(value, str):
                     raise ModelError(
-                        f"{place}: expected a text, not {_describe_type(value)}; put it in quotation marks"
+                        f"{key_location}: expected a text, not {_describe_type(value)}; put it in quotation marks"
                     )
                 values[key] = value
                 continue
             spec = by_name.get(key) or specs.get(key)
             if spec is None:
                 raise ModelError(
-                    f"{where}: a {cls.tag} has no property '{key}'{suggest_name(str(key), by_name)}"
+                    f"{location}: a {cls.tag} has no property '{key}'{suggest_name(str(key), by_name)}"
                 )
             # A property may be given by its Python name and by its tag.
             if spec.name in values:
-                raise ModelError(f"{where}: '{spec.name}' is given twice, also as '{spec.tag}'")
-            values[spec.name] = self._convert_value(value, spec, place)
+                raise ModelError(f"{location}: '{spec.name}' is given twice, also as '{spec.tag}'")
+            values[spec.name] = self._convert_value(value, spec, key_location)
         present = set(values)
         if name and "name" not in values:
             values["name"] = name
-        item = cls.build(values, present)
+        built = cls.build(values, present)
         remarks = data.get("unknown")
         if remarks:
             if not isinstance(remarks, list) or not all(isinstance(text, str) for text in remarks):
-                raise ModelError(f"{where}.unknown: expected a list of XML texts")
-            get_layout(item).before[None] = [Remark(text, True) for text in remarks]
-        return item
+                raise ModelError(f"{location}.unknown: expected a list of XML texts")
+            get_layout(built).before[None] = [Remark(text, True) for text in remarks]
+        return built
 
     def _find_class(
-        self, data: Mapping[str, Any], accepts: type[Object], where: str
+        self, data: Mapping[str, Any], accepts: type[Object], location: str
     ) -> type[Object]:
         tag = data.get("class")
         if tag is None:
             if accepts.abstract:
                 raise ModelError(
-                    f"{where}: say the class of this {accepts.tag}, such as 'class: {list_class_tags(accepts)[0]}'"
+                    f"{location}: say the class of this {accepts.tag}, such as 'class: {list_class_tags(accepts)[0]}'"
                 )
             return accepts
         if tag == "Unknown":
@@ -261,23 +263,23 @@ class _Reader:
         cls = find_class(tag) if isinstance(tag, str) else None
         if cls is None:
             raise ModelError(
-                f"{where}.class: there is no class '{tag}'{suggest_name(str(tag), list_tags())}"
+                f"{location}.class: there is no class '{tag}'{suggest_name(str(tag), list_tags())}"
             )
         if not issubclass(cls, accepts):
-            raise ModelError(f"{where}.class: a {tag} cannot stand here, only a {accepts.tag}")
+            raise ModelError(f"{location}.class: a {tag} cannot stand here, only a {accepts.tag}")
         return cls
 
-    def _convert_value(self, data: Any, spec: FieldSpec, where: str) -> Any:
+    def _convert_value(self, data: Any, spec: FieldSpec, location: str) -> Any:
         kind = spec.kind
         if isinstance(kind, ObjectField):
             assert spec.accepts is not None
             if kind.form == "list":
                 if not isinstance(data, list):
                     raise ModelError(
-                        f"{where}: expected a list of {spec.accepts.tag}, not {_describe_type(data)}"
+                        f"{location}: expected a list of {spec.accepts.tag}, not {_describe_type(data)}"
                     )
                 members = (
-                    self.convert_object(item, spec.accepts, f"{where}[{i}]")
+                    self.convert_object(item, spec.accepts, f"{location}[{i}]")
                     for i, item in enumerate(data)
                 )
                 return ObjectList(members)
@@ -288,7 +290,7 @@ class _Reader:
             return self.convert_object(
                 data,
                 spec.accepts,
-                where,
+                location,
                 spec.tag if kind.form == "single" else getattr(default, "name", ""),
             )
         try:
@@ -301,7 +303,7 @@ class _Reader:
                 )
             return kind.check(data, None)
         except (ValueError, OverflowError) as error:
-            raise ModelError(shorten_message(f"{where}: {error}")) from None
+            raise ModelError(shorten_message(f"{location}: {error}")) from None
 
     def _parse_number(self, data: Any) -> Any:
         """Parse a number that JSON cannot represent or that YAML reads as text (1e-9); return others unchanged.
@@ -396,8 +398,8 @@ def _join_pairs(pairs: list[tuple[str, Any]], file: str) -> dict[str, Any]:
     result = dict(pairs)
     if len(result) < len(pairs):
         counts = Counter(key for key, _ in pairs)
-        twice = next(key for key, count in counts.items() if count > 1)
-        raise DocumentError(f"the key {twice!r} stands twice in one mapping", file=file)
+        repeated_key = next(key for key, count in counts.items() if count > 1)
+        raise DocumentError(f"the key {repeated_key!r} stands twice in one mapping", file=file)
     return result
 
 
@@ -433,7 +435,7 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
         raise DocumentError("the YAML text cannot be read as a model", file=file, line=1) from None
 
 
-def _refuse_repeated_keys(yaml: Any, top: Any, file: str) -> None:
+def _refuse_repeated_keys(yaml: Any, root: Any, file: str) -> None:
     """Raise an error if a key stands twice in one mapping, of which PyYAML keeps the last without a word.
 
     Raises:
@@ -441,18 +443,18 @@ def _refuse_repeated_keys(yaml: Any, top: Any, file: str) -> None:
     """
     # Aliases lead to one node from several places, and may lead in circles.
     met = set()
-    left = [top]
-    while left:
-        node = left.pop()
+    pending = [root]
+    while pending:
+        node = pending.pop()
         if id(node) in met or isinstance(node, yaml.ScalarNode):
             continue
         met.add(id(node))
         if isinstance(node, yaml.SequenceNode):
-            left.extend(node.value)
+            pending.extend(node.value)
             continue
         keys = set()
         for key, value in node.value:
-            left += (key, value)
+            pending += (key, value)
             if not isinstance(key, yaml.ScalarNode):
                 continue
             if key.value in keys:

@@ -193,40 +193,40 @@ def reads_as(raw: str, kind: FieldType, value: Any) -> bool:
 
 
 def _make_single_converter(
-    read: Callable[[str], Any], optional: bool, legacy: bool
+    parse_word: Callable[[str], Any], optional: bool, legacy: bool
 ) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         # Fast path: almost every text is one clean number or switch.
-        if read is parse_real:
+        if parse_word is parse_real:
             try:
                 value = float(raw)
                 if isfinite(value) and "_" not in raw and raw.isascii():
                     return value
             except ValueError:
                 pass
-        elif raw in _PLAIN_FLAGS and read is not parse_integer:
+        elif raw in _PLAIN_FLAGS and parse_word is not parse_integer:
             return _PLAIN_FLAGS[raw]
         words = split_words(raw)
         if not words:
             if optional:
                 return None
-            if read is parse_legacy_flag:
+            if parse_word is parse_legacy_flag:
                 # OpenSim's first property system reads an empty switch as false.
                 raise UncleanText("empty", "", False)
             raise UncleanText("empty", "")
         if len(words) == 1:
-            return read(words[0])
+            return parse_word(words[0])
         if not legacy:
             # OpenSim reads all words before it uses the first, and keeps the default if it cannot
             # read one of them.
-            _parse_words(words[1:], read)
-        raise UncleanText("too-many", raw.strip(), read(words[0]))
+            _parse_words(words[1:], parse_word)
+        raise UncleanText("too-many", raw.strip(), parse_word(words[0]))
 
     return convert
 
 
 def _parse_words(
-    words: list[str], read: Callable[[str], Any]
+    words: list[str], parse_word: Callable[[str], Any]
 ) -> tuple[list[Any], UncleanText | None]:
     """Parse words; return the values, and the error of the first word that OpenSim cuts.
 
@@ -236,7 +236,7 @@ def _parse_words(
     values, first = [], None
     for word in words:
         try:
-            values.append(read(word))
+            values.append(parse_word(word))
         except UncleanText as unclean:
             if unclean.value is ABSENT:
                 raise
@@ -271,14 +271,14 @@ def _make_vector_converter(size: int) -> Callable[[str], Any]:
 
 
 def _make_list_converter(
-    read: Callable[[str], Any], least: int, most: int | None
+    parse_word: Callable[[str], Any], min_count: int, max_count: int | None
 ) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         words = split_words(raw)
         if (
-            read in (parse_real, _parse_complete_real)
-            and least <= len(words)
-            and (most is None or len(words) <= most)
+            parse_word in (parse_real, _parse_complete_real)
+            and min_count <= len(words)
+            and (max_count is None or len(words) <= max_count)
         ):
             try:
                 numbers = tuple(map(float, words))
@@ -286,24 +286,24 @@ def _make_list_converter(
                     return numbers
             except ValueError:
                 pass
-        values, first = (words, None) if read is str else _parse_words(words, read)
-        if len(values) < least:
+        values, first = (words, None) if parse_word is str else _parse_words(words, parse_word)
+        if len(values) < min_count:
             raise UncleanText("too-few" if values else "empty", raw.strip())
         if first is not None:
-            raise UncleanText(first.trouble, first.word, tuple(values[:most]))
-        if most is not None and len(values) > most:
-            raise UncleanText("too-many", raw.strip(), tuple(values[:most]))
+            raise UncleanText(first.trouble, first.word, tuple(values[:max_count]))
+        if max_count is not None and len(values) > max_count:
+            raise UncleanText("too-many", raw.strip(), tuple(values[:max_count]))
         return tuple(values)
 
     return convert
 
 
-def _make_legacy_converter(read: Callable[[str], Any]) -> Callable[[str], Any]:
+def _make_legacy_converter(parse_word: Callable[[str], Any]) -> Callable[[str], Any]:
     """Return a converter for lists of the first property system.
 
     Words are separated by blanks or by commas, and a pair of brackets may surround them.
     """
-    plain = _make_list_converter(read, 0, None)
+    plain = _make_list_converter(parse_word, 0, None)
 
     def convert(raw: str) -> Any:
         if "," not in raw and raw.lstrip()[:1] not in ("(", "[", "{"):
@@ -353,25 +353,25 @@ def make_formatter(kind: FieldType, numbers: str) -> Callable[[Any], str]:
 def _build_formatter(kind: FieldType, like_opensim: bool) -> Callable[[Any], str]:
     if isinstance(kind, Reference):
         if kind.shape == "list":
-            lead = " " if kind.legacy else ""
-            return lambda words: lead + " ".join(words) if words else ""
+            prefix = " " if kind.legacy else ""
+            return lambda words: prefix + " ".join(words) if words else ""
         return str
     assert isinstance(kind, Value)
     if kind.scalar == "double":
-        word: Callable[[Any], str] = format_17_digits if like_opensim else format_shortest
+        format_word: Callable[[Any], str] = format_17_digits if like_opensim else format_shortest
         # OpenSim prints lists of the first property system with six digits.
         if like_opensim and kind.legacy and kind.shape == "list":
-            word = format_6_digits
+            format_word = format_6_digits
     elif kind.scalar == "bool":
-        word = _format_flag
+        format_word = _format_flag
     else:
-        word = str
+        format_word = str
     if kind.shape in ("single", "optional"):
-        return lambda value: "" if value is None else word(value)
+        return lambda value: "" if value is None else format_word(value)
     if kind.legacy and kind.scalar == "bool":
-        return lambda values: "".join(f"{word(value)} " for value in values)
-    lead = " " if kind.legacy else ""
-    return lambda values: lead + " ".join(map(word, values)) if values else ""
+        return lambda values: "".join(f"{format_word(value)} " for value in values)
+    prefix = " " if kind.legacy else ""
+    return lambda values: prefix + " ".join(map(format_word, values)) if values else ""
 
 
 def _format_flag(value: bool) -> str:

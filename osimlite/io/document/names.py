@@ -40,35 +40,35 @@ def decode_name(name: str) -> str:
 
 def replace_colons(data: bytes) -> bytes:
     """Replace colons in the names of a UTF-8 text; every character keeps its line and column."""
-    pieces, done = [], 0
+    pieces, copied_end = [], 0
     hidden: list[tuple[int, int]] | None = None
     result = [match.span() for match in _COLONS.finditer(data)]
     if b"xmlns" in data:
         result = sorted([*result, *(match.span() for match in _NAMESPACE.finditer(data))])
-    for place, end in result:
-        tag = data.rfind(b"<", max(0, place - _MAX_TAG_LENGTH), place)
-        so_far = data[tag:place] if end - place == 1 else data[tag:place].rstrip()
+    for start, end in result:
+        tag = data.rfind(b"<", max(0, start - _MAX_TAG_LENGTH), start)
+        so_far = data[tag:start] if end - start == 1 else data[tag:start].rstrip()
         if tag < 0 or _TAG_SO_FAR.fullmatch(so_far) is None:
             continue
         if hidden is None:
             hidden = _find_hidden_text(data)
-        before = bisect_right(hidden, (tag, len(data))) - 1
-        if before >= 0 and place < hidden[before][1]:
+        section_index = bisect_right(hidden, (tag, len(data))) - 1
+        if section_index >= 0 and start < hidden[section_index][1]:
             continue
-        pieces += [data[done:place], _STAND_INS[data[place:end]]]
-        done = end
-    return b"".join([*pieces, data[done:]]) if pieces else data
+        pieces += [data[copied_end:start], _STAND_INS[data[start:end]]]
+        copied_end = end
+    return b"".join([*pieces, data[copied_end:]]) if pieces else data
 
 
 def _find_hidden_text(data: bytes) -> list[tuple[int, int]]:
     """Return start and end of all comments and CDATA sections, in order."""
     result = []
     for opening, ending in _HIDING:
-        place = data.find(opening)
-        while place >= 0:
-            end = data.find(ending, place)
+        start = data.find(opening)
+        while start >= 0:
+            end = data.find(ending, start)
             if end < 0:
                 break
-            result.append((place, end))
-            place = data.find(opening, end)
+            result.append((start, end))
+            start = data.find(opening, end)
     return sorted(result)

@@ -258,11 +258,13 @@ class ObjectReader:
         extra: _ExtraContent,
     ) -> Any:
         """Return the value of a text that OpenSim reads only in part or not at all, and note the problem."""
-        missing = unclean.value is ABSENT
+        is_absent = unclean.value is ABSENT
         # An unreadable text gives the default, a readable beginning that part.
-        value = self._get_default(cls, spec.name) if missing else unclean.value
+        value = self._get_default(cls, spec.name) if is_absent else unclean.value
         extra.raw[spec.name] = (value, text)
-        extra.late.append((unclean.trouble, number, unclean.word, spec, None if missing else value))
+        extra.late.append(
+            (unclean.trouble, number, unclean.word, spec, None if is_absent else value)
+        )
         return value
 
     def _read_object_field(
@@ -303,11 +305,11 @@ class ObjectReader:
             get_layout(built).before = extra.before
         if extra.raw:
             get_layout(built).raw = extra.raw
-        for kind, where, word, spec, value in extra.late:
+        for kind, number, word, spec, value in extra.late:
             # Unknown attributes stay with the object, so that writing keeps them.
             if kind in ("include", "unknown-attribute"):
                 get_layout(built).attributes[word] = value
-            self.notes.append(Note(kind, where, word, built, spec, value))
+            self.notes.append(Note(kind, number, word, built, spec, value))
         return built
 
     def _keep_duplicate(
@@ -325,32 +327,32 @@ class ObjectReader:
         file = element.get("file") if self.read_include is not None else None
         if not file or self.read_include is None:
             return self.read_object(element, cls, name)
-        result, number, known = self.read_include(str(file), cls), self.count, len(self.notes)
+        result, number, note_count = self.read_include(str(file), cls), self.count, len(self.notes)
         # The reason why the file is not read is added to the note that the reader made.
         if isinstance(result, str):
             empty: Object = self.read_object(element, cls, name)
-            self.notes[known:] = [
+            self.notes[note_count:] = [
                 note._replace(why=result)
                 if note.kind == "include" and note.number == number
                 else note
-                for note in self.notes[known:]
+                for note in self.notes[note_count:]
             ]
             return empty
         self.count += count_elements(element)
         # Objects of another file have no position here: all get that of the element.
-        item, include, notes = result
-        for part in item.walk():
+        included, include, notes = result
+        for part in included.walk():
             object.__setattr__(part, "_index", number)
             object.__setattr__(part, "_model", self.home)
         if name:
-            object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
-        get_layout(item).include = include
-        self.notes.append(Note("include", number, "file", item, None, str(file)))
+            object.__setattr__(included, "__dict__", {**included.__dict__, "name": name})
+        get_layout(included).include = include
+        self.notes.append(Note("include", number, "file", included, None, str(file)))
         # Notes of the other file are reported at this element; positions there would mislead.
         self.notes.extend(
             note._replace(number=number) for note in notes if note.kind != "include" or note.why
         )
-        return item
+        return included
 
     def _read_members(
         self, wrapper: etree._Element, spec: FieldSpec
@@ -377,14 +379,14 @@ class ObjectReader:
                     member.tree()
             elif is_element(child):
                 tag = decode_name(child.tag)
-                known = find_class(tag)
+                known_class = find_class(tag)
                 late.append(
                     (
-                        "unknown-class" if known is None else "wrong-class",
+                        "unknown-class" if known_class is None else "wrong-class",
                         self.count,
                         tag,
                         spec,
-                        known,
+                        known_class,
                     )
                 )
                 member = self._read_unknown(child)
@@ -413,32 +415,39 @@ class ObjectReader:
             return
         tag = decode_name(child.tag)
         name = child.get("name") or None
-        held = find_class(tag)
+        tagged_class = find_class(tag)
         spec = named.get(name) if name is not None else None
-        if spec is None and name is None and held is not None:
+        if spec is None and name is None and tagged_class is not None:
             # OpenSim assigns an object without a name to the first property that accepts its class
             # and has no value yet.
-            free = (
-                s
-                for s in named.values()
-                if s.name not in values and _find_accepted_class(child.tag, s.accepts)
+            candidates = (
+                candidate
+                for candidate in named.values()
+                if candidate.name not in values
+                and _find_accepted_class(child.tag, candidate.accepts)
             )
             # The first free property, in the order of the declaration.
-            spec = next(free, None)
+            spec = next(candidates, None)
         if spec is not None and spec.name not in values:
-            accepted = _find_accepted_class(child.tag, spec.accepts)
-            if accepted is not None:
+            accepted_class = _find_accepted_class(child.tag, spec.accepts)
+            if accepted_class is not None:
                 extra.attach_pending(spec.tag)
-                values[spec.name] = self._read_object_or_include(child, accepted, spec.tag)
+                values[spec.name] = self._read_object_or_include(child, accepted_class, spec.tag)
                 return
             extra.late.append(
-                ("unknown-class" if held is None else "wrong-class", self.count, tag, spec, held)
+                (
+                    "unknown-class" if tagged_class is None else "wrong-class",
+                    self.count,
+                    tag,
+                    spec,
+                    tagged_class,
+                )
             )
         elif spec is not None:
             self._keep_duplicate(child, spec, extra)
             return
         else:
-            extra.late.append(("unknown-tag", self.count, tag, None, held))
+            extra.late.append(("unknown-tag", self.count, tag, None, tagged_class))
         # What is not read is kept as text, so that writing loses nothing.
         extra.pending.append(Remark(format_element(child), True))
         self.count += count_elements(child)
@@ -455,10 +464,12 @@ class ObjectReader:
         self, element: etree._Element, number: int, spec: FieldSpec, extra: _ExtraContent
     ) -> str:
         """Return the text of a value element that contains comments or, by mistake, elements."""
-        inner = [node for node in element if is_element(node)]
-        if inner:
-            extra.late.append(("child-in-value", number, decode_name(inner[0].tag), spec, None))
-            self.count += sum(count_elements(node) for node in inner)
+        child_elements = [node for node in element if is_element(node)]
+        if child_elements:
+            extra.late.append(
+                ("child-in-value", number, decode_name(child_elements[0].tag), spec, None)
+            )
+            self.count += sum(count_elements(node) for node in child_elements)
         elif (
             sum(
                 1

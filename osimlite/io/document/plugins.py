@@ -136,19 +136,19 @@ MAX_VALUES = 1_000_000
 class _Declarations:
     """Declarations of one file; its classes are added to those of earlier files."""
 
-    def __init__(self, path: str, found: dict[str, type[Object]]) -> None:
+    def __init__(self, path: str, classes: dict[str, type[Object]]) -> None:
         self.path = path
         # The classes of earlier files may be bases of this one.
-        self.found = found
+        self.classes = classes
         self.text = read_file(path).decode("utf-8", "replace")
         try:
-            top = json.loads(self.text)
+            document = json.loads(self.text)
         except (ValueError, RecursionError) as error:
             line = getattr(error, "lineno", None)
             raise OsimliteError(
                 f"not JSON: {getattr(error, 'msg', error)}", file=path, line=line
             ) from None
-        self.top: dict[str, Any] = self.check_mapping(top, _TOP, "the file")
+        self.top: dict[str, Any] = self.check_mapping(document, _TOP, "the file")
         self.entries: dict[str, Any] = self.check_mapping(
             self.top.get("classes"), None, "'classes'"
         )
@@ -181,10 +181,10 @@ class _Declarations:
         # OpenSim's classes are imported one by one: a file refers to few of them.
         if name in MODULES and name not in self.entries:
             return cast("type[Object]", getattr(import_module(MODULES[name]), name))
-        if name not in self.found:
+        if name not in self.classes:
             if name not in self.entries:
-                near = suggest_name(name, [*MODULES, *self.entries, *self.found])
-                raise self.make_error(f"there is no class '{name}'{near}", *words)
+                suggestion = suggest_name(name, [*MODULES, *self.entries, *self.classes])
+                raise self.make_error(f"there is no class '{name}'{suggestion}", *words)
             if name in MODULES:
                 raise self.make_error(f"'{name}' is a class of OpenSim itself", name)
             if len(self.pending) > MAX_INHERITANCE_DEPTH:
@@ -198,9 +198,9 @@ class _Declarations:
             # The list also shows the chain of names in the error.
             # A class that refers to itself while it is being made is found by this list.
             self.pending.append(name)
-            self.found[name] = self.make_class(name)
+            self.classes[name] = self.make_class(name)
             self.pending.pop()
-        return self.found[name]
+        return self.classes[name]
 
     def make_class(self, name: str) -> type[Object]:
         entry = self.check_mapping(self.entries[name], _OF_A_CLASS, f"class '{name}'", name)
@@ -218,9 +218,12 @@ class _Declarations:
             )
         # Names with "<" are templates of C++, which have no class here.
         base = self.find_class(
-            next((word for word in bases if "<" not in word), "Object"), name, "bases", bases[0]
+            next((base_name for base_name in bases if "<" not in base_name), "Object"),
+            name,
+            "bases",
+            bases[0],
         )
-        inside: dict[str, Any] = {
+        namespace: dict[str, Any] = {
             "__module__": __name__,
             "__doc__": f"A class of a plug-in, as declared in {self.path}.",
             "__annotations__": {"facts": ClassVar[Facts]},
@@ -228,49 +231,51 @@ class _Declarations:
                 outputs=" ".join(map(self.format_output, self.list_rows(entry, "outputs", name)))
             ),
         }
-        known = base.field_specs()
+        inherited = base.field_specs()
         sockets = {row["tag"] for row in self.list_sockets(entry, name)}
         for row in self.list_sockets(entry, name):
             # Inherited sockets are declared already.
-            if row["tag"] not in known:
-                self.add_field(inside, base, row["tag"], *self.parse_socket(row))
+            if row["tag"] not in inherited:
+                self.add_field(namespace, base, row["tag"], *self.parse_socket(row))
         for row in self.list_properties(name):
-            spec = known.get(row["name"])
+            spec = inherited.get(row["name"])
             if spec is None and row["name"] not in sockets:
-                self.add_field(inside, base, row["name"], *self.parse_property(name, row))
+                self.add_field(namespace, base, row["name"], *self.parse_property(name, row))
             elif (
                 spec is not None and isinstance(spec.kind, Value) and row.get("default") is not None
             ):
                 # A class may change the default of an inherited property.
-                inside["__annotations__"][spec.name] = Annotated[Any, spec.kind, Tag(spec.tag)]
-                inside[spec.name] = self.parse_default(
+                namespace["__annotations__"][spec.name] = Annotated[Any, spec.kind, Tag(spec.tag)]
+                namespace[spec.name] = self.parse_default(
                     name, row, spec.kind, _format_default(row["default"])
                 )
         metaclass: Any = type(base)
         return cast(
             "type[Object]",
-            metaclass(name, (base,), inside, tag=name, abstract=bool(entry.get("abstract"))),
+            metaclass(name, (base,), namespace, tag=name, abstract=bool(entry.get("abstract"))),
         )
 
     def add_field(
         self,
-        inside: dict[str, Any],
+        namespace: dict[str, Any],
         base: type[Object],
         tag: str,
-        held: Any,
+        annotation: Any,
         kind: FieldType,
         default: Any,
     ) -> None:
         """Add a property to the namespace of a new class; attributes of all objects are not overridden."""
         # A Python attribute must be free and a legal name; the tag stays as it is.
-        taken = hasattr(base, tag) or iskeyword(tag) or not tag.isidentifier()
+        needs_new_name = hasattr(base, tag) or iskeyword(tag) or not tag.isidentifier()
         field = (
-            "".join(letter if letter.isalnum() else "_" for letter in tag) + "_" if taken else tag
+            "".join(letter if letter.isalnum() else "_" for letter in tag) + "_"
+            if needs_new_name
+            else tag
         )
-        inside["__annotations__"][field] = (
-            Annotated[held, kind, Tag(tag)] if taken else Annotated[held, kind]
+        namespace["__annotations__"][field] = (
+            Annotated[annotation, kind, Tag(tag)] if needs_new_name else Annotated[annotation, kind]
         )
-        inside[field] = default
+        namespace[field] = default
 
     def parse_socket(self, row: Any) -> tuple[Any, FieldType, Any]:
         """Return annotation, type and default of a socket or an input.
@@ -283,15 +288,15 @@ class _Declarations:
             if "connectee_type" in row
             else ("input", row.get("type"))
         )
-        many = bool(row.get("list"))
+        is_list = bool(row.get("list"))
         kind = Reference(
             rule,
             str(target),
-            "list" if many else "single",
+            "list" if is_list else "single",
             required=not row.get("optional", rule == "input"),
         )
-        held = str | Component
-        return (tuple[held, ...], kind, ()) if many else (held, kind, "")
+        annotation = str | Component
+        return (tuple[annotation, ...], kind, ()) if is_list else (annotation, kind, "")
 
     def parse_property(self, owner: str, row: Any) -> tuple[Any, FieldType, Any]:
         """Return annotation, type and default of a property.
@@ -322,16 +327,16 @@ class _Declarations:
             kind = Value(
                 "double", vector, row.get("unit"), legacy=legacy, optional=shape == "optional"
             )
-            held: Any = tuple[float, ...]
+            annotation: Any = tuple[float, ...]
         elif reference is not None:
             required = bool(reference.get("required", True))
             kind = Reference(
                 reference["resolution"], str(reference.get("target")), shape, required, legacy
             )
-            held = str | Component
+            annotation = str | Component
         else:
-            least, most = row.get("min") or 0, row.get("max")
-            for key, count in (("min", least), ("max", 0 if most is None else most)):
+            min_count, max_count = row.get("min") or 0, row.get("max")
+            for key, count in (("min", min_count), ("max", 0 if max_count is None else max_count)):
                 if (
                     isinstance(count, bool)
                     or not isinstance(count, int)
@@ -345,23 +350,25 @@ class _Declarations:
                     )
             if not isinstance(row.get("unit") or "", str):
                 raise self.make_error(f"'unit' of '{name}' must be a text", owner, name, "unit")
-            kind = Value(cast("Any", typed), shape, row.get("unit"), "", least, most, legacy)
-            held = _SCALARS[typed]
+            kind = Value(
+                cast("Any", typed), shape, row.get("unit"), "", min_count, max_count, legacy
+            )
+            annotation = _SCALARS[typed]
         if shape == "list":
-            held = tuple[held, ...]
+            annotation = tuple[annotation, ...]
         default = row.get("default")
         if shape == "optional":
-            held = held | None
+            annotation = annotation | None
             # An optional value without a default is absent.
             if default is None:
-                return held, kind, None
+                return annotation, kind, None
         text = (
             # Without a default OpenSim's types start at zero, texts empty.
             _ZEROS.get(typed, "")
             if default is None and shape == "single"
             else _format_default(default)
         )
-        return held, kind, self.parse_default(owner, row, kind, text)
+        return annotation, kind, self.parse_default(owner, row, kind, text)
 
     def parse_default(self, owner: str, row: Any, kind: FieldType, text: str) -> Any:
         """Return the value of a default's text.
@@ -413,16 +420,16 @@ class _Declarations:
     def list_properties(self, name: str) -> list[Any]:
         rows = self.list_rows(self.entries[name], "properties", name)
         for row in rows:
-            where = f"a property of '{name}'"
+            description = f"a property of '{name}'"
             self.check_mapping(
                 row,
                 _OF_A_PROPERTY,
-                where,
+                description,
                 name,
                 str(row.get("name") if isinstance(row, dict) else ""),
             )
             if not isinstance(row.get("name"), str):
-                raise self.make_error(f"{where} has no name", name)
+                raise self.make_error(f"{description} has no name", name)
             if "type" not in row:
                 raise self.make_error(f"'{row['name']}' of '{name}' has no type", name, row["name"])
         return rows
@@ -460,25 +467,25 @@ class _Declarations:
         return result
 
     def check_mapping(
-        self, value: Any, known: tuple[str, ...] | None, what: str, *words: str
+        self, value: Any, known_keys: tuple[str, ...] | None, description: str, *words: str
     ) -> dict[str, Any]:
         """Return a value that must be a JSON object with known keys.
 
         Args:
             value: the value.
-            known: the keys; None for any.
-            what: what it describes, for messages.
+            known_keys: the keys; None for any.
+            description: what it describes, for messages.
             words: words of the file that lead to it, for the line of an error.
 
         Returns:
             The value.
         """
         if not isinstance(value, dict):
-            raise self.make_error(f"{what} must be an object of JSON, in braces", *words)
+            raise self.make_error(f"{description} must be an object of JSON, in braces", *words)
         for key in value:
-            if known is not None and key not in known:
+            if known_keys is not None and key not in known_keys:
                 raise self.make_error(
-                    f"{what} has no '{key}'{suggest_or_list(key, known)}", *words, key
+                    f"{description} has no '{key}'{suggest_or_list(key, known_keys)}", *words, key
                 )
         return value
 
@@ -490,10 +497,10 @@ class _Declarations:
             words: the words, as strings of JSON.
         """
         # The search starts at the classes: "meta" may contain the same words.
-        place = max(0, self.text.find('"classes"'))
+        offset = max(0, self.text.find('"classes"'))
         for word in words:
-            place = max(place, self.text.find(json.dumps(word, ensure_ascii=False), place))
-        return OsimliteError(message, file=self.path, line=self.text.count("\n", 0, place) + 1)
+            offset = max(offset, self.text.find(json.dumps(word, ensure_ascii=False), offset))
+        return OsimliteError(message, file=self.path, line=self.text.count("\n", 0, offset) + 1)
 
 
 def _format_default(value: Any) -> str:

@@ -113,12 +113,12 @@ class _Printer:
                 f"{indent}<{item.tag} file={quote_attribute(self._get_include_path(layout.include))} />"
             )
         else:
-            head = f"{indent}<{item.tag}" + (f" name={quote_attribute(name)}" if name else "")
+            start_tag = f"{indent}<{item.tag}" + (f" name={quote_attribute(name)}" if name else "")
             if layout is not None:
-                head += "".join(
+                start_tag += "".join(
                     f" {key}={quote_attribute(text)}" for key, text in layout.attributes.items()
                 )
-            self.lines.append(head + ">")
+            self.lines.append(start_tag + ">")
             if item is self.top and layout is not None and layout.defaults:
                 self._print_defaults(layout.defaults, depth + 1)
             present = item.model_fields_set
@@ -202,9 +202,11 @@ class _Printer:
             text = self._format_value(item, spec, value)
             # OpenSim prints an empty value of the first property system as one tag, and others with
             # an end tag.
-            short = not text and spec.legacy
+            is_short = not text and spec.legacy
             self.lines.append(
-                f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>"
+                f"{indent}<{spec.tag} />"
+                if is_short
+                else f"{indent}<{spec.tag}>{text}</{spec.tag}>"
             )
         elif kind.form == "single" and not (
             isinstance(value, Unknown) and value.class_name in get_field_specs(type(item))
@@ -268,12 +270,14 @@ class _Printer:
 def _list_unprinted_defaults(cls: type[Object]) -> frozenset[str]:
     """Return the properties of a class whose default objects and lists print nothing."""
     factories = get_defaults(cls)[1]
-    held = (
+    object_specs = (
         spec
         for spec in get_field_specs(cls).values()
         if spec.name in factories and isinstance(spec.kind, ObjectField)
     )
-    return frozenset(spec.name for spec in held if not has_content(factories[spec.name](), spec))
+    return frozenset(
+        spec.name for spec in object_specs if not has_content(factories[spec.name](), spec)
+    )
 
 
 def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
@@ -294,7 +298,7 @@ def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
         return True
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True
-    return any(has_content(held, inner) for inner, held in value.list_owned_objects())
+    return any(has_content(child, inner_spec) for inner_spec, child in value.list_owned_objects())
 
 
 def format_document(source: Source) -> str:

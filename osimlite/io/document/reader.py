@@ -149,7 +149,7 @@ def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
     from osimlite.io.document.plugins import classes_in_use
 
     with classes_in_use(classes):
-        return read_document(Source.from_file(path), of=Object).top
+        return read_document(Source.from_file(path), expected_class=Object).top
 
 
 def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
@@ -171,12 +171,14 @@ def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
         ).model
 
 
-def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = False) -> Document:
+def read_document(
+    source: Source, *, expected_class: type[Object] = Model, to_check: bool = False
+) -> Document:
     """Read a document with its text and notes.
 
     Args:
         source: the text.
-        of: class of the object at the top, or one of its bases.
+        expected_class: class of the object at the top, or one of its bases.
         to_check: also find text between elements and attributes without meaning, for the linter.
 
     Raises:
@@ -191,7 +193,7 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
             # The search for text between elements is needed by the checks only.
             mixed = cast("list[etree._Element]", _MIXED(root))
             source.mixed = (
-                [number for number, each in enumerate(root.iter("*")) if each in mixed]
+                [number for number, element in enumerate(root.iter("*")) if element in mixed]
                 if mixed
                 else ()
             )
@@ -200,15 +202,15 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
         from osimlite.io.document.repair import read_repaired
 
         root, notes = read_repaired(source, fault, parse_source)
-        document = read_tree(source, root, read_version(source, root), of)
+        document = read_tree(source, root, read_version(source, root), expected_class)
         document.notes[:0] = notes
         document.fault = fault
         return document
-    return read_tree(source, root, read_version(source, root), of)
+    return read_tree(source, root, read_version(source, root), expected_class)
 
 
 def read_tree(
-    source: Source, root: etree._Element, version: int, of: type[Object] = Model
+    source: Source, root: etree._Element, version: int, expected_class: type[Object] = Model
 ) -> Document:
     """Convert an element tree to a document.
 
@@ -216,7 +218,7 @@ def read_tree(
         source: the text of the tree.
         root: root element.
         version: version of the document.
-        of: class of the object at the top, or one of its bases.
+        expected_class: class of the object at the top, or one of its bases.
 
     Raises:
         DocumentError: the document has no such object, or content of an older version that cannot be
@@ -228,21 +230,25 @@ def read_tree(
                 # A current model that OpenSim dumps has no <OpenSimDocument> around it, and therefore
                 # no version.
                 wrapped = _upgrade_tree(source, root, CURRENT_VERSION)
-                return _build_document(source, root, version, of, wrapped, is_known=True)
-            return _build_document(source, root, version, of, _upgrade_tree(source, root, version))
+                return _build_document(
+                    source, root, version, expected_class, wrapped, is_known=True
+                )
+            return _build_document(
+                source, root, version, expected_class, _upgrade_tree(source, root, version)
+            )
         document = (
             None
             # A first attempt without renaming: nearly all files have no old class names, and the
             # search for them takes time.
             if _find_class(_find_first_element(root)) is None
-            else _build_document(source, root, version, of, None)
+            else _build_document(source, root, version, expected_class, None)
         )
         if document is None or any(note.kind in _UNKNOWN_KINDS for note in document.notes):
             from osimlite.io.document.upgrade import rename_old_classes
 
             upgraded = rename_old_classes(root)
             if document is None or upgraded is not None:
-                document = _build_document(source, root, version, of, upgraded)
+                document = _build_document(source, root, version, expected_class, upgraded)
     return document
 
 
@@ -293,12 +299,12 @@ def _build_document(
     source: Source,
     root: etree._Element,
     version: int,
-    of: type[Object],
+    expected_class: type[Object],
     upgraded: UpgradeResult | None,
     is_known: bool = False,
 ) -> Document:
     reader = ObjectReader(_make_include_reader(source))
-    top = _read_top(source, root if upgraded is None else upgraded.root, reader, of)
+    top = _read_top(source, root if upgraded is None else upgraded.root, reader, expected_class)
     get_layout(top).version, get_layout(top).file = version, source.file
     notes = reader.notes
     if upgraded is not None:
@@ -332,28 +338,28 @@ def _map_to_old_text(
     if numbers is None:
         return notes
     # Read instance dictionaries instead of attributes: accessing a default would create it.
-    items: list[Object] = [top, *get_layout(top).defaults]
-    for item in items:
-        if item._index is not None:
-            put_index(item, numbers[item._index])
-        for _, name, *_ in list_holding_properties(type(item)):
-            held = item.__dict__.get(name)
-            items += held if isinstance(held, list) else [] if held is None else [held]
+    objects: list[Object] = [top, *get_layout(top).defaults]
+    for owner in objects:
+        if owner._index is not None:
+            put_index(owner, numbers[owner._index])
+        for _, name, *_ in list_holding_properties(type(owner)):
+            value = owner.__dict__.get(name)
+            objects += value if isinstance(value, list) else [] if value is None else [value]
     return [note._replace(number=numbers[note.number]) for note in notes]
 
 
 def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
     """Reject a very old document with unknown elements, which the upgrade would lose."""
-    left = [note for note in notes if note.kind in _UNKNOWN_KINDS]
-    if version >= FIRST_COMPLETE_VERSION or not left:
+    unknown_notes = [note for note in notes if note.kind in _UNKNOWN_KINDS]
+    if version >= FIRST_COMPLETE_VERSION or not unknown_notes:
         # Newer documents lose what OpenSim loses as well; of older ones nothing is known.
         return
-    tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in left})[:8])
+    tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in unknown_notes})[:8])
     message = (
         f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and no rule says what becomes of {tags}: that would "
         "be lost; take it out, or open and save the model with OpenSim 2"
     )
-    raise _make_version_error(source, version, message, left[0].number)
+    raise _make_version_error(source, version, message, unknown_notes[0].number)
 
 
 def _make_version_error(
@@ -463,13 +469,15 @@ def read_version(source: Source, root: etree._Element) -> int:
             return OLDEST_VERSION
     # Errors follow; the order is from the worst mismatch to the mildest.
     # Computing a position takes a pass over the text, so it is done for errors only.
-    place = source.locate_tag(0)
+    position = source.locate_tag(0)
     if root.tag != ROOT:
         tag = decode_name(root.tag)
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
         if tag == "mujoco":
             message += "; this is MJCF (MuJoCo): convert it with 'osimlite convert'"
-        raise _add_suggestion(source.fault(DocumentError, message, place), _guess_root(tag, root))
+        raise _add_suggestion(
+            source.fault(DocumentError, message, position), _guess_root(tag, root)
+        )
     if number is None:
         result = (
             "has no Version"
@@ -477,7 +485,7 @@ def read_version(source: Source, root: etree._Element) -> int:
             else f'has Version="{text[:40]}", which is not a whole number'
         )
         raise source.fault(
-            VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', place
+            VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', position
         )
     message = (
         f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST_VERSION}); "
@@ -486,26 +494,26 @@ def read_version(source: Source, root: etree._Element) -> int:
     raise _make_version_error(source, number, message)
 
 
-def _add_suggestion(fault: DocumentError, meant: str | None) -> DocumentError:
+def _add_suggestion(fault: DocumentError, suggestion: str | None) -> DocumentError:
     """Add the tag that was probably meant to an error, if known."""
-    if meant is not None:
-        fault.meant = meant
-        fault.message += f"; did you mean '{meant}'?"
+    if suggestion is not None:
+        fault.meant = suggestion
+        fault.message += f"; did you mean '{suggestion}'?"
     return fault
 
 
 def _guess_root(tag: str, root: etree._Element) -> str | None:
     """Return the likely name of a root: that of a document, or the class of an old setup."""
     name = tag.rpartition(":")[2]
-    first = _find_first_element(root)
-    held = (
-        first is not None
-        and find_nearest(decode_name(first.tag), list_tags(), cutoff=85) is not None
+    first_element = _find_first_element(root)
+    has_known_object = (
+        first_element is not None
+        and find_nearest(decode_name(first_element.tag), list_tags(), cutoff=85) is not None
     )
     # A likely object inside, or a similar name, speaks for the root of a document.
     return (
         ROOT
-        if held or find_nearest(name, [ROOT], cutoff=85) is not None
+        if has_known_object or find_nearest(name, [ROOT], cutoff=85) is not None
         else find_nearest(name, list_tags(), cutoff=85)
     )
 
@@ -520,38 +528,42 @@ def _find_class(element: etree._Element | None) -> type[Object] | None:
 
 
 def _read_top(
-    source: Source, root: etree._Element, reader: ObjectReader, of: type[Object]
+    source: Source, root: etree._Element, reader: ObjectReader, expected_class: type[Object]
 ) -> Object:
     """Read the object of a document, with the comments around it."""
-    first = _find_first_element(root)
-    cls = _find_class(first)
-    if first is None or cls is None or not issubclass(cls, of):
+    first_element = _find_first_element(root)
+    cls = _find_class(first_element)
+    if first_element is None or cls is None or not issubclass(cls, expected_class):
         tag = ""
-        if first is None:
-            what = "no object" if of is Object else f"no <{of.tag}>"
-        elif of is Object:
-            tag = decode_name(first.tag)
-            what = f"a <{tag}>, which is no class of OpenSim 4.6"
+        if first_element is None:
+            description = "no object" if expected_class is Object else f"no <{expected_class.tag}>"
+        elif expected_class is Object:
+            tag = decode_name(first_element.tag)
+            description = f"a <{tag}>, which is no class of OpenSim 4.6"
         else:
-            tag = decode_name(first.tag)
-            what = f"a <{tag}>, not a <{of.tag}>"
-        at = source.locate_tag(0 if first is None else 1)
-        meant = (
+            tag = decode_name(first_element.tag)
+            description = f"a <{tag}>, not a <{expected_class.tag}>"
+        position = source.locate_tag(0 if first_element is None else 1)
+        suggestion = (
             None
-            if first is None or cls is not None
-            else find_nearest(tag, list_tags() if of is Object else [of.tag])
+            if first_element is None or cls is not None
+            else find_nearest(
+                tag, list_tags() if expected_class is Object else [expected_class.tag]
+            )
         )
-        raise _add_suggestion(source.fault(DocumentError, f"the document holds {what}", at), meant)
+        raise _add_suggestion(
+            source.fault(DocumentError, f"the document holds {description}", position), suggestion
+        )
     # Element 0 is the root, 1 the object.
     reader.count = 1
-    top = reader.read_top(first, cls)
-    for second in first.itersiblings(etree.Element):
-        reader.notes.append(Note("second-object", reader.count, decode_name(second.tag)))
-        reader.count += count_elements(second)
+    top = reader.read_top(first_element, cls)
+    for sibling in first_element.itersiblings(etree.Element):
+        reader.notes.append(Note("second-object", reader.count, decode_name(sibling.tag)))
+        reader.count += count_elements(sibling)
     # Comments before an element are listed backwards by lxml.
-    for place, nodes in (
-        ("comments", [*first.itersiblings(preceding=True)][::-1]),
-        ("after", first.itersiblings()),
+    for remark_field, nodes in (
+        ("comments", [*first_element.itersiblings(preceding=True)][::-1]),
+        ("after", first_element.itersiblings()),
         ("prolog", [*root.itersiblings(preceding=True)][::-1]),
         ("epilog", root.itersiblings()),
     ):
@@ -559,8 +571,8 @@ def _read_top(
         for node in nodes:
             add_comment(node, remarks)
         if remarks:
-            getattr(get_layout(top), place).extend(
-                remarks if place == "after" else [remark.text for remark in remarks]
+            getattr(get_layout(top), remark_field).extend(
+                remarks if remark_field == "after" else [remark.text for remark in remarks]
             )
     return top
 
@@ -585,30 +597,30 @@ def _make_include_reader(
     total = [0] if read is None else read
 
     def read_include(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | str:
-        place = Path(around_it).parent / file
-        path = os.path.realpath(place)
+        include_path = Path(around_it).parent / file
+        path = os.path.realpath(include_path)
         if path in around:
             # A file that includes itself, directly or through others.
             return "is being read already"
         if len(around) == _MAX_INCLUDE_DEPTH:
             return _TOO_DEEP_MESSAGE
         try:
-            inner = Source.from_file(place)
+            included = Source.from_file(include_path)
             # Each file counts at least some bytes, so that ten thousand tiny files are refused as
             # well.
-            total[0] += max(_MIN_INCLUDED_BYTES, len(inner.data))
-            expect_size(total[0], place)
-            root = parse_source(inner)
-            version = read_version(inner, root)
+            total[0] += max(_MIN_INCLUDED_BYTES, len(included.data))
+            expect_size(total[0], include_path)
+            root = parse_source(included)
+            version = read_version(included, root)
             # An included file may have another version than the one around it.
             if version < CURRENT_VERSION:
-                root = _upgrade_tree(inner, root, version).root
+                root = _upgrade_tree(included, root, version).root
             top = next((child for child in root if is_element(child)), None)
             if top is None or top.tag != cls.tag:
                 return "holds none"
-            reader = ObjectReader(_make_include_reader(inner, (*around, path), total))
+            reader = ObjectReader(_make_include_reader(included, (*around, path), total))
             reader.count = 1
-            item = reader.read_top(top, cls)
+            included_object = reader.read_top(top, cls)
         except SpecialFileError as fault:
             return f"is not read: {fault.message.partition(': ')[2]}"
         except MissingFileError:
@@ -617,7 +629,7 @@ def _make_include_reader(
             return "holds none"
         except RecursionError:
             return _TOO_DEEP_MESSAGE
-        return item, Include(file, path, item.copy_deep()), reader.notes
+        return included_object, Include(file, path, included_object.copy_deep()), reader.notes
 
     return read_include
 

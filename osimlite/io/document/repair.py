@@ -162,19 +162,19 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
         text = _replace_by_blanks(unended[0]) + text[unended.end() :]
     pieces: list[str] = []
     # `depth` counts open elements: text outside of the root is treated differently.
-    place = depth = 0
+    offset = depth = 0
     # `as_opensim`: comments and sections end where OpenSim's parser ends them.
     for kind, start, end, _ in find_markup(text, as_opensim=True):
-        gap, piece = text[place:start], text[start:end]
+        gap, piece = text[offset:start], text[start:end]
         pieces.append(
-            _repair_outside(gap, place, repairs)
+            _repair_outside(gap, offset, repairs)
             if not depth
-            else _escape_ampersands(gap, place, repairs)
+            else _escape_ampersands(gap, offset, repairs)
         )
         if kind == "comment":
             piece = _repair_comment(piece, start, repairs)
         elif kind == "instruction":
-            if _DECLARATION.match(piece) and place > 0:
+            if _DECLARATION.match(piece) and offset > 0:
                 repairs.append(Repair("late-declaration", start, piece, ""))
                 piece = _replace_by_blanks(piece)
             elif _is_no_instruction(piece):
@@ -194,17 +194,17 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
                 piece = _replace_by_blanks(piece)
             depth = max(0, depth - 1)
         pieces.append(piece)
-        place = end
-    pieces.append(_repair_outside(text[place:], place, repairs) if not depth else text[place:])
+        offset = end
+    pieces.append(_repair_outside(text[offset:], offset, repairs) if not depth else text[offset:])
     return "".join(pieces), repairs
 
 
 def _find_unclosed(text: str) -> int | None:
     """Return the offset of a comment, CDATA section or instruction without an end."""
-    place = 0
+    last_end = 0
     for _, _, end, _ in find_markup(text, as_opensim=True):
-        place = end
-    result = _SPECIAL.search(text, place)
+        last_end = end
+    result = _SPECIAL.search(text, last_end)
     return None if result is None else result.start()
 
 
@@ -240,8 +240,8 @@ def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
 def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
     """Replace hyphens that a comment must not have by dashes."""
     # Without "<!--" and "-->".
-    inner = piece[4:-3]
-    result = _HYPHENS.search(inner)
+    comment_text = piece[4:-3]
+    result = _HYPHENS.search(comment_text)
     if result is None:
         return piece
     repairs.append(
@@ -249,7 +249,7 @@ def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
             "hyphens-in-comment", offset + 4 + result.start(), result[0], _EN_DASH * len(result[0])
         )
     )
-    return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), inner)}-->"
+    return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), comment_text)}-->"
 
 
 def _repair_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
@@ -282,10 +282,10 @@ def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     def quote(match: re.Match[str]) -> str:
         if match["name"] is None:
             return match[0]
-        meant = (
+        consequence = (
             "OpenSim takes it for quoted" if match["bare"] else "OpenSim takes its value for empty"
         )
-        repairs.append(Repair("overlooked", offset + match.start(), match[0], meant))
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], consequence))
         return f'{match["name"]}="{match["bare"] or ""}"'
 
     def add_blank(match: re.Match[str]) -> str:
@@ -308,8 +308,8 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
     """
     if "]]>" in text:
         repairs += [
-            Repair("overlooked", offset + m.start(), m[0], "OpenSim keeps it")
-            for m in _ENDING.finditer(text)
+            Repair("overlooked", offset + ending.start(), ending[0], "OpenSim keeps it")
+            for ending in _ENDING.finditer(text)
         ]
         # The end of a CDATA section must not occur in text.
         text = text.replace("]]>", "]]&gt;")
@@ -335,13 +335,13 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
         name = match[1]
         if name in _OWN_ENTITIES:
             return match[0]
-        meant = html5.get(f"{name};") if name else None
+        replacement = html5.get(f"{name};") if name else None
         repairs.append(
-            Repair("bare-ampersand", offset + match.start(), match[0], meant or match[0])
+            Repair("bare-ampersand", offset + match.start(), match[0], replacement or match[0])
         )
-        if meant is None:
+        if replacement is None:
             # Line feeds would move all positions below.
             return "&amp;" + match[0][1:]
-        return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
+        return replacement.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
 
     return _AMPERSAND.sub(escape_ampersand, _NUMBERED.sub(replace_invalid_number, text))

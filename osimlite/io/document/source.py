@@ -226,15 +226,15 @@ class Source:
         line = before[block] + self.text.count("\n", block * _BLOCK_SIZE, offset)
         return Position(line + 1, offset - self.text.rfind("\n", 0, offset), length)
 
-    def fault(self, kind: type[Fault], message: str, place: Position) -> Fault:
+    def fault(self, kind: type[Fault], message: str, position: Position) -> Fault:
         """Return an error with a position in the text.
 
         Args:
             kind: class of the error.
             message: the message.
-            place: the position.
+            position: the position.
         """
-        return kind(message, file=self.file, line=place.line, column=place.column)
+        return kind(message, file=self.file, line=position.line, column=position.column)
 
     def locate_tag(self, number: int) -> Position:
         """Return the position of an element's start tag: its ``<`` and name.
@@ -256,18 +256,25 @@ class Source:
             nth: which occurrence of the word, from 0.
         """
         span = self.spans[number]
-        inner = self.text[span.tag_end : span.inner_end]
+        inner_text = self.text[span.tag_end : span.inner_end]
         if word:
             # The word must be delimited by white space, so that "1" does not match in "10".
-            places = [m.start() for m in re.finditer(rf"(?<!\S){re.escape(word)}(?!\S)", inner)]
+            offsets = [
+                match.start()
+                for match in re.finditer(rf"(?<!\S){re.escape(word)}(?!\S)", inner_text)
+            ]
             # The word may be a part of a longer one, such as a number before a comma.
-            places = places or [m.start() for m in re.finditer(re.escape(word), inner)]
-            if places:
-                return self.position(span.tag_end + places[min(nth, len(places) - 1)], len(word))
-        stripped = inner.strip()
+            offsets = offsets or [
+                match.start() for match in re.finditer(re.escape(word), inner_text)
+            ]
+            if offsets:
+                return self.position(span.tag_end + offsets[min(nth, len(offsets) - 1)], len(word))
+        stripped = inner_text.strip()
         if not stripped or "<" in stripped:
             return self.locate_tag(number)
-        return self.position(span.tag_end + inner.index(stripped), len(stripped.splitlines()[0]))
+        return self.position(
+            span.tag_end + inner_text.index(stripped), len(stripped.splitlines()[0])
+        )
 
     def locate_attribute(self, number: int, name: str) -> Position:
         """Return the position of the value of an attribute; without the attribute, that of the tag.

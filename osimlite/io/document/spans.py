@@ -69,23 +69,25 @@ def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
         text: the text.
         as_opensim: end instructions at the first ``>`` as OpenSim does, and not at ``?>`` as in XML.
     """
-    place = 0
-    while (match := _MARKUP.search(text, place)) is not None:
+    offset = 0
+    while (match := _MARKUP.search(text, offset)) is not None:
         special = match["special"]
-        place = match.end()
+        offset = match.end()
         if special is not None:
             kind, ending = _SPECIAL[special]
             if special == "?":
                 ending = _INSTRUCTION_END[as_opensim]
-            result = text.find(ending, place)
+            result = text.find(ending, offset)
             if result < 0:
                 return
-            place = result + len(ending)
-            yield Markup(kind, match.start(), place)
+            offset = result + len(ending)
+            yield Markup(kind, match.start(), offset)
         elif match["close"] is not None:
-            yield Markup("close", match.start(), place, match["close"])
+            yield Markup("close", match.start(), offset, match["close"])
         else:
-            yield Markup("empty" if match["empty"] else "open", match.start(), place, match["open"])
+            yield Markup(
+                "empty" if match["empty"] else "open", match.start(), offset, match["open"]
+            )
 
 
 _REMARK = re.compile(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
@@ -102,21 +104,21 @@ def blank_comments(text: str, character: str = " ") -> str:
         character: the replacement.
     """
     pieces: list[str] = []
-    missing: set[str] = set()
-    place = 0
+    missing_endings: set[str] = set()
+    offset = 0
     for match in _REMARK.finditer(text):
         start = match.start()
         ending = _SPECIAL[match["special"]][1]
-        if start < place or ending in missing:
+        if start < offset or ending in missing_endings:
             continue
         closing = text.find(ending, match.end())
         if closing < 0:
-            missing.add(ending)
+            missing_endings.add(ending)
             continue
         end = closing + len(ending)
-        pieces += [text[place:start], character * (end - start)]
-        place = end
-    pieces.append(text[place:])
+        pieces += [text[offset:start], character * (end - start)]
+        offset = end
+    pieces.append(text[offset:])
     return "".join(pieces)
 
 
@@ -214,15 +216,15 @@ class PlainSpans(Sequence[Span]):
 
     def inside(self, number: int) -> Iterator[int]:
         """Yield the indices of the child elements without searching the element's own end."""
-        inner = number + 1
+        child = number + 1
         opening = self._match_start_tag(number)
-        place = opening.end()
+        offset = opening.end()
         while not opening["empty"]:
-            place = self._find_next_tag(place)
-            if self.text[place + 1] == "/":
+            offset = self._find_next_tag(offset)
+            if self.text[offset + 1] == "/":
                 return
-            yield inner
-            place, inner = self._find_end(inner)
+            yield child
+            offset, child = self._find_end(child)
 
     def _find_end(self, number: int) -> tuple[int, int]:
         """Return the offset after an element, and the index of the first element that starts there or later."""
@@ -241,20 +243,20 @@ class PlainSpans(Sequence[Span]):
         assert match is not None
         return match
 
-    def _find_next_tag(self, place: int) -> int:
+    def _find_next_tag(self, offset: int) -> int:
         """Return the offset of the next tag after comments, CDATA sections and instructions."""
         text = self.text
-        place = text.index("<", place)
-        while text[place + 1] in "!?":
+        offset = text.index("<", offset)
+        while text[offset + 1] in "!?":
             ending = (
                 "-->"
-                if text.startswith("<!--", place)
+                if text.startswith("<!--", offset)
                 else "]]>"
-                if text[place + 1] == "!"
+                if text[offset + 1] == "!"
                 else "?>"
             )
-            place = text.index("<", text.index(ending, place + 2))
-        return place
+            offset = text.index("<", text.index(ending, offset + 2))
+        return offset
 
     def _find_span(self, number: int) -> Span:
         match = self._match_start_tag(number)
@@ -268,39 +270,39 @@ class PlainSpans(Sequence[Span]):
             close = self._find_closing_tag(tag, tag_end)
         return Span(tag, start, tag_end, close, self.text.index(">", close) + 1)
 
-    def _is_outside_comments(self, place: int, start: int) -> bool:
+    def _is_outside_comments(self, offset: int, start: int) -> bool:
         """Return whether an offset is certainly not in a comment or section that starts at `start` or later."""
         text = self.text
         # Searching a rare character is many times faster than searching "<".
-        if text.find("![", start, place) >= 0 or text.find("?", start, place) >= 0:
+        if text.find("![", start, offset) >= 0 or text.find("?", start, offset) >= 0:
             return False
-        if text.find("!", start, place) < 0:
+        if text.find("!", start, offset) < 0:
             return True
-        comment = text.rfind("<!--", start, place)
-        return comment < 0 or text.find("-->", comment, place) >= 0
+        comment = text.rfind("<!--", start, offset)
+        return comment < 0 or text.find("-->", comment, offset) >= 0
 
-    def _find_closing_tag(self, tag: str, place: int) -> int:
-        """Return the offset of the closing tag of an element whose content starts at `place`."""
-        close = self.text.find("<", place)
+    def _find_closing_tag(self, tag: str, offset: int) -> int:
+        """Return the offset of the closing tag of an element whose content starts at `offset`."""
+        close = self.text.find("<", offset)
         if self.text[close + 1] == "/":
             return close
-        first = self.text.index(f"</{tag}", close)
-        is_its = self.text[first + len(tag) + 2] in "> \t\r\n"
+        first_close = self.text.index(f"</{tag}", close)
+        is_its = self.text[first_close + len(tag) + 2] in "> \t\r\n"
         if (
             is_its
-            and self.text.find(f"<{tag}", close, first) < 0
-            and self._is_outside_comments(first, close)
+            and self.text.find(f"<{tag}", close, first_close) < 0
+            and self._is_outside_comments(first_close, close)
         ):
             # The usual case: nothing before the first closing tag nests or hides one.
-            return first
+            return first_close
         depth = 1
         name = re.escape(tag)
-        same = re.compile(
+        tag_pattern = re.compile(
             rf"<(?:/{name}\s*>|{name}(?![^\s/>])(?:[^<>\"']|\"[^\"]*\"|'[^']*')*>|"
             r"!--.*?-->|!\[CDATA\[.*?\]\]>|\?.*?\?>)",
             re.DOTALL,
         )
-        for match in same.finditer(self.text, close):
+        for match in tag_pattern.finditer(self.text, close):
             if match[0][1] == "/":
                 depth -= 1
                 if not depth:

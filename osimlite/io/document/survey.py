@@ -39,24 +39,26 @@ class Survey:
     sure_until: int | None = None
 
 
-def survey_source(source: Source, *, of: type[Object] = Model) -> Survey:
+def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Survey:
     """Read as much of a text as possible; errors of the text are part of the result.
 
     Args:
         source: the text.
-        of: class of the object, or one of its bases.
+        expected_class: class of the object, or one of its bases.
     """
     try:
-        return Survey(source, read_document(source, of=of, to_check=True))
+        return Survey(source, read_document(source, expected_class=expected_class, to_check=True))
     except NotWellFormedError as fault:
-        return _survey_damaged(source, fault, of)
+        return _survey_damaged(source, fault, expected_class)
     except VersionError as fault:
         # Without a version the document is read as a current one; with an older format the
         # findings would be wrong.
         if fault.version is not None:
             return Survey(source, None, [fault])
         try:
-            return _add_document(Survey(source, None, [fault]), parse_source(source), of)
+            return _add_document(
+                Survey(source, None, [fault]), parse_source(source), expected_class
+            )
         except NotWellFormedError:
             return Survey(source, None, [fault])
     except DocumentError as fault:
@@ -67,13 +69,15 @@ def survey_source(source: Source, *, of: type[Object] = Model) -> Survey:
             root = parse_source(source)
         except NotWellFormedError as damage:
             # The root was read before the place where the text is damaged.
-            return _survey_damaged(source, damage, of)
+            return _survey_damaged(source, damage, expected_class)
         # The root is probably a misspelt <OpenSimDocument>: read on as if it were not.
         root.tag = ROOT
-        return _add_document(result, root, of)
+        return _add_document(result, root, expected_class)
 
 
-def _survey_damaged(source: Source, fault: NotWellFormedError, of: type[Object]) -> Survey:
+def _survey_damaged(
+    source: Source, fault: NotWellFormedError, expected_class: type[Object]
+) -> Survey:
     result = Survey(source, None, [fault], fault.line)
     unclosed = re.search(r"of line (\d+) is not closed", fault.message)
     if unclosed:
@@ -82,22 +86,22 @@ def _survey_damaged(source: Source, fault: NotWellFormedError, of: type[Object])
         # Repair first: lxml cannot return some characters that its parser recovers.
         from osimlite.io.document.repair import repair_text
 
-        fixed, _ = repair_text(source.text)
-        root = parse_source(Source(fixed.encode("utf-8", "replace"), source.file), recover=True)
+        repaired, _ = repair_text(source.text)
+        root = parse_source(Source(repaired.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:
         return result
     if root.tag != ROOT or not _has_same_elements(source, root, result.sure_until):
         return result
-    return _add_document(result, root, of)
+    return _add_document(result, root, expected_class)
 
 
-def _add_document(survey: Survey, root: etree._Element, of: type[Object]) -> Survey:
+def _add_document(survey: Survey, root: etree._Element, expected_class: type[Object]) -> Survey:
     try:
         version = read_version(survey.source, root)
     except DocumentError:
         version = CURRENT_VERSION
     try:
-        survey.document = read_tree(survey.source, root, version, of)
+        survey.document = read_tree(survey.source, root, version, expected_class)
     except DocumentError as fault:
         survey.faults.append(fault)
     return survey

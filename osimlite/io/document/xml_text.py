@@ -66,8 +66,8 @@ def escape_text(text: str) -> str:
     Raises:
         ModelError: XML cannot contain a character of the text.
     """
-    if not text.isprintable() and (odd := NO_XML.search(text)):
-        start = odd.start()
+    if not text.isprintable() and (match := NO_XML.search(text)):
+        start = match.start()
         raise ModelError(
             f"no file can hold the last character of '{text[max(0, start - 40) : start + 1]}'; take it out"
         )
@@ -139,23 +139,23 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
             return []
         return [indent + etree.tostring(element, encoding="unicode", with_tail=False)]
     tag = decode_name(element.tag)
-    head = f"{indent}<{tag}" + "".join(
+    start_tag = f"{indent}<{tag}" + "".join(
         f" {key}={quote_attribute(text)}" for key, text in _list_attributes(element)
     )
     texts = [element.text, *(child.tail for child in element)]
     if not len(element):
         text = "" if element.text is None or element.text.isspace() else escape_text(element.text)
-        return [f"{head}>{text}</{tag}>" if element.text is not None else f"{head} />"]
+        return [f"{start_tag}>{text}</{tag}>" if element.text is not None else f"{start_tag} />"]
     # Indentation would change the text of an element with mixed content.
     if any(text and not text.isspace() for text in texts):
-        inner = escape_text(element.text or "")
+        content = escape_text(element.text or "")
         for child in element:
-            inner += "\n".join(list_lines(child, 0, comments=comments)) + escape_text(
+            content += "\n".join(list_lines(child, 0, comments=comments)) + escape_text(
                 child.tail or ""
             )
-        return [f"{head}>{inner}</{tag}>"]
+        return [f"{start_tag}>{content}</{tag}>"]
     lines = [line for child in element for line in list_lines(child, depth + 1, comments=comments)]
-    return [f"{head}>", *lines, f"{indent}</{tag}>"] if lines else [f"{head} />"]
+    return [f"{start_tag}>", *lines, f"{indent}</{tag}>"] if lines else [f"{start_tag} />"]
 
 
 def _list_attributes(element: etree._Element) -> list[tuple[str, str]]:

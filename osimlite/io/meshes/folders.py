@@ -33,8 +33,8 @@ class MeshFolders:
         Returns:
             The folders in the order of the search.
         """
-        own = () if self.beside is None else (self.beside, self.beside / "Geometry")
-        return (*own, *self._trusted_elsewhere)
+        model_folders = () if self.beside is None else (self.beside, self.beside / "Geometry")
+        return (*model_folders, *self._trusted_elsewhere)
 
     @property
     def _trusted_elsewhere(self) -> tuple[Path, ...]:

@@ -91,10 +91,10 @@ def _get_index(word: str, count: int) -> int:
         ValueError: there is no such place.
     """
     number = int(word)
-    place = number - 1 if number > 0 else count + number
-    if number == 0 or place < 0:
+    index = number - 1 if number > 0 else count + number
+    if number == 0 or index < 0:
         raise ValueError
-    return place
+    return index
 
 
 def _make_vectors(rows: list[list[str]]) -> Array | None:

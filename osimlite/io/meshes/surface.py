@@ -97,8 +97,8 @@ def triangulate(points: Array, corners: Indices, ends: Indices) -> Indices:
     for start, end in zip(starts[sizes > 4].tolist(), ends[sizes > 4].tolist(), strict=True):
         polygon = corners[start:end]
         work += (end - start) ** 2
-        cut = _clip_ears if work <= MAX_EAR_WORK else _split_convex
-        parts.append(polygon[cut(points[polygon])])
+        split_polygon = _clip_ears if work <= MAX_EAR_WORK else _split_convex
+        parts.append(polygon[split_polygon(points[polygon])])
     return np.concatenate(parts).reshape(-1, 3)
 
 
@@ -113,41 +113,46 @@ def _split_quadrilaterals(points: Array, quads: Indices) -> Indices:
     """Return two triangles for each of k quadrilaterals (2 k, 3), cut so that both have the same orientation."""
     a, b, c, d = (points[quads[:, index]] for index in range(4))
     agreement = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
-    cut = np.where((agreement < 0.0)[:, None], (1, 2, 3, 1, 3, 0), (0, 1, 2, 0, 2, 3))
-    return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)
+    corner_order = np.where((agreement < 0.0)[:, None], (1, 2, 3, 1, 3, 0), (0, 1, 2, 0, 2, 3))
+    return np.take_along_axis(quads, corner_order, axis=1).reshape(-1, 3)
 
 
 def _split_convex(corners: Array) -> Indices:
     """Return triangles (k - 2, 3) of a polygon of k corners (k, 3) from its first corner to all others."""
-    others = np.arange(1, len(corners) - 1)
-    return np.stack([np.zeros_like(others), others, others + 1], axis=1)
+    second_corners = np.arange(1, len(corners) - 1)
+    return np.stack([np.zeros_like(second_corners), second_corners, second_corners + 1], axis=1)
 
 
 def _clip_ears(corners: Array) -> Indices:
     """Return triangles (k - 2, 3) of a polygon of k corners (k, 3) by ear clipping."""
     # Twice the area vector (Newell's method), also for polygons that are not planar.
     normal: Array = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-    left = list(range(len(corners)))
+    remaining = list(range(len(corners)))
     triangles: list[tuple[int, int, int]] = []
-    while len(left) > 3:
-        ears = ((left[k - 1], left[k], left[(k + 1) % len(left)]) for k in range(len(left)))
+    while len(remaining) > 3:
+        ears = (
+            (remaining[k - 1], remaining[k], remaining[(k + 1) % len(remaining)])
+            for k in range(len(remaining))
+        )
         # A polygon that crosses itself may have no ear; then cut off any corner.
         ear = next(
-            (ear for ear in ears if _is_ear(corners, ear, left, normal)),
-            (left[0], left[1], left[2]),
+            (ear for ear in ears if _is_ear(corners, ear, remaining, normal)),
+            (remaining[0], remaining[1], remaining[2]),
         )
         triangles.append(ear)
-        left.remove(ear[1])
-    return np.array([*triangles, left], dtype=np.int64)
+        remaining.remove(ear[1])
+    return np.array([*triangles, remaining], dtype=np.int64)
 
 
-def _is_ear(corners: Array, ear: tuple[int, int, int], left: Iterable[int], normal: Array) -> bool:
+def _is_ear(
+    corners: Array, ear: tuple[int, int, int], remaining: Iterable[int], normal: Array
+) -> bool:
     a, b, c = corners[list(ear)]
     if np.cross(b - a, c - b) @ normal <= 0.0:
         return False
-    others = corners[[place for place in left if place not in ear]]
-    inside = [
-        np.cross(end - start, others - start) @ normal >= 0.0
+    other_points = corners[[corner for corner in remaining if corner not in ear]]
+    is_left_of_edge = [
+        np.cross(end - start, other_points - start) @ normal >= 0.0
         for start, end in ((a, b), (b, c), (c, a))
     ]
-    return not bool(np.any(inside[0] & inside[1] & inside[2]))
+    return not bool(np.any(is_left_of_edge[0] & is_left_of_edge[1] & is_left_of_edge[2]))

@@ -101,22 +101,33 @@ def _revolve_profile(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     points: list[Array] = []
     normals: list[Array] = []
     triangles: list[Indices] = []
-    first = 0
+    first_index = 0
     for strip in strips:
         for vectors, columns in ((points, strip[:, :2]), (normals, strip[:, 2:])):
             # Distance from the axis, and height along it.
-            out, up = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
+            radius, height = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
             vectors.append(
-                np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3)
+                np.stack(
+                    (radius * np.cos(around), radius * np.sin(around), height), axis=2
+                ).reshape(-1, 3)
             )
         row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
         # The last point of a row is followed by the first.
-        a, b = first + row * slices + k, first + row * slices + (k + 1) % slices
+        start_corners, end_corners = (
+            first_index + row * slices + k,
+            first_index + row * slices + (k + 1) % slices,
+        )
         # Points on the axis coincide; leave out the degenerate triangles there.
-        apart = np.abs(strip[:, 0]) > 1e-12
-        triangles.append(np.column_stack((a, b, b + slices))[apart[row]])
-        triangles.append(np.column_stack((a, b + slices, a + slices))[apart[row + 1]])
-        first += len(strip) * slices
+        is_off_axis = np.abs(strip[:, 0]) > 1e-12
+        triangles.append(
+            np.column_stack((start_corners, end_corners, end_corners + slices))[is_off_axis[row]]
+        )
+        triangles.append(
+            np.column_stack((start_corners, end_corners + slices, start_corners + slices))[
+                is_off_axis[row + 1]
+            ]
+        )
+        first_index += len(strip) * slices
     return Surface(
         np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True
     )

@@ -121,22 +121,25 @@ class _File:
         self.appended = b""
         mark = content.find(b"<AppendedData")
         if mark >= 0:
-            first, last = (
+            data_start, data_end = (
                 content.find(b"_", content.find(b">", mark)) + 1,
                 content.rfind(b"</AppendedData"),
             )
             # The data begin after an underscore.
-            if not 0 < first <= last:
+            if not 0 < data_start <= data_end:
                 raise _Unreadable("the file ends in the middle")
-            self.appended, content = content[first:last], content[:first] + content[last:]
+            self.appended, content = (
+                content[data_start:data_end],
+                content[:data_start] + content[data_end:],
+            )
         try:
             # `huge_tree`: meshes have texts beyond the parser's limit of 10 MB.
             parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
             self.root = etree.fromstring(content, parser)
         except etree.XMLSyntaxError as error:
             # The parser breaks some of its messages into lines.
-            why = " ".join(str(error.msg).split()).replace(" ,", ",")
-            raise _Unreadable(f"it is not a VTK file in XML ({why})") from None
+            reason = " ".join(str(error.msg).split()).replace(" ,", ",")
+            raise _Unreadable(f"it is not a VTK file in XML ({reason})") from None
         if self.root.getroottree().docinfo.internalDTD is not None:
             raise _Unreadable("it has a DOCTYPE, which may declare what is not in the file")
         if self.root.tag != "VTKFile" or self.root.get("type") != "PolyData":
@@ -173,17 +176,17 @@ class _File:
         )
         sizes, count, all_normals = [np.zeros(0, dtype=np.int64)], 0, True
         for piece in self.root.iterfind("PolyData/Piece"):
-            own = self._read_vectors(piece.find("Points/DataArray"))
-            points.append(own)
-            for around, lengths in self._iterate_polygons(piece, len(own)):
+            piece_points = self._read_vectors(piece.find("Points/DataArray"))
+            points.append(piece_points)
+            for around, lengths in self._iterate_polygons(piece, len(piece_points)):
                 # Indices of a piece count from its first point.
                 corners.append(around + count)
                 sizes.append(lengths)
-            at_points = self._read_normals(piece, len(own))
+            at_points = self._read_normals(piece, len(piece_points))
             # Normals of some pieces only would not fit the points of all.
             all_normals = all_normals and at_points is not None
             normals += [] if at_points is None else [at_points]
-            count += len(own)
+            count += len(piece_points)
         ends = np.concatenate(sizes).cumsum()
         if not len(ends):
             raise _Unreadable("it has no polygons")
@@ -229,9 +232,14 @@ class _File:
         if data is None:
             return None
         # PointData names its normals in an attribute; "Normals" is VTK's usual name.
-        wanted = data.get("Normals", "Normals")
+        normals_name = data.get("Normals", "Normals")
         array = next(
-            (item for item in data.iterfind("DataArray") if item.get("Name") == wanted), None
+            (
+                candidate
+                for candidate in data.iterfind("DataArray")
+                if candidate.get("Name") == normals_name
+            ),
+            None,
         )
         if array is None or array.get("NumberOfComponents") != "3":
             return None
@@ -283,9 +291,9 @@ class _File:
         """Return the bytes of the array that starts at an offset of the appended data."""
         if not 0 <= offset < len(self.appended):
             raise ValueError
-        end = next(place for place in self.offsets if place > offset)
-        part = self.appended[offset:end]
-        return part if self.raw else _decode_base64(part)
+        end = next(next_offset for next_offset in self.offsets if next_offset > offset)
+        encoded = self.appended[offset:end]
+        return encoded if self.raw else _decode_base64(encoded)
 
     def _count_bytes(self, count: float) -> None:
         """Add bytes to the sum of numbers read, which is limited: several arrays may use the same bytes."""
@@ -318,19 +326,21 @@ class _File:
             return b""
         # The header has the number of blocks, their size, the size of the last one, and the
         # compressed sizes.
-        _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
+        _, block_size, last_size, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
         # Check the declared size before decompressing anything; no block may be larger.
-        self._count_bytes(weight * (whole * (blocks - bool(last)) + last))
-        place, parts = (3 + blocks) * width, []
+        self._count_bytes(weight * (block_size * (blocks - bool(last_size)) + last_size))
+        offset, contents = (3 + blocks) * width, []
         for size in sizes:
-            parts.append(
-                _DECOMPRESS[self.compressor](stream[place : place + size], max(whole, last))
+            contents.append(
+                _DECOMPRESS[self.compressor](
+                    stream[offset : offset + size], max(block_size, last_size)
+                )
             )
-            place += size
+            offset += size
         # VTK writes the length zero for a last block that is as long as the others.
-        if sum(map(len, parts)) != whole * (blocks - bool(last)) + last:
+        if sum(map(len, contents)) != block_size * (blocks - bool(last_size)) + last_size:
             raise ValueError
-        return b"".join(parts)
+        return b"".join(contents)
 
 
 def _decode_base64(text: bytes) -> bytes:

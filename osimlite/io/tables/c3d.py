@@ -73,7 +73,7 @@ def read_c3d_forces(path: str | Path) -> StoTable:
     )
 
 
-def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
+def _run_reader(path: str | Path, content_type: str) -> dict[str, Array]:
     """Run the reader in a separate process.
 
     Damaged files make ezc3d 1.6 write outside its memory (the process ends by SIGSEGV) or loop forever;
@@ -81,7 +81,7 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
 
     Args:
         path: the file.
-        what: ``markers`` or ``forces``.
+        content_type: ``markers`` or ``forces``.
     """
     size = len(read_file(path))
     # An entry None in sys.modules blocks the import, as a missing package does.
@@ -103,13 +103,13 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
         "-P",
         "-c",
         PROGRAM,
-        what,
+        content_type,
         os.path.abspath(path),
         str(seconds),
         package,
     ]
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             command,
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -127,16 +127,16 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
         raise DocumentError(
             f"no process can be started that reads it: {error}", file=str(path)
         ) from None
-    if done.returncode != 0:
-        raise DocumentError(f"the file cannot be read: {_find_reason(done)}", file=str(path))
+    if process.returncode != 0:
+        raise DocumentError(f"the file cannot be read: {_find_reason(process)}", file=str(path))
     # No pickles: the output of a crashed process may be anything.
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+    with np.load(io.BytesIO(process.stdout), allow_pickle=False) as arrays:
         return dict(arrays)
 
 
-def _find_reason(done: subprocess.CompletedProcess[bytes]) -> str:
+def _find_reason(process: subprocess.CompletedProcess[bytes]) -> str:
     """Return the reason why the process failed, from its output and exit code."""
     try:
-        return str(json.loads(done.stdout)["error"])
+        return str(json.loads(process.stdout)["error"])
     except (ValueError, KeyError, TypeError):
         return "it is damaged, so that reading it ends in a crash or takes too long"

@@ -26,10 +26,10 @@ def run_process() -> None:
 
     Of a file that cannot be read the reason is written as JSON, and the exit code is 1.
     """
-    what, path, seconds = sys.argv[1:4]
+    content_type, path, seconds = sys.argv[1:4]
     _limit_resources(int(seconds))
     try:
-        arrays = READERS[what](path)
+        arrays = READERS[content_type](path)
         if not all(np.isfinite(arrays["times"])):
             raise ValueError("its frames have no times")
         buffer = io.BytesIO()
@@ -38,8 +38,8 @@ def run_process() -> None:
     # index.
     except Exception as error:
         reason = str(error) or type(error).__name__
-        known = isinstance(error, OSError | RuntimeError | ValueError)
-        message = reason if known else f"it is damaged ({reason})"
+        is_reading_error = isinstance(error, OSError | RuntimeError | ValueError)
+        message = reason if is_reading_error else f"it is damaged ({reason})"
         sys.stdout.buffer.write(json.dumps({"error": message}).encode())
         raise SystemExit(1) from None
     sys.stdout.buffer.write(buffer.getvalue())
@@ -57,7 +57,7 @@ def read_markers(path: str) -> dict[str, Array]:
     unit = METRES_PER_UNIT.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
     # More than 255 labels continue in LABELS2 and so on.
     names = [
-        name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]
+        name for key, entry in points.items() if key.startswith("LABELS") for name in entry["value"]
     ]
     # ezc3d has (coordinate, marker, frame).
     positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
@@ -132,5 +132,5 @@ def _limit_resources(seconds: int) -> None:
     ):
         _, hard = resource.getrlimit(kind)
         # The limit cannot be raised beyond what the system has set.
-        most = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-        resource.setrlimit(kind, (most, hard))
+        soft_limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(kind, (soft_limit, hard))

@@ -149,12 +149,12 @@ class StorageHeader:
     def __init__(self, data: bytes, file: str = "") -> None:
         self._is_motion = file.lower().endswith(".mot")
         mark = len(MARK) if data.startswith(MARK) else 0
-        head = data[mark:MAX_HEADER_BYTES]
-        end = _END.search(head) or _ANY_END.search(head)
-        labels = None if end else _LABELS.search(head)
+        header = data[mark:MAX_HEADER_BYTES]
+        end = _END.search(header) or _ANY_END.search(header)
+        labels = None if end else _LABELS.search(header)
         stop = end or labels
         self.lines = [
-            _decode_line(line) for line in head[: stop.start() if stop else 0].split(b"\n")
+            _decode_line(line) for line in header[: stop.start() if stop else 0].split(b"\n")
         ]
         number = len(self.lines)
         self.end = (
@@ -218,9 +218,9 @@ class StorageHeader:
     @property
     def in_degrees(self) -> bool:
         """True if angles are in degrees, as OpenSim reads the header."""
-        said = self.value("inDegrees").lower() in ("yes", "y")
-        if self.form or said:
-            return said
+        says_degrees = self.value("inDegrees").lower() in ("yes", "y")
+        if self.form or says_degrees:
+            return says_degrees
         # Files without a version are in the format of SIMM, whose motions are in degrees.
         return self._is_motion or "degrees" in self.value("Angles")
 

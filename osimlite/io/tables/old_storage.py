@@ -62,11 +62,11 @@ def _format_decimals(rows: Array, cell: str, eights: int) -> str | None:
     """
     # Numbers with more than four digits before the point, NaN and infinities are rare and are
     # formatted one by one below.
-    plain = np.abs(rows) < 9999.0
-    size = np.where(plain, np.abs(rows), 0.0)
+    is_regular = np.abs(rows) < 9999.0
+    size = np.where(is_regular, np.abs(rows), 0.0)
     digits = [size.astype(np.int64), *_split_decimals(size - size.astype(np.int64), eights)]
-    for before, eight in zip(digits[-2::-1], digits[:0:-1], strict=True):
-        before += eight == 10**8
+    for left_digits, eight in zip(digits[-2::-1], digits[:0:-1], strict=True):
+        left_digits += eight == 10**8
         eight[eight == 10**8] = 0
     wholes, fours = _make_digit_tables()
     names = [f"{half}{number}" for number in range(eights) for half in ("first", "last")]
@@ -77,45 +77,45 @@ def _format_decimals(rows: Array, cell: str, eights: int) -> str | None:
     )
     cells["whole"] = wholes[digits[0] + 10000 * np.signbit(rows)]
     for number, eight in enumerate(digits[1:]):
-        first, last = np.divmod(eight.astype(np.int32), 10000)
-        cells[f"first{number}"], cells[f"last{number}"] = fours[first], fours[last]
+        left_four, right_four = np.divmod(eight.astype(np.int32), 10000)
+        cells[f"first{number}"], cells[f"last{number}"] = fours[left_four], fours[right_four]
     cells["end"], cells["end"][:, -1] = ord("\t"), ord("\n")
     width = cells.itemsize - 1
     flat = cells.view("u1").reshape(-1, cells.itemsize)
-    for place in np.flatnonzero(~plain):
-        text = cell % rows.flat[place]
+    for index in np.flatnonzero(~is_regular):
+        text = cell % rows.flat[index]
         if len(text) > width:
             return None
-        flat[place, :width] = np.frombuffer(text.encode(), "u1")
+        flat[index, :width] = np.frombuffer(text.encode(), "u1")
     return cells.tobytes().decode()
 
 
-def _split_decimals(part: Array, count: int) -> list[NDArray[np.int64]]:
+def _split_decimals(fraction: Array, count: int) -> list[NDArray[np.int64]]:
     """Return the decimals of numbers in [0, 1) as `count` arrays of integers with eight digits each.
 
     The last integer is rounded to nearest, ties to even, and may be 1e8. The multiplication by 1e8 is
     exact: each product comes with its rounding error (T. J. Dekker, Numer. Math. 18, 1971; 134217729 is
     2^27 + 1, which splits a double into halves).
     """
-    high, low, result = part, np.zeros_like(part), []
+    high, low, result = fraction, np.zeros_like(fraction), []
     for number in range(count):
         product, split = 1e8 * high, 134217729.0 * high
         upper = split - (split - high)
-        over = (1e8 * upper - product) + 1e8 * (high - upper) + 1e8 * low
-        value = product + over
-        over -= value - product
+        error = (1e8 * upper - product) + 1e8 * (high - upper) + 1e8 * low
+        value = product + error
+        error -= value - product
         if number == count - 1:
-            whole = np.rint(value)
-            # A value of exactly one half is no tie if the rounding error `over` is not zero.
-            half = value - whole
-            whole += np.where((np.abs(half) == 0.5) & (half * over > 0.0), 2.0 * half, 0.0)
+            integer_part = np.rint(value)
+            # A value of exactly one half is no tie if the rounding `error` is not zero.
+            half = value - integer_part
+            integer_part += np.where((np.abs(half) == 0.5) & (half * error > 0.0), 2.0 * half, 0.0)
         else:
-            whole = np.floor(value)
-            whole -= (value == whole) & (over < 0.0)
-            rest = value - whole
-            high = rest + over
-            low = over - (high - rest)
-        result.append(whole.astype(np.int64))
+            integer_part = np.floor(value)
+            integer_part -= (value == integer_part) & (error < 0.0)
+            remainder = value - integer_part
+            high = remainder + error
+            low = error - (high - remainder)
+        result.append(integer_part.astype(np.int64))
     return result
 
 

@@ -66,11 +66,11 @@ class StoTable(Tabular):
         Returns:
             The index, which is ``time`` (s), and the columns by label, each (n,).
         """
-        columns, again = dict[str, Array](), Counter[str]()
+        columns, label_counts = dict[str, Array](), Counter[str]()
         for label, column in zip(self.columns, self.rows.T, strict=True):
-            columns[f"{label}.{again[label]}" if again[label] else label] = column
+            columns[f"{label}.{label_counts[label]}" if label_counts[label] else label] = column
             # A label may occur several times.
-            again[label] += 1
+            label_counts[label] += 1
         return {"time": self.times}, columns
 
 
@@ -92,8 +92,10 @@ def format_sto(
 ) -> str:
     """Write a table as OpenSim 4.6 does, but with all digits of every number, and more in its header."""
     lines = list(_format_lines(times, rows, 1))
-    first, *others = _format_header(name, columns, len(lines), in_degrees, "double")
-    return "".join([first, *(f"{key}={value}\n" for key, value in header.items()), *others, *lines])
+    first_line, *other_lines = _format_header(name, columns, len(lines), in_degrees, "double")
+    return "".join(
+        [first_line, *(f"{key}={value}\n" for key, value in header.items()), *other_lines, *lines]
+    )
 
 
 def write_sto(
@@ -176,9 +178,13 @@ def find_named_file(folder: Path, name: str) -> Path:
         folder: folder of the document.
         name: name of the file in the document.
     """
-    there, here = folder / name, Path(name)
+    beside_document, in_current_folder = folder / name, Path(name)
     # The folder of the document wins; if the file is in neither place, messages name that folder.
-    return there if there.is_file() or not here.is_file() else here
+    return (
+        beside_document
+        if beside_document.is_file() or not in_current_folder.is_file()
+        else in_current_folder
+    )
 
 
 def expect_plain_labels(name: str, columns: Sequence[str]) -> None:
@@ -211,16 +217,17 @@ def expect_increasing_times(times: Array, file: str | None) -> None:
             before.
     """
     # `not <` catches NaN as well.
-    odd = np.flatnonzero(~(np.abs(times) < MAX_TIME_S))
-    if len(odd):
+    invalid = np.flatnonzero(~(np.abs(times) < MAX_TIME_S))
+    if len(invalid):
         raise DocumentError(
-            f"the time of row {odd[0] + 1} is {times[odd[0]]:g} s; correct it", file=file
+            f"the time of row {invalid[0] + 1} is {times[invalid[0]]:g} s; correct it", file=file
         )
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
-        before, after = times[late[0] : late[0] + 2]
+        previous_time, next_time = times[late[0] : late[0] + 2]
         raise DocumentError(
-            f"the time {after:g} does not come after {before:g}; sort the rows", file=file
+            f"the time {next_time:g} does not come after {previous_time:g}; sort the rows",
+            file=file,
         )
 
 
@@ -236,9 +243,9 @@ def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array)
     Raises:
         SimulationError: a value is NaN or infinite; with its column and time.
     """
-    odd = np.argwhere(~np.isfinite(rows))
-    if len(odd):
-        row, column = odd[0]
+    invalid = np.argwhere(~np.isfinite(rows))
+    if len(invalid):
+        row, column = invalid[0]
         raise SimulationError(
             f"'{columns[column]}' of the {name or 'results'} is {rows[row, column]:g} at {times[row]:g} s; look for a "
             "number in the model or the data that is far too large"

@@ -42,7 +42,7 @@ class TableStream:
         self.close()
 
     def __iter__(self) -> Iterator[tuple[float, list[float]]]:
-        place, size = self._time, len(self.columns) + 1
+        time_column, size = self._time, len(self.columns) + 1
         vectors = self.kind != "double"
         for number, data in enumerate(self._stream, start=self.line + 1):
             # A broken character belongs to a word that is reported, not to an error of decoding.
@@ -66,7 +66,7 @@ class TableStream:
                     else find_word_start(text, size),
                 )
             # The time may be in any column in files of version 1.
-            time = row.pop(place)
+            time = row.pop(time_column)
             yield time, row
 
     def _odd(self, text: str, number: int) -> list[float]:
@@ -74,10 +74,14 @@ class TableStream:
         row = []
         for match in re.finditer(r"\S+", text):
             word = match.group()
-            odd = _NO_NUMBER.fullmatch(word)
-            if odd:
+            non_finite = _NO_NUMBER.fullmatch(word)
+            if non_finite:
                 # "-1.#INF" becomes "-inf": the sign, without the digit.
-                word = word[0].replace("1", "") + "inf" if odd.group(1).upper() == "INF" else "nan"
+                word = (
+                    word[0].replace("1", "") + "inf"
+                    if non_finite.group(1).upper() == "INF"
+                    else "nan"
+                )
             try:
                 row.append(float(word))
             except ValueError:
@@ -102,17 +106,19 @@ class TableStream:
             )
         labels = [label.text for label in result.labels]
         # OpenSim accepts "Time" in old files.
-        at = next((index for index, label in enumerate(labels) if label.lower() == "time"), None)
+        time_column = next(
+            (index for index, label in enumerate(labels) if label.lower() == "time"), None
+        )
         # Vectors are split into columns, so that the time cannot stand between them.
-        if at is None or (at > 0 and self.kind != "double"):
+        if time_column is None or (time_column > 0 and self.kind != "double"):
             raise DocumentError(
                 f"the first column is '{labels[0]}'; it must be 'time'",
                 file=self.file,
                 line=self.line,
                 column=result.labels[0].at.column,
             )
-        self._time = at
-        self.labels = (*labels[:at], *labels[at + 1 :])
+        self._time = time_column
+        self.labels = (*labels[:time_column], *labels[time_column + 1 :])
         self.columns = tuple(label + end for label in self.labels for end in ends)
 
 

@@ -67,15 +67,19 @@ class Tabular(ABC):
         from html import escape
 
         columns = self._listed
-        head = "".join(f"<th>{word}</th>" for word in ("", "smallest", "largest", "unit"))
+        header = "".join(f"<th>{word}</th>" for word in ("", "smallest", "largest", "unit"))
         rows = "".join(
             "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
             for row in _describe_columns(columns, self.units, HTML_ROWS)
         )
-        more = len(columns) - HTML_ROWS
-        rest = f"<div>... and {format_count(more, 'column')} more</div>" if more > 0 else ""
-        table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-        return f"<div>{escape(self.heading)}</div>{table}{rest}"
+        hidden_count = len(columns) - HTML_ROWS
+        footer = (
+            f"<div>... and {format_count(hidden_count, 'column')} more</div>"
+            if hidden_count > 0
+            else ""
+        )
+        table = f"<table><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table>"
+        return f"<div>{escape(self.heading)}</div>{table}{footer}"
 
     @property
     @abstractmethod
@@ -137,7 +141,7 @@ def _describe_columns(
     for name, column in islice(columns.items(), count):
         values = np.asarray(column)
         # Columns of text have no range.
-        known = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
-        low, high = (f"{known.min():.4g}", f"{known.max():.4g}") if known.size else ("-", "-")
+        finite = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
+        low, high = (f"{finite.min():.4g}", f"{finite.max():.4g}") if finite.size else ("-", "-")
         result.append((name, low, high, units.get(name, "")))
     return result

@@ -120,14 +120,18 @@ class Fold(NamedTuple):
                 )
             )
             places = (
-                f", on line{'s' * (len(lines) > 1)} {join_words(lines, most=4)}" if lines else ""
+                f", on line{'s' * (len(lines) > 1)} {join_words(lines, max_count=4)}"
+                if lines
+                else ""
             )
             result.append(f"{len(self.more)} more like this{places}")
         if self.elsewhere:
             files = dict.fromkeys(
                 os.path.basename(finding.file or "") for finding in self.elsewhere
             )
-            result.append(f"{len(self.elsewhere)} more in other files: {join_words(files, most=3)}")
+            result.append(
+                f"{len(self.elsewhere)} more in other files: {join_words(files, max_count=3)}"
+            )
         return result
 
 

@@ -85,7 +85,9 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
         for first, second in pairs
     ):
         return ""
-    shapes = join_words([f"{type(surface).__name__} '{surface.name}'" for surface in known], most=3)
+    shapes = join_words(
+        [f"{type(surface).__name__} '{surface.name}'" for surface in known], max_count=3
+    )
     return f"{shapes}, between which OpenSim computes no contact"
 
 

@@ -53,7 +53,7 @@ def report_duplicate_name(subject: Subject, report: FindingCollector) -> None:
         )
         if users:
             message += (
-                f", and {join_words(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the "
+                f", and {join_words(users, max_count=3)} then {'uses' if len(users) == 1 else 'use'} the "
                 "first"
             )
         report(message, item, attribute="name", suggestion=None)

@@ -207,8 +207,8 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
             for body in sorted(bodies & loaded)
         ]
         if twice:
-            names = join_words([f"'{force.name}'" for force, _ in twice], most=3)
-            bodies = join_words(sorted({body for _, body in twice}), most=3)
+            names = join_words([f"'{force.name}'" for force, _ in twice], max_count=3)
+            bodies = join_words(sorted({body for _, body in twice}), max_count=3)
             tag = (
                 "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
             )

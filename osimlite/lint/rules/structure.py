@@ -123,7 +123,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
         message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
     else:
         homes = list_homes(note.word, type(owner))
-        message += f": it is a property of {join_words(homes, most=3)}" if homes else ""
+        message += f": it is a property of {join_words(homes, max_count=3)}" if homes else ""
     # Only the letter case is wrong: the fix is certain.
     same = suggestion is not None and suggestion.lower() == note.word.lower()
     # Renaming is no fix if the property is given as well: it would be there twice.

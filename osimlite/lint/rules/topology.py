@@ -63,7 +63,7 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     for body, *others in loose.values():
         message = f"no joint connects {describe_object(body)}"
         if others:
-            names = join_words((f"'{other.name}'" for other in others), most=3)
+            names = join_words((f"'{other.name}'" for other in others), max_count=3)
             message = (
                 f"{describe_object(body)} is not connected to ground, nor {names}, which joints "
                 "connect with it"

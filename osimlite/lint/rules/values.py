@@ -247,7 +247,7 @@ def _describe_foreign_characters(text: str) -> str:
     import unicodedata
 
     names = [f"U+{ord(c):04X} ({unicodedata.name(c, 'without a name').lower()})" for c in odd]
-    return f" (there is {join_words(names, most=3)} in it)"
+    return f" (there is {join_words(names, max_count=3)} in it)"
 
 
 def _make_readable(text: str, kind: Value) -> str | None:

@@ -202,7 +202,7 @@ def unknown_constraint(path: str, kind: str) -> UnsupportedError:
     """
     return UnsupportedError(
         f"the constraint '{path}' ({kind}) cannot be computed; set its isEnforced to false or remove it; "
-        f"those osimlite computes are {join_words([item.__name__ for item in _READERS], most=len(_READERS))}"
+        f"those osimlite computes are {join_words([item.__name__ for item in _READERS], max_count=len(_READERS))}"
     )
 
 

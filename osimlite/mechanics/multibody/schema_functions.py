@@ -64,7 +64,7 @@ def convert_function(
             can += [item.__name__ for item in _UNIVARIATE]
             raise UnsupportedError(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
-                f"the functions it can are {join_words(can, most=len(can))}"
+                f"the functions it can are {join_words(can, max_count=len(can))}"
             )
         _converts(function, 1, arguments)
         return _UNIVARIATE[kind](function)

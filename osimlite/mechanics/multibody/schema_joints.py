@@ -91,7 +91,7 @@ def unknown_joint(path: str, kind: str) -> UnsupportedError:
     """
     return UnsupportedError(
         f"'{path}' is a {kind}, whose motion osimlite cannot compute; the joints it can are "
-        f"{join_words(JOINT_TYPES, most=len(JOINT_TYPES))}"
+        f"{join_words(JOINT_TYPES, max_count=len(JOINT_TYPES))}"
     )
 
 

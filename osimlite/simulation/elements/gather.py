@@ -135,5 +135,6 @@ def summarize_skipped(skipped: Sequence[str]) -> list[str]:
         path, _, kind = words.partition(" (")
         groups.setdefault(kind.removesuffix(")") or "others", []).append(path)
     return [
-        f"{len(paths)} of {kind}: {join_words(paths, most=2)}" for kind, paths in groups.items()
+        f"{len(paths)} of {kind}: {join_words(paths, max_count=2)}"
+        for kind, paths in groups.items()
     ]

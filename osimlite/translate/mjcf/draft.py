@@ -287,7 +287,7 @@ class MjcfDraft:
             name = (
                 dotted_name
                 if dotted_name not in used_names
-                else make_unique_name(dotted_name, used_names, first=2)
+                else make_unique_name(dotted_name, used_names, first_number=2)
             )
         used_names.add(name)
         # Only components have a name of their own to compare with.

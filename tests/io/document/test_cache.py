@@ -33,7 +33,7 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     def noted(source: Source, *, of: type[Object]) -> Document:
         seen.append(str(source.file))
-        return read_document(source, of=of)
+        return read_document(source, expected_class=of)
 
     monkeypatch.setattr("osimlite.io.document.cache.read_document", noted)
     return seen

@@ -35,7 +35,7 @@ def files() -> list[Path]:
 def fate(data: bytes) -> str:
     """What becomes of a file: ``read``, or ``refused``. Anything but that raises."""
     try:
-        document = read_document(Source(data, "damaged.osim"), of=Object)
+        document = read_document(Source(data, "damaged.osim"), expected_class=Object)
     except DocumentError as refused:
         assert refused.line is not None and refused.line >= 1, refused.message
         assert refused.message and "\n" not in refused.message, refused.message
@@ -50,7 +50,7 @@ def fate(data: bytes) -> str:
     for note in document.notes:
         document.source.locate_tag(note.number)
     text = to_text(top)
-    again = read_document(Source(text.encode("utf-8", "surrogatepass")), of=Object)
+    again = read_document(Source(text.encode("utf-8", "surrogatepass")), expected_class=Object)
     assert (again.fault, again.changes) == (None, [])
     assert to_text(again.top) == text
     return "read"

@@ -107,7 +107,7 @@ def test_defaults_of_a_class_under_its_old_name_count_for_nothing() -> None:
 	</CMC_TaskSet>
 </OpenSimDocument>
 """
-    tasks: Any = read_document(Source(text.encode()), of=Object).top
+    tasks: Any = read_document(Source(text.encode()), expected_class=Object).top
     assert [task.kp for task in tasks.objects] == [(1.0, 1.0, 1.0), (5.0, 5.0, 5.0)]
     assert "<rdCMC_Joint name" in osimlite.to_text(tasks)
 

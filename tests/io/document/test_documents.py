@@ -26,14 +26,14 @@ def document(inside: str, version: int = 40600) -> str:
 
 
 def read(text: str) -> Object:
-    return read_document(Source(text.encode()), of=Object).top
+    return read_document(Source(text.encode()), expected_class=Object).top
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 def test_what_is_read_is_written_again(path: Path, tmp_path: Path) -> None:
-    read = read_document(Source.from_file(path), of=Object)
+    read = read_document(Source.from_file(path), expected_class=Object)
     osimlite.write(read.top, tmp_path / path.name)
-    again = read_document(Source.from_file(tmp_path / path.name), of=Object)
+    again = read_document(Source.from_file(tmp_path / path.name), expected_class=Object)
     assert again.top == read.top and type(again.top) is type(read.top)
     assert osimlite.to_text(again.top) == osimlite.to_text(read.top)
     assert (again.version, again.changes) == (40600, [])
@@ -82,7 +82,9 @@ def test_a_tool_made_in_python(tmp_path: Path) -> None:
 
 
 def test_an_unknown_tag_is_kept_and_told(fixtures: Path) -> None:
-    result = read_document(Source.from_file(fixtures / "documents" / "forward.xml"), of=Object)
+    result = read_document(
+        Source.from_file(fixtures / "documents" / "forward.xml"), expected_class=Object
+    )
     (note,) = result.notes
     assert (note.kind, note.word, result.source.locate_tag(note.number).line) == (
         "unknown-tag",

@@ -146,4 +146,7 @@ def test_an_object_that_is_there_by_itself_is_printed_where_it_may_be_missing() 
     phase = osimlite.MocoPhase(name="phase")
     text = osimlite.to_text(phase)
     assert phase.model.model is not None and '<Model name="model">' in text
-    assert read_document(Source(text.encode()), of=Object).top.model.model == phase.model.model
+    assert (
+        read_document(Source(text.encode()), expected_class=Object).top.model.model
+        == phase.model.model
+    )

@@ -27,20 +27,20 @@ def move_engine_content(draft: Draft) -> None:
     if model is None:
         return
     for holder in model.findall("DynamicsEngine"):
-        for inner in list_elements(holder):
-            if inner.tag != "SimbodyEngine":
+        for engine in list_elements(holder):
+            if engine.tag != "SimbodyEngine":
                 lost = (
-                    ", ".join(sorted({f"<{part.tag}>" for part in list_elements(inner)}))
+                    ", ".join(sorted({f"<{part.tag}>" for part in list_elements(engine)}))
                     or "its content"
                 )
                 raise UpgradeError(
-                    f"document version {draft.version} describes its bodies for a <{inner.tag}>, which no later format "
+                    f"document version {draft.version} describes its bodies for a <{engine.tag}>, which no later format "
                     f"can say: {lost} would be lost; export the model for Simbody with the program that wrote it",
-                    draft.numbers[inner],
+                    draft.numbers[engine],
                 )
-            for part in list_elements(inner):
+            for part in list_elements(engine):
                 draft.move(part, model)
-        draft.record_change(model, at=holder)
+        draft.record_change(model, location=holder)
         draft.remove(holder)
 
 
@@ -74,7 +74,7 @@ def convert_transform_axes(draft: Draft) -> None:
                     padding = draft.add(spatial, "TransformAxis", source=old, name=name)
                     draft.add(padding, "axis", direction, source=old)
         draft.remove(old)
-        draft.record_change(joint, at=old)
+        draft.record_change(joint, location=old)
 
 
 def _move_axis(draft: Draft, axis: Element, spatial: Element, name: str) -> None:
@@ -87,23 +87,23 @@ def _move_axis(draft: Draft, axis: Element, spatial: Element, name: str) -> None
     draft.move(axis, spatial)
 
 
-def _complete_directions(present: list[str | None]) -> list[str]:
+def _complete_directions(document_texts: list[str | None]) -> list[str]:
     """Return the texts of three independent directions that begin with those of the document."""
-    known = [
+    directions = [
         vector(parse_reals(text, 3) or parse_reals(unit, 3), 0)
-        for text, unit in zip(present, _UNIT_AXES, strict=False)
+        for text, unit in zip(document_texts, _UNIT_AXES, strict=False)
     ]
-    texts = [text or unit for text, unit in zip(present, _UNIT_AXES, strict=False)]
-    if not known:
+    texts = [text or unit for text, unit in zip(document_texts, _UNIT_AXES, strict=False)]
+    if not directions:
         return [*_UNIT_AXES]
-    if len(known) == 1:
+    if len(directions) == 1:
         # The second direction is Y, or Z if the first is nearly Y.
-        second = (0.0, 1.0, 0.0) if abs(abs(known[0][1]) - 1) >= 1e-4 else (0.0, 0.0, 1.0)
-        known.append(second)
+        second = (0.0, 1.0, 0.0) if abs(abs(directions[0][1]) - 1) >= 1e-4 else (0.0, 0.0, 1.0)
+        directions.append(second)
         texts.append(" ".join(f"{value:g}" for value in second))
-        texts.append(_compute_normal(second, known[0]))
-    elif len(known) == 2:
-        texts.append(_compute_normal(known[0], known[1]))
+        texts.append(_compute_normal(second, directions[0]))
+    elif len(directions) == 2:
+        texts.append(_compute_normal(directions[0], directions[1]))
     return texts
 
 
@@ -137,7 +137,7 @@ def apply_scale_factors(draft: Draft) -> None:
                     abs(part) * factor for part, factor in zip(direction, scales, strict=True)
                 )
                 _add_multiplier(draft, axis.find("function"), x + y + z, factors)
-        draft.record_change(joint, at=factors)
+        draft.record_change(joint, location=factors)
         draft.remove(factors)
     for point, factors in find_with_child(draft.find_tagged("MovingPathPoint"), "scale_factors"):
         scales = parse_reals(get_text(factors), 3)
@@ -145,7 +145,7 @@ def apply_scale_factors(draft: Draft) -> None:
             continue
         for tag, scale in zip(_LOCATION_TAGS, scales, strict=True):
             _add_multiplier(draft, point.find(tag), scale, factors)
-        draft.record_change(point, at=factors)
+        draft.record_change(point, location=factors)
         draft.remove(factors)
 
 
@@ -198,7 +198,9 @@ def convert_tool_controls(draft: Draft) -> None:
             draft.add(controller, "kp", "16", source=spring)
             draft.add(controller, "kv", "8", source=spring)
             draft.record_change(
-                tool, at=spring, lost="corrective springs, which a CorrectionController replaces"
+                tool,
+                location=spring,
+                lost="corrective springs, which a CorrectionController replaces",
             )
             for tag in _SPRINGS:
                 for child in tool.findall(tag):
@@ -308,8 +310,10 @@ def move_first_trial(draft: Draft) -> None:
             else:
                 # Comments move with their trial.
                 tool.append(child)
-        for extra in result[1:]:
-            draft.record_change(tool, at=extra, lost=f"the trial '{extra.get('name', '')}'")
+        for surplus_trial in result[1:]:
+            draft.record_change(
+                tool, location=surplus_trial, lost=f"the trial '{surplus_trial.get('name', '')}'"
+            )
         draft.add(tool, "constraint_weight", "20", source=trials)
         # Defaults of the old version, which differ from the present ones.
         draft.add(tool, "accuracy", "1e-05" if draft.version == 10500 else "0.0001", source=trials)
@@ -357,7 +361,7 @@ def convert_inverse_dynamics(draft: Draft) -> None:
             if other is not analysis:
                 draft.record_change(
                     tool,
-                    at=other,
+                    location=other,
                     lost=f"the analysis {other.tag}, which needs a separate tool",
                 )
         for analysis_set in tool.findall("AnalysisSet"):
@@ -384,7 +388,7 @@ def convert_geometry_files(draft: Draft) -> None:
         has_transform = any(parse_reals(get_child_text(visible, "transform"), 6) or ())
         draft.record_change(
             body,
-            at=visible,
+            location=visible,
             lost="the position of the shown geometry in the body" if has_transform else None,
         )
         draft.remove(visible)
@@ -419,13 +423,15 @@ def convert_external_forces(draft: Draft) -> None:
                 first = (
                     ""
                     if functions is None
-                    else next((f.get("name", "") for f in list_members(functions)), "")
+                    else next(
+                        (function.get("name", "") for function in list_members(functions)), ""
+                    )
                 )
                 # "#" stands for a column by its number.
                 if first.startswith("#"):
                     draft.record_change(
                         force,
-                        at=functions,
+                        location=functions,
                         lost=f"the columns from {first} on, which have no labels; give them labels",
                     )
                     first = ""

@@ -156,9 +156,14 @@ class Draft:
         """Changes that the steps have made, in the order of the old document."""
         result = [
             Change(
-                step.name, step.below, step.what, describe_element(owner), self.numbers[place], lost
+                step.name,
+                step.below,
+                step.what,
+                describe_element(owner),
+                self.numbers[element],
+                lost,
             )
-            for step, owner, place, lost in self._changes
+            for step, owner, element, lost in self._changes
         ]
         return sorted(result, key=lambda change: change.number)
 
@@ -189,16 +194,16 @@ class Draft:
         """
         # Tags are looked up by class, so that lxml searches once for all of them.
         tags = {tag for kind in kinds for tag in self._tags.get(kind, ())}
-        sets = [
+        set_tags = [
             owner
             for owner, kind in _MEMBER_FAMILIES.items()
             if kind in kinds and owner in self._tags
         ]
         result = list(self.root.iter(*tags)) if tags else []
-        if sets:
+        if set_tags:
             strange = [
                 member
-                for owner in self.root.iter(*sets)
+                for owner in self.root.iter(*set_tags)
                 for member in list_members(owner)
                 if not find_families(member.tag)
             ]
@@ -334,17 +339,17 @@ class Draft:
         self.refusals.append(Refusal(self.numbers[owner], self.numbers[element], message))
 
     def record_change(
-        self, element: Element, *, at: Element | None = None, lost: str | None = None
+        self, element: Element, *, location: Element | None = None, lost: str | None = None
     ) -> None:
         """Record that the current step changed an element.
 
         Args:
             element: changed component.
-            at: element inside that the change concerns; default the component.
+            location: element inside that the change concerns; default the component.
             lost: content that the current format cannot express.
         """
         assert self.step is not None
-        self._changes.append((self.step, element, element if at is None else at, lost))
+        self._changes.append((self.step, element, element if location is None else location, lost))
 
 
 def describe_element(element: Element) -> str:
@@ -426,13 +431,13 @@ def make_body_path(name: str) -> str:
 def make_path(component: Element) -> str:
     """Return the path of a component by the rules of version 4; a component without a name has that of its class."""
     # OpenSim's paths leave out wrappers such as <objects>, and use the tag of sets.
-    words: list[str] = []
-    here: Element | None = component
-    while here is not None and here.tag != "Model":
-        kinds = find_families(here.tag)
+    names: list[str] = []
+    element: Element | None = component
+    while element is not None and element.tag != "Model":
+        kinds = find_families(element.tag)
         if "ModelComponentSet" in kinds:
-            words.append(here.tag.lower())
-        elif "Component" in kinds or here is component:
-            words.append(here.get("name") or here.tag.lower())
-        here = here.getparent()
-    return "/" + "/".join(reversed(words))
+            names.append(element.tag.lower())
+        elif "Component" in kinds or element is component:
+            names.append(element.get("name") or element.tag.lower())
+        element = element.getparent()
+    return "/" + "/".join(reversed(names))

@@ -137,11 +137,11 @@ def _check_joint(draft: Draft, joint: Element) -> None:
 
 def _find_elements(owner: Element, path: str) -> Iterator[Element]:
     """Yield the elements at a path as OpenSim finds them: the first of each tag, but every <DisplayGeometry>."""
-    first, _, rest = path.partition("/")
-    result = owner.findall(first)
-    for child in result if first == "DisplayGeometry" else result[:1]:
-        if rest:
-            yield from _find_elements(child, rest)
+    tag, _, remaining_path = path.partition("/")
+    result = owner.findall(tag)
+    for child in result if tag == "DisplayGeometry" else result[:1]:
+        if remaining_path:
+            yield from _find_elements(child, remaining_path)
         else:
             yield child
 
@@ -162,13 +162,13 @@ def _is_value(element: Element) -> bool:
 
 def _is_number(text: str) -> bool:
     """Return whether OpenSim reads a number from a text."""
-    word, *others = split_words(text) or [""]
+    word, *trailing_words = split_words(text) or [""]
     try:
         value = parse_real(word)
     except UncleanText as unclean:
         # OpenSim reads a number with trailing characters, if it is cut.
         return unclean.trouble == "cut"
-    return not others or isfinite(value)
+    return not trailing_words or isfinite(value)
 
 
 def _is_integer(text: str) -> bool:

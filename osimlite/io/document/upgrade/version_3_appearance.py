@@ -26,30 +26,34 @@ from osimlite.mechanics.laws.vectors import Vector, plus
 def convert_display_geometry(draft: Draft) -> None:
     """Turn each <DisplayGeometry> into a <Mesh>, in an offset frame if it has a transform."""
     for body, visible in find_with_child(draft.find_tagged("Body", "Ground"), "VisibleObject"):
-        shown = visible.find("GeometrySet")
-        if shown is not None and shown.find("objects") is not None:
-            attached = draft.add(body, "attached_geometry", source=shown)
+        geometry_set = visible.find("GeometrySet")
+        if geometry_set is not None and geometry_set.find("objects") is not None:
+            attached = draft.add(body, "attached_geometry", source=geometry_set)
             # Other classes in the set were never shown.
-            pieces = [piece for piece in list_members(shown) if piece.tag == "DisplayGeometry"]
-            for count, piece in enumerate(pieces, 1):
-                _add_mesh(draft, body, visible, attached, piece, count)
-            draft.record_change(body, at=visible)
+            geometries = [
+                geometry
+                for geometry in list_members(geometry_set)
+                if geometry.tag == "DisplayGeometry"
+            ]
+            for count, geometry in enumerate(geometries, 1):
+                _add_mesh(draft, body, visible, attached, geometry, count)
+            draft.record_change(body, location=visible)
         draft.remove(visible)
 
 
 def _add_mesh(
-    draft: Draft, body: Element, visible: Element, attached: Element, piece: Element, count: int
+    draft: Draft, body: Element, visible: Element, attached: Element, geometry: Element, count: int
 ) -> None:
     name = body.get("name", "")
     # The pose of the body's geometry, then that of the piece.
-    place = compose_transforms(
-        get_child_text(visible, "transform"), get_child_text(piece, "transform")
+    pose = compose_transforms(
+        get_child_text(visible, "transform"), get_child_text(geometry, "transform")
     )
-    if place is not None:
-        orientation, translation = place
+    if pose is not None:
+        orientation, translation = pose
         source = (
-            piece.find("transform")
-            if piece.find("transform") is not None
+            geometry.find("transform")
+            if geometry.find("transform") is not None
             else visible.find("transform")
         )
         assert source is not None
@@ -63,22 +67,22 @@ def _add_mesh(
         draft.add(frame, "translation", translation, source=source)
         draft.add(frame, "orientation", orientation, source=source)
         attached = draft.add(frame, "attached_geometry", source=source)
-    mesh = draft.add(attached, "Mesh", source=piece, name=f"{name}_geom_{count}")
-    draft.add(mesh, "socket_frame", "..", source=piece)
-    scale = piece.find("scale_factors")
+    mesh = draft.add(attached, "Mesh", source=geometry, name=f"{name}_geom_{count}")
+    draft.add(mesh, "socket_frame", "..", source=geometry)
+    scale = geometry.find("scale_factors")
     # Scales of body and piece multiply.
-    outer = visible.find("scale_factors")
-    source = scale if scale is not None else outer if outer is not None else piece
-    draft.add(mesh, "scale_factors", _multiply_scales(scale, outer), source=source)
-    file = piece.find("geometry_file")
+    body_scale = visible.find("scale_factors")
+    source = scale if scale is not None else body_scale if body_scale is not None else geometry
+    draft.add(mesh, "scale_factors", _multiply_scales(scale, body_scale), source=source)
+    file = geometry.find("geometry_file")
     draft.add(
         mesh,
         "mesh_file",
         "" if file is None else get_text(file),
-        source=piece if file is None else file,
+        source=geometry if file is None else file,
     )
-    appearance = draft.add(mesh, "Appearance", source=piece)
-    for child in list_elements(piece):
+    appearance = draft.add(mesh, "Appearance", source=geometry)
+    for child in list_elements(geometry):
         if child.tag in ("color", "opacity"):
             draft.move(child, appearance)
         elif child.tag == "display_preference":
@@ -87,13 +91,13 @@ def _add_mesh(
             if preference == "0":
                 draft.add(appearance, "visible", "false", source=child)
             elif preference != "4":
-                draft.record_change(body, at=child, lost=f"display_preference {preference}")
+                draft.record_change(body, location=child, lost=f"display_preference {preference}")
 
 
-def _multiply_scales(scale: Element | None, outer: Element | None) -> str:
+def _multiply_scales(scale: Element | None, body_scale: Element | None) -> str:
     """Return the text of the product of two scales; a scale of one leaves the other text unchanged."""
     inner_text = "1 1 1" if scale is None else get_text(scale)
-    outer_text = "1 1 1" if outer is None else get_text(outer)
+    outer_text = "1 1 1" if body_scale is None else get_text(body_scale)
     inner_values, outer_values = parse_reals(inner_text, 3), parse_reals(outer_text, 3)
     # Words stay as they are where possible, so that no digits change.
     if outer_values is None or outer_values == [1, 1, 1]:
@@ -180,9 +184,9 @@ def move_geometry_lists(draft: Draft) -> None:
         # The <geometry> of contact forces is a list of names and stays.
         if not list_elements(geometry):
             continue
-        listed = draft.get_list(component, "components", source=geometry)
-        for piece in list_elements(geometry):
-            draft.move(piece, listed)
+        components = draft.get_list(component, "components", source=geometry)
+        for shape in list_elements(geometry):
+            draft.move(shape, components)
         draft.remove(geometry)
         draft.record_change(component)
 
@@ -219,17 +223,17 @@ def convert_wrap_appearance(draft: Draft) -> None:
     for wrap in draft.find_all("WrapObject"):
         visible = wrap.find("VisibleObject")
         color, local = wrap.find("color"), wrap.find("display_preference")
-        outer = None if visible is None else visible.find("display_preference")
+        visible_preference = None if visible is None else visible.find("display_preference")
         representation = "3"
         hidden = False
         set_by = color
         # The preference of the wrap object comes before that of the visible object.
-        for preference in (local, outer):
-            word = "" if preference is None else get_text(preference)
-            if word == "0":
+        for preference in (local, visible_preference):
+            value = "" if preference is None else get_text(preference)
+            if value == "0":
                 hidden, set_by = True, preference
-            elif word in ("1", "2", "3") and representation == "3":
-                representation, set_by = word, preference
+            elif value in ("1", "2", "3") and representation == "3":
+                representation, set_by = value, preference
         if set_by is not None:
             _add_appearance(draft, wrap, set_by, color, representation, hidden)
         for part in (color, local, visible):
@@ -265,18 +269,18 @@ def _add_appearance(
 
 def _is_shown_elsewhere(wrap: Element, visible: Element | None) -> bool:
     """Return whether the surface was shown at another position than that of the wrap object."""
-    shown = None if visible is None else parse_reals(get_child_text(visible, "transform"), 6)
-    angles, place = (
+    shown_pose = None if visible is None else parse_reals(get_child_text(visible, "transform"), 6)
+    angles, translation = (
         parse_reals(get_child_text(wrap, tag), 3) or [0.0] * 3
         for tag in ("xyz_body_rotation", "translation")
     )
-    here = [*angles, *place]
+    wrap_pose = [*angles, *translation]
     return (
-        shown is not None
-        and any(shown)
+        shown_pose is not None
+        and any(shown_pose)
         # OpenSim's wrap objects may be drawn elsewhere than they act, which the new format cannot
         # say.
-        and any(abs(a - b) > 1e-4 for a, b in zip(shown, here, strict=True))
+        and any(abs(a - b) > 1e-4 for a, b in zip(shown_pose, wrap_pose, strict=True))
     )
 
 

@@ -36,7 +36,7 @@ def convert_connectors(draft: Draft) -> None:
             connectee = connector.find("connectee_name")
             text = "" if connectee is None else get_text(connectee)
             draft.add(component, f"socket_{connector.get('name', '')}", text, source=connector)
-        draft.record_change(component, at=old)
+        draft.record_change(component, location=old)
         draft.remove(old)
 
 
@@ -46,7 +46,7 @@ def rename_connectors(draft: Draft) -> None:
         for child in list_elements(component):
             if child.tag.startswith("connector_"):
                 draft.rename(child, child.tag.replace("connector", "socket", 1))
-                draft.record_change(component, at=child)
+                draft.record_change(component, location=child)
 
 
 def shorten_connectee_names(draft: Draft) -> None:
@@ -56,7 +56,7 @@ def shorten_connectee_names(draft: Draft) -> None:
             match = _SUFFIX.fullmatch(child.tag)
             if match is not None:
                 draft.rename(child, match[1])
-                draft.record_change(component, at=child)
+                draft.record_change(component, location=child)
 
 
 def complete_body_paths(draft: Draft) -> None:
@@ -84,25 +84,25 @@ def complete_body_paths(draft: Draft) -> None:
                 and not _leads_to_body(component, text, paths)
             ):
                 child.text = paths[last]
-                draft.record_change(component, at=child)
+                draft.record_change(component, location=child)
 
 
 def _leads_to_body(component: Element, text: str, paths: dict[str, str]) -> bool:
     """Return whether a relative path leads to a body, or to a frame that the component contains."""
-    here = make_path(component).split("/")[1:]
+    path_parts = make_path(component).split("/")[1:]
     # ".." leads to the parent, as in paths of files.
-    for word in text.split("/"):
-        if word != "..":
-            here.append(word)
-        elif here:
-            here.pop()
-    if "/" + "/".join(here) in paths.values():
+    for part in text.split("/"):
+        if part != "..":
+            path_parts.append(part)
+        elif path_parts:
+            path_parts.pop()
+    if "/" + "/".join(path_parts) in paths.values():
         return True
     frames = (
-        piece for tag in ("frames", "components") for piece in _list_children(component.find(tag))
+        frame for tag in ("frames", "components") for frame in _list_children(component.find(tag))
     )
     # Relative names of frames inside the component are valid.
-    return any(piece.get("name") == text for piece in frames)
+    return any(frame.get("name") == text for frame in frames)
 
 
 def _list_children(parent: Element | None) -> list[Element]:
@@ -135,8 +135,8 @@ def add_joint_frames(draft: Draft) -> None:
                 continue
             # Old sockets have names or paths; the last word is the name.
             body = get_text(socket).rpartition("/")[2]
-            place = [joint.find(f"{what}_in_{side}") for what in ("location", "orientation")]
-            socket.text = _add_frame(draft, joint, body, socket, place)
+            pose = [joint.find(f"{quantity}_in_{side}") for quantity in ("location", "orientation")]
+            socket.text = _add_frame(draft, joint, body, socket, pose)
         draft.record_change(joint)
 
 
@@ -146,42 +146,44 @@ def add_linker_frames(draft: Draft) -> None:
         is_changed = False
         for side in ("1", "2"):
             socket = linker.find(f"body_{side}")
-            place = [linker.find(f"{what}_body_{side}") for what in ("location", "orientation")]
+            pose = [
+                linker.find(f"{quantity}_body_{side}") for quantity in ("location", "orientation")
+            ]
             if socket is None:
                 continue
             is_changed = True
             body = get_text(socket)
             draft.rename(socket, f"socket_frame{side}")
-            values = [parse_reals(get_text(part), 3) for part in place if part is not None]
+            values = [parse_reals(get_text(part), 3) for part in pose if part is not None]
             # Unreadable values go into a frame, so that the reader can report them.
             if any(numbers is None or any(numbers) for numbers in values):
-                socket.text = _add_frame(draft, linker, body, socket, place)
+                socket.text = _add_frame(draft, linker, body, socket, pose)
             else:
                 socket.text = make_body_path(body)
-                _remove_parts(draft, place)
+                _remove_parts(draft, pose)
         if is_changed:
             draft.record_change(linker)
 
 
 def _add_frame(
-    draft: Draft, owner: Element, body: str, socket: Element, place: list[Element | None]
+    draft: Draft, owner: Element, body: str, socket: Element, pose: list[Element | None]
 ) -> str:
     """Add an offset frame of `body` to the owner's list; return its name.
 
     OpenSim gives both frames of one body the same name, and then uses the first for either side.
     """
-    location, orientation = place
-    source = next((part for part in place if part is not None), socket)
+    location, orientation = pose
+    source = next((part for part in pose if part is not None), socket)
     frames = draft.get_list(owner, "frames", source=source)
-    taken = {frame.get("name") for frame in frames}
+    used_names = {frame.get("name") for frame in frames}
     # Names of frames must be unique in their list.
-    name = make_unique_name(f"{body}_offset", taken, 0)
+    name = make_unique_name(f"{body}_offset", used_names, 0)
     frame = draft.add(frames, "PhysicalOffsetFrame", source=source, name=name)
     draft.add(frame, "socket_parent", make_body_path(body), source=socket)
     for tag, part in (("translation", location), ("orientation", orientation)):
         text = _ZERO if part is None else get_text(part)
         draft.add(frame, tag, text, source=source if part is None else part)
-    _remove_parts(draft, place)
+    _remove_parts(draft, pose)
     return name
 
 
@@ -246,7 +248,7 @@ def convert_point_coordinates(draft: Draft) -> None:
     coordinates count.
     """
     paths: dict[str, str] | None = None
-    taken: dict[str, str] = {}
+    opensim_paths: dict[str, str] = {}
     for point in draft.find_tagged("ConditionalPathPoint", "MovingPathPoint"):
         axes = ("",) if point.tag == "ConditionalPathPoint" else ("x_", "y_", "z_")
         result = [child for axis in axes if (child := point.find(f"{axis}coordinate")) is not None]
@@ -256,13 +258,13 @@ def convert_point_coordinates(draft: Draft) -> None:
             name = get_text(child)
             # An unknown name stays, so that the reader reports it.
             child.text = paths.get(name, name)
-            if name in paths and name not in taken:
-                taken[name] = _find_opensim_path(draft, name)
-            if name in paths and taken[name] != paths[name]:
+            if name in paths and name not in opensim_paths:
+                opensim_paths[name] = _find_opensim_path(draft, name)
+            if name in paths and opensim_paths[name] != paths[name]:
                 draft.record_refusal(
                     point,
                     child,
-                    f"coordinate '{name}' is '{taken[name]}' for OpenSim, by the first element of that name, and not "
+                    f"coordinate '{name}' is '{opensim_paths[name]}' for OpenSim, by the first element of that name, and not "
                     f"'{paths[name]}'",
                 )
             draft.rename(child, f"socket_{child.tag}")
@@ -318,7 +320,7 @@ def _list_coordinate_paths(draft: Draft) -> dict[str, str]:
     Joints of the same name get the suffixes that OpenSim gives them.
     """
     paths: dict[str, str] = {}
-    taken: set[str] = set()
+    used_names: set[str] = set()
     for joint in (
         joint
         for _, joint_set in draft.find_in_model("JointSet")
@@ -326,10 +328,10 @@ def _list_coordinate_paths(draft: Draft) -> dict[str, str]:
     ):
         name = joint.get("name") or joint.tag.lower()
         # Joints of one name get "_0", "_1", as in OpenSim.
-        free = make_unique_name(name, taken, 0)
-        taken.add(free)
+        joint_name = make_unique_name(name, used_names, 0)
+        used_names.add(joint_name)
         for coordinate in joint.iter("Coordinate"):
             paths.setdefault(
-                coordinate.get("name", ""), f"/jointset/{free}/{coordinate.get('name')}"
+                coordinate.get("name", ""), f"/jointset/{joint_name}/{coordinate.get('name')}"
             )
     return paths

@@ -60,16 +60,16 @@ def remove_white_space(draft: Draft) -> None:
                 component.set("name", component.tag.lower())
                 draft.record_change(component)
         elif any(space in name for space in " \t\n\r"):
-            new = "".join(name.split())
+            stripped_name = "".join(name.split())
             siblings = (
-                () if parent is None else (other for other in parent if other is not component)
+                () if parent is None else (child for child in parent if child is not component)
             )
             # Two names may become equal without their blanks.
-            taken = {sibling.get("name") for sibling in siblings}
-            free = make_unique_name(new, taken, 0)
-            component.set("name", free)
+            sibling_names = {sibling.get("name") for sibling in siblings}
+            unique_name = make_unique_name(stripped_name, sibling_names, 0)
+            component.set("name", unique_name)
             # Texts are compared with white space collapsed.
-            renamed.setdefault(" ".join(name.split()), free)
+            renamed.setdefault(" ".join(name.split()), unique_name)
             draft.record_change(component)
     if renamed:
         _rename_references(draft, renamed)
@@ -86,7 +86,7 @@ def _rename_references(draft: Draft, renamed: dict[str, str]) -> None:
                 )
                 if new != text:
                     element.text = new
-                    draft.record_change(_get_owner(element), at=element)
+                    draft.record_change(_get_owner(element), location=element)
         name = element.get("name")
         if name is not None and " ".join(name.split()) in renamed and find_families(element.tag):
             # An object that is no component can be named after the component it describes.
@@ -117,20 +117,20 @@ def combine_inertia(draft: Draft) -> None:
         if body.get("name") == "ground":
             continue
         parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
-        given = [part for part in parts.values() if part is not None]
+        present_elements = [part for part in parts.values() if part is not None]
         words = [
             default if (part := parts[axes]) is None else get_text(part)
             for axes, default in _INERTIA.items()
         ]
         # The source is an unreadable number if there is one, so that messages point to it.
         source = next(
-            (part for part in given if parse_reals(get_text(part), 1) is None),
-            given[0] if given else body,
+            (part for part in present_elements if parse_reals(get_text(part), 1) is None),
+            present_elements[0] if present_elements else body,
         )
         draft.add(body, "inertia", " ".join(words), source=source)
-        for part in given:
+        for part in present_elements:
             draft.remove(part)
-        draft.record_change(body, at=given[0] if given else body)
+        draft.record_change(body, location=present_elements[0] if present_elements else body)
 
 
 _GROUND_TAGS = {"VisibleObject", "WrapObjectSet", "attached_geometry", "components", "geometry"}
@@ -167,9 +167,11 @@ def move_joints(draft: Draft) -> None:
             if result:
                 # A body had one joint; more are malformed, and OpenSim takes the first.
                 _convert_joint(draft, result[0], body, objects)
-            for extra in result[1:]:
+            for surplus_joint in result[1:]:
                 draft.record_change(
-                    body, at=extra, lost=f"a second joint of the body, <{extra.tag}>"
+                    body,
+                    location=surplus_joint,
+                    lost=f"a second joint of the body, <{surplus_joint.tag}>",
                 )
             draft.remove(wrapper)
 
@@ -196,17 +198,17 @@ def _convert_joint(draft: Draft, joint: Element, body: Element, objects: Element
 
 def list_joint_coordinates(draft: Draft) -> None:
     """Turn the <CoordinateSet> of a joint into its <coordinates>."""
-    for joint, old in find_with_child(draft.find_all("Joint"), "CoordinateSet"):
+    for joint, coordinate_set in find_with_child(draft.find_all("Joint"), "CoordinateSet"):
         # Members of other classes move too, so that the reader can report them.
-        coordinates = list(list_members(old))
+        coordinates = list(list_members(coordinate_set))
         if coordinates:
-            listed = draft.add(joint, "coordinates", source=old)
+            coordinate_list = draft.add(joint, "coordinates", source=coordinate_set)
             for coordinate in coordinates:
-                draft.move(coordinate, listed)
-        groups = old.find("groups")
+                draft.move(coordinate, coordinate_list)
+        groups = coordinate_set.find("groups")
         lost = "groups of coordinates" if groups is not None and len(groups) else None
-        draft.record_change(joint, at=old, lost=lost)
-        draft.remove(old)
+        draft.record_change(joint, location=coordinate_set, lost=lost)
+        draft.remove(coordinate_set)
 
 
 def invert_switches(draft: Draft) -> None:
@@ -234,12 +236,12 @@ def _invert_switch(draft: Draft, family: str, new: str) -> None:
 
 def move_frame_set(draft: Draft) -> None:
     """Move the members of <FrameSet> to the model's <components>."""
-    for model, old in draft.find_in_model("FrameSet"):
-        listed = draft.get_list(model, "components", source=old)
-        for frame in list(list_members(old)):
-            draft.move(frame, listed)
-        draft.record_change(model, at=old)
-        draft.remove(old)
+    for model, frame_set in draft.find_in_model("FrameSet"):
+        components = draft.get_list(model, "components", source=frame_set)
+        for frame in list(list_members(frame_set)):
+            draft.move(frame, components)
+        draft.record_change(model, location=frame_set)
+        draft.remove(frame_set)
 
 
 _DEFAULT_BOUNDS = {"min_control": 0.0, "max_control": 1.0}

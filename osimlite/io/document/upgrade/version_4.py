@@ -88,7 +88,7 @@ def remove_meaningless(draft: Draft) -> None:
     for visible in draft.find_tagged("VisibleObject"):
         parent = visible.getparent()
         if parent is not None and find_families(parent.tag):
-            draft.record_change(parent, at=visible)
+            draft.record_change(parent, location=visible)
             draft.remove(visible)
     for family, default in MEANINGLESS.items():
         for owner in draft.find_all(family):
@@ -96,7 +96,7 @@ def remove_meaningless(draft: Draft) -> None:
                 if child.tag in default:
                     lost = _describe_loss(child, default[child.tag])
                     if lost is None or draft.version >= 10901:
-                        draft.record_change(owner, at=child, lost=lost)
+                        draft.record_change(owner, location=child, lost=lost)
                         draft.remove(child)
 
 
@@ -139,8 +139,8 @@ def convert_controller_actuators(draft: Draft) -> None:
     """
     if next(draft.root.iter("actuator_list"), None) is None:
         return
-    listed = [*find_with_child(draft.find_all("Controller"), "actuator_list")]
-    if not listed:
+    controllers = [*find_with_child(draft.find_all("Controller"), "actuator_list")]
+    if not controllers:
         return
     # OpenSim does not read what is in a list that no set holds.
     actuators = [
@@ -157,7 +157,7 @@ def convert_controller_actuators(draft: Draft) -> None:
     by_name: dict[str, str] = {}
     for path, name in (*actuators, *forces):
         by_name.setdefault(name, path)
-    for controller, names in listed:
+    for controller, names in controllers:
         words = split_words(get_text(names))
         lost = None
         # "ALL" stands for every actuator, in any letter case.
@@ -169,9 +169,9 @@ def convert_controller_actuators(draft: Draft) -> None:
                 )
         else:
             paths = [by_name.get(word, f"/forceset/{word}") for word in words]
-            known = [path for path in paths if path in {*by_name.values()}]
+            known_paths = [path for path in paths if path in {*by_name.values()}]
             # OpenSim fails over a repeated actuator.
-            if len({*known}) < len(known):
+            if len({*known_paths}) < len(known_paths):
                 draft.record_refusal(controller, names, "a controller names an actuator twice")
         names.text = " ".join(dict.fromkeys(paths))
         draft.rename(names, "socket_actuators")

@@ -56,7 +56,7 @@ with mute_output():
         "pybullet",
         extra="bullet",
         purpose="the PyBullet engine",
-        instead="--engine compiled, whose motions osimlite view shows",
+        alternative="--engine compiled, whose motions osimlite view shows",
     )
     import pybullet as bullet
 

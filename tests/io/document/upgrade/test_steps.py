@@ -50,7 +50,7 @@ def unresolved(model: Model) -> list[str]:
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.name)
 def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:
     (example,) = (fixtures / "versions").glob(f"{step.name}.*")
-    old = read_document(Source.from_file(example), of=Object)
+    old = read_document(Source.from_file(example), expected_class=Object)
     assert old.version < step.below
     assert step.name in {change.step for change in old.changes}
     assert to_text(old.top) == (fixtures / "versions" / "upgraded" / example.name).read_text()
@@ -60,7 +60,7 @@ def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.name)
 def test_what_is_upgraded_needs_no_upgrade(step, fixtures: Path) -> None:
     (path,) = (fixtures / "versions" / "upgraded").glob(f"{step.name}.*")
-    new = read_document(Source.from_file(path), of=Object)
+    new = read_document(Source.from_file(path), expected_class=Object)
     assert (new.version, new.changes, new.notes) == (CURRENT_VERSION, [], [])
     assert to_text(new.top) == path.read_text()
 
@@ -367,7 +367,7 @@ def test_a_tool_cannot_name_all_actuators_of_its_model() -> None:
         f"<ForwardTool><ControllerSet><objects>{controller}</objects></ControllerSet></ForwardTool>"
     )
     text = f'<OpenSimDocument Version="40500">{tool}</OpenSimDocument>'
-    (change,) = read_document(Source(text.encode()), of=Object).changes
+    (change,) = read_document(Source(text.encode()), expected_class=Object).changes
     assert change.lost is not None and "all actuators" in change.lost
 
 
@@ -378,7 +378,7 @@ def test_actuators_without_a_version_push_backwards_as_in_opensim() -> None:
 <TorqueActuator name="torque"> <axis>1 0 0</axis> </TorqueActuator>
 <TorqueActuator name="about" />
 </objects> </ForceSet>"""
-    top: Any = read_document(Source(text.encode()), of=Object).top
+    top: Any = read_document(Source(text.encode()), expected_class=Object).top
     given, bare, torque, about = top.objects
     assert (given.direction, given.force_is_global) == ((0.0, -2.0, 0.0), False)
     assert (bare.direction, torque.axis, about.axis) == (
