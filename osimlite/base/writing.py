@@ -362,7 +362,7 @@ class ResultWriter:
         real_path = self.resolve(path)
         chunks = iter(lines)
         beginning = b""
-        # The parts of a table may be its lines, and its head says what it is.
+        # The chunks of a table may be single lines, and its header says what it is.
         for chunk in chunks:
             beginning += _encode_text(chunk, real_path)
             if len(beginning) >= BEGINNING_BYTES:

@@ -64,8 +64,8 @@ def validate(
 
     if config is None:
         meshes = tuple(map(str, list_mesh_folders()))
-        named = [classes] if isinstance(classes, str | os.PathLike) else classes
-        files = tuple(map(os.path.abspath, named))
+        class_paths = [classes] if isinstance(classes, str | os.PathLike) else classes
+        files = tuple(map(os.path.abspath, class_paths))
         config = Config(parse_codes(select), parse_codes(ignore), mesh_paths=meshes, classes=files)
     # Plug-in classes are registered for this check only.
     with classes_in_use(config.classes):
@@ -75,11 +75,11 @@ def validate(
             from osimlite.lint.many import check_files
 
             # Spawned processes would run the caller's script again.
-            passed: list[str] = []
+            skipped_files: list[str] = []
             report = check_files(
-                find_project_files([model], passed=passed), config, cached=False, processes=1
+                find_project_files([model], passed=skipped_files), config, cached=False, processes=1
             )
-            report.passed = passed
+            report.passed = skipped_files
             return report
         with pause_collector():
             return check_source(
@@ -97,8 +97,8 @@ def assert_valid(
         ignore: codes or names of rules to ignore.
     """
     report = validate(model, ignore=ignore)
-    bad = report.at_least(Severity.WARNING)
-    assert not bad, "\n".join(map(str, bad))
+    failures = report.at_least(Severity.WARNING)
+    assert not failures, "\n".join(map(str, failures))
 
 
 def __getattr__(name: str) -> Any:

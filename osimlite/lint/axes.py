@@ -52,14 +52,18 @@ def refuses_axes(joint: CustomJoint) -> bool:
         return True
     if not names:
         return bool(declared)
-    made = list(declared)
+    existing_names = list(declared)
     for index, name in enumerate(names):
-        if name not in made:
-            if len(made) != index or any(character in name for character in ILLEGAL_CHARACTERS):
+        if name not in existing_names:
+            if len(existing_names) != index or any(
+                character in name for character in ILLEGAL_CHARACTERS
+            ):
                 return True
-            made.append(name)
-    moved = any(names.index(name) != index for index, name in enumerate(declared) if name in names)
-    return moved and len(declared) != len(names)
+            existing_names.append(name)
+    is_reordered = any(
+        names.index(name) != index for index, name in enumerate(declared) if name in names
+    )
+    return is_reordered and len(declared) != len(names)
 
 
 @cache_per_subject

@@ -49,16 +49,18 @@ def subtract_baseline(path: str | Path, report: Report) -> Report:
         raise OsimliteError(
             "this is not a baseline; write one with --write-baseline", file=str(path)
         ) from None
-    kept = []
+    new_findings = []
     for finding in report.findings:
         key = _make_key(finding)
         # Older baselines contain the code of the group.
-        known = next((code for code in (key[0], key[0][:7]) if counts[(code, *key[1:])] > 0), None)
-        if known is not None:
-            counts[(known, *key[1:])] -= 1
+        known_code = next(
+            (code for code in (key[0], key[0][:7]) if counts[(code, *key[1:])] > 0), None
+        )
+        if known_code is not None:
+            counts[(known_code, *key[1:])] -= 1
         else:
-            kept.append(finding)
-    return replace(report, findings=kept, known=len(report.findings) - len(kept))
+            new_findings.append(finding)
+    return replace(report, findings=new_findings, known=len(report.findings) - len(new_findings))
 
 
 def _make_key(finding: Finding) -> tuple[str, str, str, str]:

@@ -53,31 +53,31 @@ class Cache:
             # is used.
             match json.loads(read_file(self._entry(file))):
                 case {
-                    "key": str(kept),
+                    "key": str(cached_key),
                     "text": [*text],
-                    "outside": [*outside],
+                    "outside": [*outside_stamps],
                     "findings": [*findings],
                     "unmeasured": [*why_not],
-                    **rest,
+                    **other_fields,
                 }:
-                    stamps = dict(map(_parse_outside, outside))
-                    if kept != key or any(
+                    stamps = dict(map(_parse_outside, outside_stamps))
+                    if cached_key != key or any(
                         self._stamp(path) != stamp for path, stamp in stamps.items()
                     ):
                         return None
                     why_not = _check_types(why_not, *[_TEXT] * len(why_not))
-                    known = Report(
+                    report = Report(
                         [_parse_finding(file, values) for values in findings], unmeasured=why_not
                     )
                     now = time_ns()
                     # The stamp differs after a checkout or a copy, though the text may be the same.
-                    if rest.get("file") != _stamp_file(file):
+                    if other_fields.get("file") != _stamp_file(file):
                         if text != fingerprint_text(read_file(file)):
                             return None
                         # With a new stamp, the next check need not read the text.
-                        self.store(file, key, text, known, stamps, now)
+                        self.store(file, key, text, report, stamps, now)
                     mark_used(self._entry(file))
-                    return known
+                    return report
         # A damaged entry is no reason to fail: the file is checked again.
         except (OsimliteError, OSError, ValueError, TypeError, RecursionError):
             pass
@@ -89,7 +89,7 @@ class Cache:
         key: str,
         text: list[object],
         report: Report,
-        outside: Iterable[str],
+        outside_paths: Iterable[str],
         since: int,
     ) -> None:
         """Cache the report of a file.
@@ -99,22 +99,22 @@ class Cache:
             key: what the entry holds for.
             text: the text that was checked.
             report: of it.
-            outside: the paths at which the check looked for something.
+            outside_paths: the paths at which the check looked for something.
             since: when the check began, ns.
         """
-        place = self._entry(file)
+        cache_path = self._entry(file)
         try:
             entry = {
                 "key": key,
                 "file": _stamp_if_settled(file, since),
                 "text": text,
-                "outside": [(path, self._stamp(path)) for path in outside],
+                "outside": [(path, self._stamp(path)) for path in outside_paths],
                 "findings": [_dump_finding(finding) for finding in report],
                 "unmeasured": report.unmeasured,
             }
         except (OSError, OsimliteError):
             return
-        write_cached(place, json.dumps(entry, separators=(",", ":")))
+        write_cached(cache_path, json.dumps(entry, separators=(",", ":")))
 
     def _entry(self, file: str) -> Path:
         # The key contains the path too: of two files with the same checksum, the last one is cached.
@@ -247,10 +247,10 @@ def _parse_finding(file: str, values: Any) -> Finding:
     code, name, severity, message, line, column, length, component, suggestion, fix = _check_types(
         values, *_FINDING
     )
-    place = [number for number in (line, column) if number is not None]
+    position = [number for number in (line, column) if number is not None]
     # A line without a column, or the other way round, cannot come from a finding; numbers count
     # from 1.
-    if len(place) == 1 or min(*place, length, length) < 1:
+    if len(position) == 1 or min(*position, length, length) < 1:
         raise TypeError
     level = Severity(severity)
     return Finding(

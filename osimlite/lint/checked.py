@@ -73,10 +73,10 @@ class CheckTarget:
         return None
 
     def make_replacement(
-        self, at: Position, named: object, text: str, *, certain: bool
+        self, position: Position, expected: object, text: str, *, certain: bool
     ) -> Fix | None:
-        """Return the fix that replaces the words `named` at a position; None if other words are there."""
-        return replace_name(self.source, at, named, text, certain=certain)
+        """Return the fix that replaces the words `expected` at a position; None if other words are there."""
+        return replace_name(self.source, position, expected, text, certain=certain)
 
     def suppressions(self) -> list[Suppression]:
         """Return the comments that ignore findings."""

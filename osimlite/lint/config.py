@@ -51,18 +51,18 @@ class Config:
         selected = not self.select or any(rule.matches(word) for word in self.select)
         return selected and not any(rule.matches(word) for word in self.ignore)
 
-    def severity_of(self, rule: Rule, own: Severity) -> Severity:
-        """Return the severity of a finding, given the severity `own` of its rule.
+    def severity_of(self, rule: Rule, default: Severity) -> Severity:
+        """Return the severity of a finding, given the severity `default` of its rule.
 
         Args:
             rule: the rule.
-            own: severity that the finding has without settings.
+            default: severity that the finding has without settings.
         """
         # The first setting that matches decides, in the order of the configuration file.
-        for word, severity in self.severity.items():
-            if rule.matches(word):
+        for selector, severity in self.severity.items():
+            if rule.matches(selector):
                 return severity
-        return own
+        return default
 
     def value_of(self, threshold: Threshold) -> float:
         """Return the value of a threshold."""
@@ -73,15 +73,15 @@ class Config:
         )
 
 
-def _check_thresholds(given: Mapping[str, float]) -> None:
+def _check_thresholds(thresholds: Mapping[str, float]) -> None:
     from osimlite.base.text import suggest_name
     from osimlite.lint.registry import all_rules
 
-    known = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
-    for name, number in given.items():
-        if name not in known:
+    names = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
+    for name, number in thresholds.items():
+        if name not in names:
             raise OsimliteError(
-                f"no rule has a threshold '{name}'{suggest_name(name, known)} `osimlite rule CODE` "
+                f"no rule has a threshold '{name}'{suggest_name(name, names)} `osimlite rule CODE` "
                 "shows the thresholds of a rule"
             )
         if (
@@ -101,12 +101,12 @@ def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, .
     Returns:
         The codes and names.
     """
-    given = (
+    separate_words = (
         words.split(",")
         if isinstance(words, str)
         else [part for word in words or () for part in word.split(",")]
     )
-    cleaned = tuple(word.strip() for word in given if word.strip())
+    cleaned = tuple(word.strip() for word in separate_words if word.strip())
     if not cleaned:
         return ()
     # A check without options need not import all rules.
@@ -116,9 +116,9 @@ def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, .
         if not any(rule.matches(word) for rule in all_rules()):
             from osimlite.base.text import suggest_name
 
-            known = [
+            known_words = [
                 name for rule in (*all_rules(), *rule_groups()) for name in (rule.code, rule.name)
             ]
-            near = suggest_name(word, known) or "; 'osimlite rule' lists all rules"
-            raise OsimliteError(f"no rule has the code or name '{word}'{near}")
+            hint = suggest_name(word, known_words) or "; 'osimlite rule' lists all rules"
+            raise OsimliteError(f"no rule has the code or name '{word}'{hint}")
     return cleaned

@@ -159,8 +159,8 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
 
 def obstacles_of(subject: Subject, *stages: Stage) -> list[Obstacle]:
     """Return the obstacles of a model that were found in some stages."""
-    known = cast("list[Obstacle]", subject.cache.get(CONSTRUCTION, []))
-    return [obstacle for obstacle in known if obstacle.stage in stages]
+    obstacles = cast("list[Obstacle]", subject.cache.get(CONSTRUCTION, []))
+    return [obstacle for obstacle in obstacles if obstacle.stage in stages]
 
 
 def _digest(subject: Subject) -> str:

@@ -169,8 +169,8 @@ class Report:
         # The sort is stable: equal severities keep the order of the files.
         ranked = sorted(self.findings, key=lambda finding: finding.severity.rank)
         lines += [_shorten(str(finding)) for finding in ranked[:MAX_LISTED]]
-        if (more := len(ranked) - MAX_LISTED) > 0:
-            lines.append(f"... and {format_count(more, 'finding')} more")
+        if (hidden_count := len(ranked) - MAX_LISTED) > 0:
+            lines.append(f"... and {format_count(hidden_count, 'finding')} more")
         return "\n".join(lines)
 
     @property
@@ -235,10 +235,10 @@ class Report:
 
 def merge_reports(reports: Iterable[Report]) -> Report:
     """Return one report of several, with findings in the given order."""
-    whole = Report(checked=0)
+    merged = Report(checked=0)
     for report in reports:
-        whole.findings.extend(report.findings)
-        whole.texts.update(report.texts)
-        whole.checked += report.checked
-        whole.unmeasured += report.unmeasured
-    return whole
+        merged.findings.extend(report.findings)
+        merged.texts.update(report.texts)
+        merged.checked += report.checked
+        merged.unmeasured += report.unmeasured
+    return merged

@@ -82,14 +82,14 @@ def use_classes(config: Config | None) -> None:
     use_classes(config.classes)
 
 
-def _make_document_subject(found: Survey, config: Config | None) -> Subject:
-    if not is_document(found.source.file) or (
-        found.document and isinstance(found.document.top, Model)
+def _make_document_subject(survey: Survey, config: Config | None) -> Subject:
+    if not is_document(survey.source.file) or (
+        survey.document and isinstance(survey.document.top, Model)
     ):
-        return Subject(found, config)
+        return Subject(survey, config)
     from osimlite.lint.setup import Setup
 
-    return Setup(found, config)
+    return Setup(survey, config)
 
 
 @pause_collector()
@@ -106,13 +106,13 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
         The report.
     """
     findings: list[Finding] = []
-    wanted = [
-        known
-        for known in all_rules(subject.about)
-        if subject.config.includes(known) and subject.is_for(known)
+    selected = [
+        rule
+        for rule in all_rules(subject.about)
+        if subject.config.includes(rule) and subject.is_for(rule)
     ]
-    measuring = [known for known in wanted if known.about == MEASURES]
-    building = [known for known in wanted if known.about == CONSTRUCTION]
+    measuring = [rule for rule in selected if rule.about == MEASURES]
+    building = [rule for rule in selected if rule.about == CONSTRUCTION]
     why_not = unbuilt = ""
     if building:
         unbuilt = subject.find_obstacles(anew=measure) if measure or recall else "not requested"
@@ -120,18 +120,20 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
         why_not = subject.measure(anew=measure) if measure or recall else "not requested"
     left_out = [*(measuring if why_not else []), *(building if unbuilt else [])]
     # What stops a computation is not reported where another rule has reported its cause.
-    wanted.sort(key=lambda known: known.about == CONSTRUCTION)
+    selected.sort(key=lambda rule: rule.about == CONSTRUCTION)
     checks: dict[Check, dict[str, Rule]] = {}
-    for known in wanted:
-        if known not in left_out:
-            checks.setdefault(known.check, {})[known.name if known.group else ""] = known
+    for rule in selected:
+        if rule not in left_out:
+            checks.setdefault(rule.check, {})[rule.name if rule.group else ""] = rule
     for check, told_apart in checks.items():
         check(subject, FindingCollector(told_apart, subject, findings))
     # Text after a syntax error was guessed by the reader; findings there may be wrong.
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [
-            f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)
+            candidate
+            for candidate in findings
+            if candidate.code[4] == "0" or (candidate.line is not None and candidate.line < limit)
         ]
     comments = subject.suppressions()
     if comments:
@@ -142,7 +144,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     why_not = why_not or unbuilt
     unmeasured = []
     if why_not and measure:
-        families = join_words(dict.fromkeys(sorted(known.code[:6] for known in left_out)))
+        families = join_words(dict.fromkeys(sorted(rule.code[:6] for rule in left_out)))
         unmeasured.append(f"{subject.file or 'the model'}: rules {families}{NOT_MEASURED}{why_not}")
     return Report(unique, unmeasured=unmeasured)
 
@@ -154,7 +156,7 @@ MAX_SHORT_LINES = 3
 def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
     """Return a test of whether a comment ignores a finding; it records which comments were used."""
     by_line: dict[int, list[Suppression]] = {}
-    long: list[Suppression] = []
+    long_comments: list[Suppression] = []
     # Short comments are found by the line of a finding, so that thousands of findings and comments
     # do not multiply.
     for comment in comments:
@@ -162,13 +164,16 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
             for line in range(comment.first, comment.last + 1):
                 by_line.setdefault(line, []).append(comment)
         else:
-            long.append(comment)
+            long_comments.append(comment)
 
     def is_ignored(finding: Finding) -> bool:
-        near = by_line.get(finding.line or 0, [])
+        on_line = by_line.get(finding.line or 0, [])
         # A list, not a generator: every comment that covers the finding counts as used.
         return any(
-            [comment.covers(finding, get_rule(finding.code).has_name) for comment in (*long, *near)]
+            [
+                comment.covers(finding, get_rule(finding.code).has_name)
+                for comment in (*long_comments, *on_line)
+            ]
         )
 
     return is_ignored
@@ -179,18 +184,20 @@ def _apply_suppressions(
 ) -> list[Finding]:
     """Return the findings that no comment ignores, with a finding for each unused comment."""
     is_ignored = _make_ignore_test(comments)
-    kept = [finding for finding in findings if not is_ignored(finding)]
-    unused = next(known for known in all_rules() if known.name == "unused-ignore")
-    if subject.config.includes(unused):
-        result = FindingCollector({"": unused}, subject, kept)
+    remaining = [finding for finding in findings if not is_ignored(finding)]
+    unused_rule = next(rule for rule in all_rules() if rule.name == "unused-ignore")
+    if subject.config.includes(unused_rule):
+        result = FindingCollector({"": unused_rule}, subject, remaining)
         for comment in comments:
             for code in comment.codes:
-                named = [known for known in all_rules() if known.matches(code)]
+                matching_rules = [rule for rule in all_rules() if rule.matches(code)]
                 # A comment for a rule that did not run may be useful.
-                is_silent = any(known in left_out for known in named)
-                ran = not named or (any(map(subject.config.includes, named)) and not is_silent)
+                is_silent = any(rule in left_out for rule in matching_rules)
+                ran = not matching_rules or (
+                    any(map(subject.config.includes, matching_rules)) and not is_silent
+                )
                 if code not in comment.used and ran:
                     result(f"'{code}' ignores nothing here; delete it", at=comment.place)
             if not comment.codes:
                 result("this comment names no code to ignore", at=comment.place)
-    return kept
+    return remaining

@@ -38,10 +38,10 @@ class RuleFault(NamedTuple):
 
     def page(self, group: str) -> str:
         """Return the page of the fault; `group` is the code and the name of its rule."""
-        why = self.text.partition(". ")[2] or self.text
+        reason = self.text.partition(". ")[2] or self.text
         return (
             f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is "
-            f"one of the group `{group}`.\n\n## Why is this bad\n{why}\n\n## "
+            f"one of the group `{group}`.\n\n## Why is this bad\n{reason}\n\n## "
             f"Example\n{self._example('+')}\n\n## Use instead\n{self._example('-')}"
         )
 
@@ -52,25 +52,25 @@ class RuleFault(NamedTuple):
         return before + start + "".join(f"{margin}{line}\n" for line in lines) + after
 
 
-def parse_faults(listed: str, frames: Mapping[str, str]) -> Iterator[RuleFault]:
+def parse_faults(fault_list: str, frames: Mapping[str, str]) -> Iterator[RuleFault]:
     """Yield the faults that a rule lists; `frames` are the documents of their examples by name."""
-    parts: list[tuple[str, list[str], list[str]]] = []
-    for line in listed.splitlines():
+    sections: list[tuple[str, list[str], list[str]]] = []
+    for line in fault_list.splitlines():
         if line[:2].isdigit():
-            head, _, text = line.partition(": ")
-            parts.append((head, [text], []))
+            heading, _, text = line.partition(": ")
+            sections.append((heading, [text], []))
         else:
-            _, words, lines = parts[-1]
-            (lines if line[:2] in ("- ", "+ ", "  ") else words).append(line)
-    for head, words, lines in parts:
-        name, severity, *fixes, frame = head[3:].split(", ")
+            _, text_lines, lines = sections[-1]
+            (lines if line[:2] in ("- ", "+ ", "  ") else text_lines).append(line)
+    for heading, text_lines, lines in sections:
+        name, severity, *fixes, frame = heading[3:].split(", ")
         kind = fixes[0].removeprefix("fix ") if fixes else ""
         yield RuleFault(
-            head[:2],
+            heading[:2],
             name,
             severity,
             kind,
             frames[frame.removeprefix("in ")],
-            " ".join(words),
+            " ".join(text_lines),
             tuple(lines),
         )

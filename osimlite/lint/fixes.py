@@ -13,46 +13,46 @@ from osimlite.lint.project_files import is_table
 
 
 def replace_text(
-    source: Source | None, place: Position | None, text: str | None, *, safe: bool = True
+    source: Source | None, position: Position | None, text: str | None, *, safe: bool = True
 ) -> Fix | None:
     """Return the fix that replaces the text at a position; None without a source, position or text.
 
     Args:
         source: the text; None for a model made in Python.
-        place: position of the old text.
+        position: position of the old text.
         text: new text; None without a suggestion.
         safe: whether the fix is certain.
     """
-    if source is None or place is None or text is None:
+    if source is None or position is None or text is None:
         return None
     # Columns count from 1, offsets from 0.
-    start = source.line_start(place.line) + place.column - 1
-    return Fix((Edit(start, start + place.length, text),), safe)
+    start = source.line_start(position.line) + position.column - 1
+    return Fix((Edit(start, start + position.length, text),), safe)
 
 
 def replace_name(
-    source: Source | None, place: Position, named: object, text: str, *, certain: bool
+    source: Source | None, position: Position, expected: object, text: str, *, certain: bool
 ) -> Fix | None:
     """Return the fix that replaces a name; None if another text is at the position.
 
     Args:
         source: the text; None for a model made in Python.
-        place: position of the name.
-        named: present name.
+        position: position of the name.
+        expected: present name.
         text: new name.
         certain: whether the fix is safe also if more than the letter case differs.
     """
     # A name with quotes could end the attribute that it is in.
-    if source is None or not isinstance(named, str) or "'" in text or '"' in text:
+    if source is None or not isinstance(expected, str) or "'" in text or '"' in text:
         return None
-    start = source.line_start(place.line) + place.column - 1
+    start = source.line_start(position.line) + position.column - 1
     # The value may be an entity, or come from an included file, where this fix would damage the
     # text.
-    if source.text[start : start + place.length] != escape_text(named.strip()):
+    if source.text[start : start + position.length] != escape_text(expected.strip()):
         return None
     # OpenSim's names depend on the case; a different case is almost certainly a slip.
     return replace_text(
-        source, place, escape_text(text), safe=certain or text.lower() == named.lower()
+        source, position, escape_text(text), safe=certain or text.lower() == expected.lower()
     )
 
 

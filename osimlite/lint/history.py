@@ -44,21 +44,25 @@ def load_later_changes(release: str) -> LaterChanges:
         return LaterChanges(CURRENT_VERSION, {}, {})
     import json
 
-    known: dict[str, dict[str, Any]] = json.loads(
+    history: dict[str, dict[str, Any]] = json.loads(
         Path(__file__).with_suffix(".json").read_text(encoding="utf-8")
     )
-    if release not in known["formats"]:
+    if release not in history["formats"]:
         raise OsimliteError(
-            f"unknown release of OpenSim '{release}'; known are {join_words(known['formats'], max_count=20)}"
+            f"unknown release of OpenSim '{release}'; known are {join_words(history['formats'], max_count=20)}"
         )
     numbers = _parse_release(release)
     return LaterChanges(
-        known["formats"][release],
-        {tag: first for tag, first in known["classes"].items() if _parse_release(first) > numbers},
+        history["formats"][release],
         {
-            name: told
-            for name, told in known["properties"].items()
-            if _parse_release(told[0]) > numbers
+            tag: release_added
+            for tag, release_added in history["classes"].items()
+            if _parse_release(release_added) > numbers
+        },
+        {
+            name: change
+            for name, change in history["properties"].items()
+            if _parse_release(change[0]) > numbers
         },
     )
 
@@ -71,10 +75,12 @@ def find_new_properties(cls: type[Object], release: str) -> list[NewProperty]:
         spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}")
         for tag, spec in get_field_specs(cls).items()
     }
-    told = ((spec, later.get(base) or later.get(own)) for spec, (base, own) in names.items())
+    changes = (
+        (spec, later.get(base) or later.get(own_key)) for spec, (base, own_key) in names.items()
+    )
     return [
         NewProperty(spec, result[0], "".join(result[1:]))
-        for spec, result in told
+        for spec, result in changes
         if result is not None
     ]
 

@@ -56,7 +56,7 @@ def compute_principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[
 
 def _project_onto_cone(moments: Sequence[float]) -> list[float]:
     """Return the point of the cone nearest to `moments`, by trying every face."""
-    best, least = [0.0, 0.0, 0.0], math.inf
+    best, least_distance = [0.0, 0.0, 0.0], math.inf
     faces = [face for count in range(4) for face in combinations(_EDGES, count)]
     for face in faces:
         weights = _solve_weights(face, moments)
@@ -67,8 +67,8 @@ def _project_onto_cone(moments: Sequence[float]) -> list[float]:
             for k in range(3)
         ]
         distance = math.dist(point, moments)
-        if distance < least:
-            best, least = point, distance
+        if distance < least_distance:
+            best, least_distance = point, distance
     return best
 
 
@@ -77,5 +77,5 @@ def _solve_weights(face: Sequence[Sequence[float]], moments: Sequence[float]) ->
     # Any two edges have the scalar product 1, and each has 2 with itself: the normal equations are
     # solved at once.
     products = [sum(a * b for a, b in zip(edge, moments, strict=True)) for edge in face]
-    share = sum(products) / (len(face) + 1) if face else 0.0
-    return [product - share for product in products]
+    correction = sum(products) / (len(face) + 1) if face else 0.0
+    return [product - correction for product in products]

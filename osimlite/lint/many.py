@@ -36,17 +36,17 @@ class CheckJob(NamedTuple):
 
 def check_files(
     files: list[str],
-    given: Config,
+    options: Config,
     *,
     cached: bool = True,
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """Check files, each with the settings of its folder and the options in `given`.
+    """Check files, each with the settings of its folder and the options in `options`.
 
     Args:
         files: paths, ``-`` for standard input.
-        given: configuration with precedence over the settings of the project.
+        options: configuration with precedence over the settings of the project.
         cached: whether to take findings of unchanged files from the cache, and to cache new ones.
         processes: number of processes; as many as are worth starting by default.
         progress: called with the numbers of files that are done and of all files.
@@ -65,25 +65,25 @@ def check_files(
     # The same file may be named twice, by a folder and by itself.
     for file in dict.fromkeys(files):
         settings = find_settings(file)
-        config = settings.config_for(file, given)
+        config = settings.config_for(file, options)
         if file == "-":
             result[file] = _check_standard_input(config, texts)
             continue
         job = CheckJob(file, config, user_cache_folder() if cached else None)
-        known = None
+        cached_report = None
         if job.cache_folder is not None:
-            kept = caches.setdefault(job.cache_folder, Cache(job.cache_folder))
-            known = kept.get(file, make_key(file, config))
-        if known is None:
+            cache = caches.setdefault(job.cache_folder, Cache(job.cache_folder))
+            cached_report = cache.get(file, make_key(file, config))
+        if cached_report is None:
             jobs.append(job)
         else:
-            result[file] = known
+            result[file] = cached_report
     for count, (job, report) in enumerate(_check_jobs(jobs, processes), len(result) + 1):
         result[job.file] = report
         if progress is not None:
             progress(count, len(files))
-    whole = merge_reports(result[file] for file in files)
-    return replace(whole, texts=texts, checked=len(files))
+    merged = merge_reports(result[file] for file in files)
+    return replace(merged, texts=texts, checked=len(files))
 
 
 class SourceTexts(dict[str, str]):
@@ -133,9 +133,9 @@ def _check_jobs(jobs: list[CheckJob], processes: int | None) -> Iterator[tuple[C
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     # Several files in one message to a process; not too many, so that all processes end at the same
     # time.
-    share = max(1, min(16, len(jobs) // (4 * processes)))
+    chunk_size = max(1, min(16, len(jobs) // (4 * processes)))
     with ProcessPoolExecutor(processes, context) as pool:
-        yield from zip(jobs, pool.map(check_job, jobs, chunksize=share), strict=True)
+        yield from zip(jobs, pool.map(check_job, jobs, chunksize=chunk_size), strict=True)
 
 
 def count_processes(jobs: list[CheckJob]) -> int:
@@ -166,11 +166,11 @@ def check_job(job: CheckJob) -> Report:
     if isinstance(subject, Subject) and job.cache_folder is not None:
         subject.cache_folder = Cache(job.cache_folder).folder
     report = run_rules(subject)
-    outside = subject.list_outside_paths() if job.cache_folder is not None else None
-    if job.cache_folder is not None and outside is not None:
+    outside_paths = subject.list_outside_paths() if job.cache_folder is not None else None
+    if job.cache_folder is not None and outside_paths is not None:
         # A file that changes during the check must not count as checked.
         key, text = make_key(job.file, job.config), fingerprint_text(subject.data)
-        Cache(job.cache_folder).store(job.file, key, text, report, outside, began)
+        Cache(job.cache_folder).store(job.file, key, text, report, outside_paths, began)
     return report
 
 

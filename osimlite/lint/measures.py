@@ -63,8 +63,8 @@ class CoordinateSetting(NamedTuple):
         Returns:
             Number and unit, such as ``30 deg``.
         """
-        shown, unit = (degrees(value), "deg") if self.unit == "rad" else (value, self.unit)
-        return f"{shown:.{digits}g} {unit}".rstrip()
+        display_value, unit = (degrees(value), "deg") if self.unit == "rad" else (value, self.unit)
+        return f"{display_value:.{digits}g} {unit}".rstrip()
 
 
 class MeasuringPose(NamedTuple):
@@ -154,19 +154,28 @@ class Measures(NamedTuple):
 def select_owners(measures: Measures, owners: Container[str]) -> Measures:
     """Return the measurements of some paths."""
     lists: Any = measures[1:]
-    kept = {owner: places for owner, places in measures.swept.items() if owner in owners}
-    return Measures(kept, *([item for item in items if item.owner in owners] for items in lists))
+    swept = {owner: indices for owner, indices in measures.swept.items() if owner in owners}
+    return Measures(
+        swept,
+        *(
+            [measurement for measurement in measurements if measurement.owner in owners]
+            for measurements in lists
+        ),
+    )
 
 
-def merge_measures(one: Measures, two: Measures) -> Measures:
+def merge_measures(first: Measures, second: Measures) -> Measures:
     """Return the measurements of two disjoint sets of paths together."""
-    lists: Any = zip(one[1:], two[1:], strict=True)
-    return Measures(one.swept | two.swept, *([*items, *others] for items, others in lists))
+    lists: Any = zip(first[1:], second[1:], strict=True)
+    return Measures(
+        first.swept | second.swept,
+        *([*first_list, *second_list] for first_list, second_list in lists),
+    )
 
 
 def find_swept_coordinates(measures: Measures) -> set[int]:
     """Return the indices of the coordinates that change the length of a path."""
-    return {place for places in measures.swept.values() for place in places}
+    return {index for indices in measures.swept.values() for index in indices}
 
 
 class NoMachineCodeError(OsimliteError):
@@ -191,35 +200,39 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
     from osimlite.schema.tree import lend_tree
 
     compiles = sum(1 for _ in subject.find_by_class("PathWrap")) > MAX_WRAPS_UNCOMPILED
-    missing = find_missing_packages("numpy")
-    if missing:
-        verb = "is" if len(missing) == 1 else "are"
+    missing_packages = find_missing_packages("numpy")
+    if missing_packages:
+        verb = "is" if len(missing_packages) == 1 else "are"
         return (
-            f"{NEEDS_SIM} ({join_words(missing)} {verb} not installed); run: pip install "
+            f"{NEEDS_SIM} ({join_words(missing_packages)} {verb} not installed); run: pip install "
             "'osimlite[sim]'"
         )
     mechanism = subject.cache.pop(MECHANISM, None)
-    parts = digest_parts(subject)
-    known = None if parts is None else recall_measures(parts, subject.cache_folder)
-    if parts is not None and known is not None:
-        still = known.select_unchanged(parts)
-        if still.swept.keys() == parts.paths.keys() and find_swept_coordinates(
-            still
-        ) == find_swept_coordinates(known.measures):
-            subject.cache[MEASURES] = still
+    text_parts = digest_parts(subject)
+    remembered_measures = (
+        None if text_parts is None else recall_measures(text_parts, subject.cache_folder)
+    )
+    if text_parts is not None and remembered_measures is not None:
+        unchanged = remembered_measures.select_unchanged(text_parts)
+        if unchanged.swept.keys() == text_parts.paths.keys() and find_swept_coordinates(
+            unchanged
+        ) == find_swept_coordinates(remembered_measures.measures):
+            subject.cache[MEASURES] = unchanged
             return ""
     if not anew:
         return "not requested"
     try:
         measured = import_module("osimlite.lint.measuring").measure_model
         assert subject.model is not None
-        known_of = (
+        earlier_measures = (
             None
-            if parts is None or known is None
-            else (known.measures, known.select_unchanged(parts))
+            if text_parts is None or remembered_measures is None
+            else (remembered_measures.measures, remembered_measures.select_unchanged(text_parts))
         )
         with lend_tree(subject.tree):
-            result = measured(subject.model, compiles=compiles, known=known_of, mechanism=mechanism)
+            result = measured(
+                subject.model, compiles=compiles, earlier=earlier_measures, mechanism=mechanism
+            )
     except NoMachineCodeError as error:
         subject.needs_remeasuring = True
         return error.message
@@ -230,8 +243,8 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
         # Numbers that other rules have something to say of.
         return f"a number is too large to compute with ({fault})"
     subject.cache[MEASURES] = result
-    if parts is not None:
-        remember_measures(parts, result, subject.cache_folder)
+    if text_parts is not None:
+        remember_measures(text_parts, result, subject.cache_folder)
     return ""
 
 
@@ -264,7 +277,7 @@ class RememberedMeasures(NamedTuple):
         """Return the measurements of the paths whose elements have not changed."""
         return select_owners(
             self.measures,
-            {path for path, own in self.paths.items() if parts.paths.get(path) == own},
+            {path for path, digest in self.paths.items() if parts.paths.get(path) == digest},
         )
 
 
@@ -281,7 +294,7 @@ def digest_parts(subject: Subject) -> TextParts | None:
         or subject.notes_of("include")
     ):
         return None
-    places: list[tuple[int, int, str]] = []
+    spans: list[tuple[int, int, str]] = []
     for cls, items in subject.by_class.items():
         has_path = "geometry_path" in cls.model_fields
         if not has_path and _INDEPENDENT_CLASSES.isdisjoint(get_class_names(cls)):
@@ -289,22 +302,26 @@ def digest_parts(subject: Subject) -> TextParts | None:
         for item in items:
             if item._index is not None:
                 span = source.spans[item._index]
-                places.append((span.start, span.end, subject.path(item) if has_path else ""))
+                spans.append((span.start, span.end, subject.path(item) if has_path else ""))
             elif has_path:
                 return None
-    rest, paths, seen = blake2b(str(subject.version).encode(), digest_size=16), dict[str, str](), 0
-    for start, end, path in sorted(places):
-        if start >= seen:
+    rest_digest, paths, covered_end = (
+        blake2b(str(subject.version).encode(), digest_size=16),
+        dict[str, str](),
+        0,
+    )
+    for start, end, path in sorted(spans):
+        if start >= covered_end:
             # Space around an element says nothing, so that one more does not change what is around
             # it.
-            rest.update(source.text[seen:start].strip().encode("utf-8", "replace"))
-            seen = end
+            rest_digest.update(source.text[covered_end:start].strip().encode("utf-8", "replace"))
+            covered_end = end
         if path:
             paths[path] = blake2b(
                 source.text[start:end].encode("utf-8", "replace"), digest_size=16
             ).hexdigest()
-    rest.update(source.text[seen:].strip().encode("utf-8", "replace"))
-    return TextParts(rest.hexdigest(), paths)
+    rest_digest.update(source.text[covered_end:].strip().encode("utf-8", "replace"))
+    return TextParts(rest_digest.hexdigest(), paths)
 
 
 def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures | None:
@@ -314,19 +331,19 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
         parts: of the text.
         folder: where it may be kept.
     """
-    known = remembered.get(parts.rest)
-    if known is None and folder is not None:
+    recalled = remembered.get(parts.rest)
+    if recalled is None and folder is not None:
         from pydantic import TypeAdapter, ValidationError
 
         try:
-            known = TypeAdapter(RememberedMeasures).validate_json(
+            recalled = TypeAdapter(RememberedMeasures).validate_json(
                 read_file(_cache_file(folder, parts)), strict=True
             )
         except (OsimliteError, ValidationError):
             return None
         mark_used(_cache_file(folder, parts))
-        remembered[parts.rest] = known
-    return known
+        remembered[parts.rest] = recalled
+    return recalled
 
 
 def remember_measures(parts: TextParts, measures: Measures, folder: Path | None) -> None:
@@ -337,7 +354,7 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
         measures: of its model.
         folder: where it is kept; in memory alone if None.
     """
-    known = remembered[parts.rest] = RememberedMeasures(parts.paths, measures)
+    entry = remembered[parts.rest] = RememberedMeasures(parts.paths, measures)
     remembered.move_to_end(parts.rest)
     while len(remembered) > MAX_REMEMBERED_MODELS:
         remembered.popitem(last=False)
@@ -345,7 +362,7 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
         from pydantic import ConfigDict, TypeAdapter
 
         adapter = TypeAdapter(RememberedMeasures, config=ConfigDict(ser_json_inf_nan="constants"))
-        write_cached(_cache_file(folder, parts), adapter.dump_json(known))
+        write_cached(_cache_file(folder, parts), adapter.dump_json(entry))
 
 
 def _cache_file(folder: Path, parts: TextParts) -> Path:

@@ -124,10 +124,10 @@ def successor(cls: type[Object], tag: str) -> Successor | None:
     """Return what replaces an old tag in objects of a class; None for a tag that no version had."""
     specs = get_field_specs(cls)
     for base in cls.__mro__:
-        known = _OLD.get(base.__name__, {}).get(tag)
+        candidate = _OLD.get(base.__name__, {}).get(tag)
         # The successor must be a property of this class: derived classes may lack it.
-        if known is not None and (known.tag is None or known.tag in specs):
-            return known
+        if candidate is not None and (candidate.tag is None or candidate.tag in specs):
+            return candidate
     # Connectors were renamed to sockets in version 30517.
     match = _CONNECTEE.fullmatch(tag)
     if match is not None and f"socket_{match[1]}" in specs:

@@ -48,8 +48,8 @@ def format_rule_page(rule: Rule) -> str:
 
 def format_group_page(group: Rule) -> str:
     """Return the common page of the rules of a group as Markdown."""
-    summary, what, why = cleandoc(group.check.__doc__ or "").split("\n\n")[:3]
-    return f"# {group.name} ({group.code})\n\n{summary}\n\n{what}\n\n{why}"
+    summary, explanation, reason = cleandoc(group.check.__doc__ or "").split("\n\n")[:3]
+    return f"# {group.name} ({group.code})\n\n{summary}\n\n{explanation}\n\n{reason}"
 
 
 def describe_severity(rule: Rule) -> str:
@@ -83,14 +83,16 @@ def format_index() -> str:
         ]
     rows += ["", "## Thresholds", "", "Under `[tool.osimlite.thresholds]`:", ""]
     rows += ["| Name | Default | Unit | Rule | Meaning |", "|---|---|---|---|---|"]
-    seen: dict[str, list[str]] = {}
+    codes_by_name: dict[str, list[str]] = {}
     for rule in all_rules():
         for threshold in rule.thresholds:
-            seen.setdefault(threshold.name, []).append(rule.code)
-    known = {threshold.name: threshold for rule in all_rules() for threshold in rule.thresholds}
+            codes_by_name.setdefault(threshold.name, []).append(rule.code)
+    thresholds = {
+        threshold.name: threshold for rule in all_rules() for threshold in rule.thresholds
+    }
     rows += [
-        f"| {name} | {known[name].default:g} | {known[name].unit} | {', '.join(codes)} | "
-        f"{known[name].meaning} |"
-        for name, codes in seen.items()
+        f"| {name} | {thresholds[name].default:g} | {thresholds[name].unit} | {', '.join(codes)} | "
+        f"{thresholds[name].meaning} |"
+        for name, codes in codes_by_name.items()
     ]
     return "\n".join(rows) + "\n"

@@ -111,11 +111,11 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
         subject: the check target.
         frame: the frame.
     """
-    pose, seen = FramePose(), 0
+    pose, depth = FramePose(), 0
     # The bound ends a chain of frames that forms a loop.
-    while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
+    while isinstance(frame, PhysicalOffsetFrame) and depth < 100:
         pose = make_offset(frame.orientation, frame.translation).compose(pose)
-        frame, seen = subject.target_of(frame, "socket_parent"), seen + 1
+        frame, depth = subject.target_of(frame, "socket_parent"), depth + 1
     return (frame, pose) if isinstance(frame, (Body, Ground)) else None
 
 
@@ -177,15 +177,17 @@ def compute_poses(
                 for item in link.joint.coordinates
             ):
                 continue
-            across = (
+            joint_pose = (
                 parent[1]
                 .compose(_compute_joint_pose(link.joint, motions[id(link.joint)], values))
                 .compose(child[1].inverse())
             )
             # A joint whose child is known is passed backwards, by the inverse of its transform.
-            end, step = (child[0], across) if parent[0] is base else (parent[0], across.inverse())
-            poses[id(end)] = poses[id(base)].compose(step)
-            pending.append(end)
+            next_base, step = (
+                (child[0], joint_pose) if parent[0] is base else (parent[0], joint_pose.inverse())
+            )
+            poses[id(next_base)] = poses[id(base)].compose(step)
+            pending.append(next_base)
     return poses
 
 
@@ -213,17 +215,17 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
         if is_a(joint, "CustomJoint"):
             axes = [*enumerate(list_axes(cast("CustomJoint", joint)))]
             functions = [_make_function(axis, rough) for _, axis in axes]
-            known = [function for function in functions if function is not None]
-            if len(known) == len(axes):
+            known_functions = [function for function in functions if function is not None]
+            if len(known_functions) == len(axes):
                 result[id(joint)] = [
                     _JointMotion(
-                        place < 3,
+                        index < 3,
                         # OpenSim normalizes axes; a zero axis stays zero.
                         divide(axis.axis, norm(axis.axis) or 1.0),
                         [] if isinstance(axis.function, Constant) else axis.names,
                         function,
                     )
-                    for (place, axis), function in zip(axes, known, strict=True)
+                    for (index, axis), function in zip(axes, known_functions, strict=True)
                 ]
         elif (
             joint.moves is not None
@@ -261,23 +263,24 @@ def _make_function(axis: TransformAxis, rough: bool) -> SmoothFunction | None:
 
 
 def _compute_joint_pose(
-    joint: Joint, motions: list[_JointMotion], given: Mapping[str, float] | None
+    joint: Joint, motions: list[_JointMotion], values_by_name: Mapping[str, float] | None
 ) -> FramePose:
     """Return the pose of the child frame of a joint in its parent frame."""
     values = {
-        item.name: (given or {}).get(item.name, item.default_value) for item in joint.coordinates
+        item.name: (values_by_name or {}).get(item.name, item.default_value)
+        for item in joint.coordinates
     }
-    axes, place = (X, Y, Z), ZERO
+    axes, position = (X, Y, Z), ZERO
     for motion in motions:
         amount = motion.amount(values)
         if motion.turns and amount:
             axes = multiply_rotations(axes, rotation_about_axis(motion.axis, *_sine_cosine(amount)))
         elif amount:
-            place = add_scaled(place, amount, motion.axis)
+            position = add_scaled(position, amount, motion.axis)
     # OpenSim places the child on the ellipsoid where the rotated z axis points.
     if isinstance(joint, EllipsoidJoint):
-        place = multiply_elementwise(joint.radii_x_y_z, axes[2])
-    return FramePose(axes, place)
+        position = multiply_elementwise(joint.radii_x_y_z, axes[2])
+    return FramePose(axes, position)
 
 
 def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:

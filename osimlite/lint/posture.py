@@ -44,13 +44,13 @@ def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[in
         The poses by the identity of the body.
     """
     angles = find_angles(setup)
-    turn = (
+    radians_per_unit = (
         math.pi / 180.0
         if isinstance(motion.header, StorageHeader) and motion.header.in_degrees
         else 1.0
     )
     values = {
-        name: value * turn if name in angles else value
+        name: value * radians_per_unit if name in angles else value
         for name, value in zip(
             map(coordinate_name, motion.columns), motion.read_row(time)[1:], strict=False
         )

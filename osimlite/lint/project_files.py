@@ -39,7 +39,7 @@ def is_opensim_xml(beginning: bytes) -> bool:
         return True
     open_tags: list[str] = []
     evidence: set[tuple[str, str]] = set()
-    for number, (closing, name, empty) in enumerate(
+    for number, (closing, name, is_empty) in enumerate(
         result for result in _TAGS.findall(text) if result[1]
     ):
         tag = name.rpartition(":")[2]
@@ -55,38 +55,40 @@ def is_opensim_xml(beginning: bytes) -> bool:
             # A single property could be an accident.
             if len(evidence) > 1:
                 return True
-        if not empty:
+        if not is_empty:
             open_tags.append(tag)
     return False
 
 
-def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
+def find_misspelt_name(word: str, candidates: Iterable[str]) -> str | None:
     """Return the known name that differs from a word in letter case and at most two letters; None without one.
 
     Args:
         word: the word.
-        known: known names.
+        candidates: known names.
     """
-    lower = word.lower()
+    lower_word = word.lower()
     # Names of fewer than eight letters differ from many words by two letters.
     if len(word) < 8:
-        return next((name for name in known if name.lower() == lower), None)
-    letters = set(lower)
+        return next((name for name in candidates if name.lower() == lower_word), None)
+    letters = set(lower_word)
     # Each of two changes replaces at most one letter by another. Hardly a name passes, and importing
     # rapidfuzz takes as long as reading a small file.
-    near = [
+    similar_names = [
         name
-        for name in known
+        for name in candidates
         if abs(len(name) - len(word)) <= 2 and len(letters.symmetric_difference(name.lower())) <= 4
     ]
-    if not near:
+    if not similar_names:
         return None
-    if word in near:
+    if word in similar_names:
         return word
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
 
-    result = extractOne(word, near, scorer=OSA.distance, processor=str.lower, score_cutoff=2)
+    result = extractOne(
+        word, similar_names, scorer=OSA.distance, processor=str.lower, score_cutoff=2
+    )
     return result[0] if result else None
 
 
@@ -104,9 +106,9 @@ def _class_name(tag: str) -> str | None:
     from osimlite.io.document.upgrade.class_names import RENAMED
     from osimlite.schema.registry import MODULES
 
-    known = {**{name: name for name in MODULES}, **RENAMED}
-    result = tag if tag in known else find_misspelt_name(tag, known)
-    return None if result is None else known[result]
+    class_names = {**{name: name for name in MODULES}, **RENAMED}
+    result = tag if tag in class_names else find_misspelt_name(tag, class_names)
+    return None if result is None else class_names[result]
 
 
 @cache
@@ -156,12 +158,14 @@ def find_project_files(
         OsimliteError: a folder contains no OpenSim file.
     """
     result: list[str] = []
-    others: list[str] = [] if passed is None else passed
+    skipped: list[str] = [] if passed is None else passed
     for path in paths:
         if os.path.isdir(path):
-            named = (file for file in Path(path).rglob("*.*") if file.suffix.lower() in suffixes)
-            inside = sorted(str(file) for file in named if not file.is_dir())
-            below = [file for file in inside if is_opensim_file(file)]
+            matching_files = (
+                file for file in Path(path).rglob("*.*") if file.suffix.lower() in suffixes
+            )
+            folder_files = sorted(str(file) for file in matching_files if not file.is_dir())
+            below = [file for file in folder_files if is_opensim_file(file)]
             if not below:
                 raise OsimliteError(
                     f"no OpenSim file in this folder: no {', '.join(suffixes[:-1])} or "
@@ -169,7 +173,7 @@ def find_project_files(
                     file=str(path),
                 )
             result += below
-            others += sorted({*inside}.difference(below))
+            skipped += sorted({*folder_files}.difference(below))
         elif (
             str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved
         ):
@@ -177,7 +181,7 @@ def find_project_files(
         elif not only_ours or is_opensim_file(str(path)):
             result.append(str(path))
         else:
-            others.append(str(path))
+            skipped.append(str(path))
     # Of a file that is named twice the first spelling of its path remains.
     return list({os.path.abspath(file): file for file in reversed(result)}.values())[::-1]
 

@@ -166,27 +166,27 @@ class Rule:
             return self.fault.page(f"{self.code[:-2]} {self.group}")
         # A page has exactly four parts separated by blank lines, as `rule` in CONTRIBUTING.md says;
         # a test checks each.
-        summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
-        fence, *lines, end = example.splitlines()
+        summary, explanation, reason, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
+        fence, *lines, closing_fence = example.splitlines()
         # The lines with "-" are the example that fails, those with "+" the corrected one, and
         # others belong to both.
-        fails, fixed = (
+        fails, corrected = (
             "\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-"
         )
         return (
-            f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n## "
-            f"Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{fixed}\n{end}"
+            f"{summary}\n\n## What it does\n{explanation}\n\n## Why is this bad\n{reason}\n\n## "
+            f"Example\n{fence}\n{fails}\n{closing_fence}\n\n## Use instead\n{fence}\n{corrected}\n{closing_fence}"
         )
 
     @property
     def summary(self) -> str:
         """The first line of the page."""
-        told = (
+        summary = (
             self.fault.summary
             if self.fault is not None
             else (self.check.__doc__ or "").partition("\n")[0]
         )
-        return told.rstrip(".")
+        return summary.rstrip(".")
 
     def severity_in(self, version: int | None) -> Severity:
         """Return the severity of findings in a document of a version; None stands for the current version."""
@@ -233,20 +233,21 @@ def rule(
     """
 
     def register(check: Check) -> Check:
-        whole = Rule(code, name, severity, check, before, thresholds, fixes, about)
+        group_rule = Rule(code, name, severity, check, before, thresholds, fixes, about)
         if not faults:
-            _register_rule(_RULES, whole)
+            _register_rule(_RULES, group_rule)
             return check
-        _register_rule(_GROUPS, whole)
+        _register_rule(_GROUPS, group_rule)
         for fault in parse_faults(faults, frames or {}):
-            own: Any = {
+            fault_fields: Any = {
                 "code": code + fault.number,
                 "name": fault.name,
                 "fixes": fault.fixes,
                 "group": name,
             }
             _register_rule(
-                _RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own)
+                _RULES,
+                replace(group_rule, severity=Severity(fault.severity), fault=fault, **fault_fields),
             )
         return check
 

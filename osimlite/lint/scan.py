@@ -91,8 +91,8 @@ class TableRows:
         """Return the line of a row; lines count from 1, rows from 0."""
         # `lines` has one entry for each jump (blank lines, comments); a search from the end finds
         # the jump before this row.
-        first = next((place for place in reversed(self.lines) if place[0] <= row), (0, 0))
-        return first[1] + row - first[0]
+        jump = next((entry for entry in reversed(self.lines) if entry[0] <= row), (0, 0))
+        return jump[1] + row - jump[0]
 
 
 BLOCK = 16_000
@@ -144,12 +144,12 @@ class RowScanner:
             self.rows.unseen = set(range((self.cells - 2) // 3))
             # Before the first frame OpenSim passes over lines that have no number of one.
             frame = _FRAME.search(data, start)
-            first = frame.start() if frame else len(data)
-            start, line = first, line + data.count(b"\n", start, first)
+            first_frame = frame.start() if frame else len(data)
+            start, line = first_frame, line + data.count(b"\n", start, first_frame)
         layout = MARKERS if self.markers else VECTORS if self.parts > 1 else ROWS
         # The time is one number, also of vectors.
         cells = [b"0", *[b",".join([b"0"] * self.parts)] * (self.cells - 1)]
-        whole = (b"\t" if self.markers else b"").join(cells)
+        plain_shape = (b"\t" if self.markers else b"").join(cells)
         for block in _split_blocks(data, start):
             lines = block.split(b"\n")
             # Each line of a block ends with a line feed, so that the last piece is empty.
@@ -162,15 +162,15 @@ class RowScanner:
                 else (b"!\n" * len(lines), False)
             )
             # The usual case: a block of rows of plain numbers is recognised by one comparison.
-            if looks == (whole + b"\n") * len(lines):
-                self._note_rows(lines, [whole] * len(lines), line, zeros)
+            if looks == (plain_shape + b"\n") * len(lines):
+                self._note_rows(lines, [plain_shape] * len(lines), line, zeros)
             else:
                 forms = looks.split(b"\n")
                 # Where markers were not seen, a good row has another form than a whole one.
                 kinds = [
                     form
                     and (
-                        form == whole
+                        form == plain_shape
                         or (self.markers and _find_seen_markers(form, self.cells) is not None)
                     )
                     for form in forms
@@ -178,15 +178,17 @@ class RowScanner:
                 # Runs of valid rows are recorded together; each kind is True, False, or the empty
                 # form of a blank line.
                 for kind, group in groupby(range(len(lines)), kinds.__getitem__):
-                    places = list(group)
+                    indices = list(group)
                     if kind:
-                        part = slice(places[0], places[-1] + 1)
-                        self._note_rows(lines[part], forms[part], line + places[0], zeros)
+                        selection = slice(indices[0], indices[-1] + 1)
+                        self._note_rows(
+                            lines[selection], forms[selection], line + indices[0], zeros
+                        )
                     elif kind is False:
-                        for place in places:
-                            self.examine_odd_line(lines[place], line + place)
+                        for index in indices:
+                            self.examine_odd_line(lines[index], line + index)
                     elif self.rows.count:
-                        self._note("blank", 0, line + places[0], 0, b"", times=len(places))
+                        self._note("blank", 0, line + indices[0], 0, b"", times=len(indices))
             line += len(lines)
         # Without rows every marker would be missing, which is not what is wrong with such a table.
         if not self.rows.count:
@@ -228,20 +230,26 @@ class RowScanner:
 
     def _read_marker_times(self, lines: list[bytes], line: int) -> list[float]:
         """Return the times of frames; a missing time becomes the next number after the previous time."""
-        heads = [text.split(b"\t", 2)[:2] for text in lines]
+        leading_cells = [text.split(b"\t", 2)[:2] for text in lines]
         # One comparison of lists is faster than a check of each frame number.
-        if [frame for frame, _ in heads] != [
-            b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)
+        if [frame for frame, _ in leading_cells] != [
+            b"%d" % (self._frame + number) for number in range(1, len(leading_cells) + 1)
         ]:
-            for number, (frame, _) in enumerate(heads, line):
+            for number, (frame, _) in enumerate(leading_cells, line):
                 self._expect_frame(frame.strip(), number)
         else:
-            self._frame += len(heads)
-        times = [float(moment.strip() or b"nan") for _, moment in heads]
+            self._frame += len(leading_cells)
+        times = [float(moment.strip() or b"nan") for _, moment in leading_cells]
         for number, time in enumerate(times):
             # Only NaN differs from itself.
             if time != time:
-                self._note("time", 1, line + number, len(heads[number][0]) + 1, heads[number][1])
+                self._note(
+                    "time",
+                    1,
+                    line + number,
+                    len(leading_cells[number][0]) + 1,
+                    leading_cells[number][1],
+                )
                 times[number] = nextafter(
                     times[number - 1] if number else self._get_last_time(), inf
                 )
@@ -254,13 +262,13 @@ class RowScanner:
         for number, cell in enumerate(cells[: self.cells]):
             if number > 1 and number % 3 == 2:
                 # Cells 0 and 1 are the frame and the time; coordinates of markers start at cell 2.
-                place = [part.strip() for part in cells[number : number + 3]]
-                seen = [part.lower() not in (b"", b"nan") for part in place]
-                if any(seen) and not all(seen):
+                marker_cells = [part.strip() for part in cells[number : number + 3]]
+                is_present = [part.lower() not in (b"", b"nan") for part in marker_cells]
+                if any(is_present) and not all(is_present):
                     self._note("part", number, line, start, cell)
                 # What is left after removing zeros, points and signs is empty for a marker exactly
                 # at the origin.
-                elif all(seen) and not b"".join(place).strip(b"0.-+"):
+                elif all(is_present) and not b"".join(marker_cells).strip(b"0.-+"):
                     self._note("zero", number, line, start, cell)
             start += len(cell) + 1
 
@@ -377,10 +385,12 @@ class RowScanner:
         # After a wrong frame number the count continues from it: one shift is one finding.
         self._frame = number if number is not None else self._frame + 1
 
-    def _note_order(self, text: bytes, line: int, time: float, before: float) -> None:
-        place = _WORD.search(text, text.find(b"\t") if self.markers else 0)
-        start, word = (place.start(), place[0]) if place else (0, b"")
-        self._note("order", int(time < before), line, start, word, f"{time:.9g} {before:.9g}")
+    def _note_order(self, text: bytes, line: int, time: float, previous_time: float) -> None:
+        match = _WORD.search(text, text.find(b"\t") if self.markers else 0)
+        start, word = (match.start(), match[0]) if match else (0, b"")
+        self._note(
+            "order", int(time < previous_time), line, start, word, f"{time:.9g} {previous_time:.9g}"
+        )
 
     def _note(
         self,
@@ -395,12 +405,12 @@ class RowScanner:
         faults = self.rows.faults
         if (kind, number) in faults:
             # A fault in the same column is counted, not reported again.
-            known = faults[kind, number]
-            faults[kind, number] = known._replace(times=known.times + times)
+            fault = faults[kind, number]
+            faults[kind, number] = fault._replace(times=fault.times + times)
         else:
-            told = cell.decode("latin-1") if text is None else text
+            description = cell.decode("latin-1") if text is None else text
             faults[kind, number] = RowFault(
-                kind, number, line, start + 1, max(1, len(cell)), told, times
+                kind, number, line, start + 1, max(1, len(cell)), description, times
             )
 
 

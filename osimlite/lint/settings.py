@@ -84,9 +84,9 @@ def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
     parse_max_file_size(file, table)
     for key in table:
         if key not in _SETTINGS:
-            every = join_words(_SETTINGS, max_count=len(_SETTINGS))
+            setting_names = join_words(_SETTINGS, max_count=len(_SETTINGS))
             raise OsimliteError(
-                f"unknown setting '{key}'{suggest_name(key, _SETTINGS)} Settings are {every}",
+                f"unknown setting '{key}'{suggest_name(key, _SETTINGS)} Settings are {setting_names}",
                 file=str(file),
             )
     try:

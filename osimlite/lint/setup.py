@@ -57,8 +57,8 @@ class Setup(Subject):
 
     about: ClassVar[str] = "document"
 
-    def __init__(self, found: Survey, config: Config | None = None) -> None:
-        super().__init__(found, config)
+    def __init__(self, survey: Survey, config: Config | None = None) -> None:
+        super().__init__(survey, config)
         self._looked_at: dict[str, None] = {}
 
     def is_for(self, rule: Rule) -> bool:
@@ -97,8 +97,8 @@ class Setup(Subject):
     def setup_items(self) -> list[Object]:
         """Objects outside of any model in the document, in document order."""
         # A study of Moco may contain its model; rules for setups must not report on that.
-        inside = {id(part) for model in self.by_class.get(Model, ()) for part in model.walk()}
-        return [item for item in self.items if id(item) not in inside]
+        model_parts = {id(part) for model in self.by_class.get(Model, ()) for part in model.walk()}
+        return [item for item in self.items if id(item) not in model_parts]
 
     def find_having(self, *properties: str) -> Iterator[Any]:
         """Yield every object whose class has these properties, class by class."""
@@ -118,8 +118,8 @@ class Setup(Subject):
 
     def list_outside_paths(self) -> list[str] | None:
         """Return every path that the check looked at."""
-        known = super().list_outside_paths()
-        return None if known is None else [*known, *self._looked_at]
+        paths = super().list_outside_paths()
+        return None if paths is None else [*paths, *self._looked_at]
 
     # ------------------------------------------------------------------------------------------------- files
 
@@ -173,9 +173,9 @@ class Setup(Subject):
         """Tools in this folder, its parent, and folders beside and below, with the paths of their setups."""
         if self.folder is None:
             return []
-        here = self.folder.resolve()
+        folder = self.folder.resolve()
         return self._find_tools(
-            [here, here.parent, *list_folders(here), *list_folders(here.parent)]
+            [folder, folder.parent, *list_folders(folder), *list_folders(folder.parent)]
         )
 
     def _find_tools(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
@@ -205,12 +205,12 @@ class Setup(Subject):
         if _find_model_file(self.top) is not None:
             yield self.file, self.top
             return
-        here = os.path.realpath(self.file)
+        own_path = os.path.realpath(self.file)
         # Paths may differ by symbolic links and by "..".
         for file, top in self.neighbours:
             folder = os.path.dirname(file)
             if any(
-                os.path.realpath(os.path.join(folder, name)) == here
+                os.path.realpath(os.path.join(folder, name)) == own_path
                 for name in _list_read_files(top)
             ):
                 yield file, top
@@ -241,26 +241,30 @@ class Setup(Subject):
     def uses(self) -> list[Use]:
         """Every name that stands in the document, of a component or of something else."""
         result: list[Use] = []
-        named: dict[int, Reference | None] = {}
+        references_by_member: dict[int, Reference | None] = {}
         for item in self.setup_items:
             cls = type(item)
             # What is named in a setup is looked up in the model: nothing in the document owns it.
             owner: Any = item if self.tree is None else self.tree.model
-            names = named.get(id(item))
+            names = references_by_member.get(id(item))
             if item.name and (names is not None or cls.name_reference is not None):
                 result.append(Use(item, owner, get_name_spec(cls, names), item.name))
             for spec in get_member_specs(cls):
-                held = getattr(item, spec.name)
-                members = held if isinstance(held, list) else getattr(held, "objects", ())
-                named |= dict.fromkeys(map(id, members), spec.names)
+                property_value = getattr(item, spec.name)
+                members = (
+                    property_value
+                    if isinstance(property_value, list)
+                    else getattr(property_value, "objects", ())
+                )
+                references_by_member |= dict.fromkeys(map(id, members), spec.names)
             for spec in get_naming_specs(cls):
                 if names is not None and spec.reference.rule == names.rule:
                     spec = spec._replace(kind=names)
                 value = getattr(item, spec.name)
                 if isinstance(value, tuple):
                     result += [
-                        Use(item, owner, spec, word, position)
-                        for position, word in enumerate(value)
+                        Use(item, owner, spec, name, position)
+                        for position, name in enumerate(value)
                     ]
                 elif value:
                     result.append(Use(item, owner, spec, value))
@@ -292,12 +296,12 @@ class Setup(Subject):
     def is_bound(self, name: str) -> bool:
         """Return whether a coordinate of the model is locked, prescribed, or determined by others."""
         assert self.tree is not None
-        bound: Any = self.tree.find_by_class("CoordinateCouplerConstraint").values()
+        couplers: Any = self.tree.find_by_class("CoordinateCouplerConstraint").values()
         # OpenSim determines the values of all of these itself, so no tool can drive such a
         # coordinate.
-        item = self.tree.find_by_class("Coordinate").get(name)
-        held = any(getattr(item, flag, False) for flag in ("locked", "prescribed"))
-        return held or name in {str(coupler.dependent_coordinate_name) for coupler in bound}
+        coordinate = self.tree.find_by_class("Coordinate").get(name)
+        is_fixed = any(getattr(coordinate, flag, False) for flag in ("locked", "prescribed"))
+        return is_fixed or name in {str(coupler.dependent_coordinate_name) for coupler in couplers}
 
     @cached_property
     def added_sets(self) -> list[tuple[str, Object]]:
@@ -312,31 +316,32 @@ class Setup(Subject):
 
     def find_writer(self, path: str) -> str | None:
         """Return another setup of the project that writes a file; None without one."""
-        wanted = os.path.realpath(path)
-        around = self._find_tools(list(Path(wanted).parents)[:3])
-        named: dict[int, str] = {}
+        target = os.path.realpath(path)
+        around = self._find_tools(list(Path(target).parents)[:3])
+        files_by_name_length: dict[int, str] = {}
         for file, top in dict(self.neighbours + around).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
                 # Only other setups are searched.
                 continue
             folder = os.path.dirname(file)
             results = getattr(top, "results_directory", "") or "."
-            within = os.path.realpath(os.path.join(folder, results))
+            results_folder = os.path.realpath(os.path.join(folder, results))
             # Tools that run through time call their tables by their own name, which may begin with
             # that of another.
-            is_own = os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(
-                f"{top.name}_"
-            )
-            if is_own and not wanted.endswith(".osim"):
-                named[len(top.name)] = file
+            is_own = os.path.dirname(target) == results_folder and os.path.basename(
+                target
+            ).startswith(f"{top.name}_")
+            if is_own and not target.endswith(".osim"):
+                files_by_name_length[len(top.name)] = file
             for item in top.walk():
                 for _, name in list_files(item, "output-file"):
-                    if wanted in (
-                        os.path.realpath(os.path.join(place, name)) for place in (folder, within)
+                    if target in (
+                        os.path.realpath(os.path.join(base, name))
+                        for base in (folder, results_folder)
                     ):
                         return file
         # Of several names that fit, the longest is the most specific.
-        return named[max(named)] if named else None
+        return files_by_name_length[max(files_by_name_length)] if files_by_name_length else None
 
 
 def is_given(name: str) -> bool:

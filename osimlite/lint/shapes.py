@@ -45,24 +45,26 @@ class RowLayout(NamedTuple):
     hidden: bytes
 
 
-def _make_layout(kept: bytes, *more: tuple[bytes, int, int]) -> RowLayout:
+def _make_layout(kept_separators: bytes, *more_characters: tuple[bytes, int, int]) -> RowLayout:
     """Return a layout with some separators kept in the shapes.
 
     Some characters are said to follow on each other never, though they may: that tells separators
     from each other.
     """
-    codes, shown = bytearray(256), bytearray(256)
-    for characters, what, never in (*_CHARACTERS, *more):
+    codes, shown_bytes = bytearray(256), bytearray(256)
+    for characters, code, no_repeat in (*_CHARACTERS, *more_characters):
         for character in characters:
-            codes[character] = what | never << 4
-    shown[1] = ord("0")
-    for separator in b"\n" + kept:
-        shown[codes[separator] & _LAYOUT] = separator
+            codes[character] = code | no_repeat << 4
+    shown_bytes[1] = ord("0")
+    for separator in b"\n" + kept_separators:
+        shown_bytes[codes[separator] & _LAYOUT] = separator
     for value in range(256):
         if value & 2:
-            shown[value] = 10 if shown[value ^ 2] == 10 else ord("!")
+            shown_bytes[value] = 10 if shown_bytes[value ^ 2] == 10 else ord("!")
     return RowLayout(
-        bytes(codes), bytes(shown), bytes(value for value in range(256) if not shown[value])
+        bytes(codes),
+        bytes(shown_bytes),
+        bytes(value for value in range(256) if not shown_bytes[value]),
     )
 
 
@@ -101,23 +103,23 @@ def compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
     solid = ones ^ spaces
     behind_space = spaces << 8 | 1
     others = solid ^ points
-    runs = (
+    run_ends = (
         others << 8
     ) - others  # all bits of every other character: a mark that is added is carried to their end
     # Two characters that must not follow on each other, and two points in one number.
-    wrong = (text << 4 | _POWER) & text & fifteens | (points << 8) + runs & points
+    invalid = (text << 4 | _POWER) & text & fifteens | (points << 8) + run_ends & points
     powers = text >> 1 & ones if text & twos else 0
     if powers:
         # Neither a point nor another power stands in an exponent.
         others ^= powers
-        wrong |= (powers << 8) + (others << 8) - others & (points | powers)
+        invalid |= (powers << 8) + (others << 8) - others & (points | powers)
     last_points = points & (spaces | powers) >> 8
     if last_points:
         # Before the point must be a digit then: neither point nor sign, and no sign may follow on
         # it.
         digits = (text >> 4 & solid | points | text & ones) ^ (points | text & ones)
-        wrong |= last_points ^ (last_points & digits << 8)
-    if layout is ROWS and not wrong and not spaces & behind_space:
+        invalid |= last_points ^ (last_points & digits << 8)
+    if layout is ROWS and not invalid and not spaces & behind_space:
         # One separator between any two numbers: they tell how many there are.
         return block.translate(_AS_NUMBERS, _NO_SEPARATORS).replace(b"\n", b"0\n"), False
     starts = behind_space & solid
@@ -127,15 +129,15 @@ def compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
         nothing = solid ^ digits ^ (digits & text)
         zeros = (starts & nothing) + (nothing << 8) - nothing & spaces
     marks = starts | text & spaces * _LAYOUT
-    if wrong:
-        wrong = (wrong | wrong >> 1 | wrong >> 2 | wrong >> 3) & ones
-        marks |= (wrong & solid | (wrong & spaces) >> 8) << 1
-    shown = marks.to_bytes(len(block) + 1, "little").translate(layout.shown, layout.hidden)
-    return shown[:-1], bool(zeros)
+    if invalid:
+        invalid = (invalid | invalid >> 1 | invalid >> 2 | invalid >> 3) & ones
+        marks |= (invalid & solid | (invalid & spaces) >> 8) << 1
+    shapes = marks.to_bytes(len(block) + 1, "little").translate(layout.shown, layout.hidden)
+    return shapes[:-1], bool(zeros)
 
 
 @lru_cache(maxsize=4)
-def _make_masks(bits: int) -> tuple[int, int, int]:
-    """Return a 1 in each of 2**bits + 1 bytes, then 2 and 15 in each."""
-    ones = int.from_bytes(b"\1" * ((1 << bits) + 1), "little")
+def _make_masks(exponent: int) -> tuple[int, int, int]:
+    """Return a 1 in each of 2**exponent + 1 bytes, then 2 and 15 in each."""
+    ones = int.from_bytes(b"\1" * ((1 << exponent) + 1), "little")
     return ones, 2 * ones, 15 * ones

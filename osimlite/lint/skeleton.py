@@ -59,10 +59,10 @@ class Skeleton:
         while pending:
             base = pending.pop(0)
             for link in self.find_joints(base):
-                for end in (link.parent_base, link.child_base):
-                    if end is not None and id(end) not in depth:
-                        depth[id(end)] = depth[id(base)] + 1
-                        pending.append(end)
+                for body in (link.parent_base, link.child_base):
+                    if body is not None and id(body) not in depth:
+                        depth[id(body)] = depth[id(base)] + 1
+                        pending.append(body)
         return depth
 
     def find_joints(self, base: Component) -> list[JointLink]:
@@ -108,8 +108,8 @@ def grow_tree(subject: Subject) -> TreeGrowth:
         )
         for link, parent, child in bones.iterate_pairs()
     ]
-    joined = {path for edge in edges for path in edge[:2]}
-    edges += [_SkeletonEdge(ground, path) for path in masses if path not in joined]
+    joined_paths = {path for edge in edges for path in edge[:2]}
+    edges += [_SkeletonEdge(ground, path) for path in masses if path not in joined_paths]
     order: dict[str, _SkeletonEdge] = {}
     while True:
         branches, loops = spanning_tree(edges, ground, masses)
@@ -180,13 +180,15 @@ def has_unknown_joints(subject: Subject) -> bool:
 
 def find_base(subject: Subject, frame: Component | None) -> Component | None:
     """Return the body or ground that a frame is fixed to through offset frames; cached for each frame."""
-    known = cast("dict[int, Component | None]", subject.cache.setdefault("bases", {}))
-    way: set[int] = set()
-    while frame is not None and not isinstance(frame, (Body, Ground)) and id(frame) not in known:
-        if id(frame) in way:
+    known_bases = cast("dict[int, Component | None]", subject.cache.setdefault("bases", {}))
+    passed_frames: set[int] = set()
+    while (
+        frame is not None and not isinstance(frame, (Body, Ground)) and id(frame) not in known_bases
+    ):
+        if id(frame) in passed_frames:
             frame = None
             break
-        way.add(id(frame))
+        passed_frames.add(id(frame))
         if isinstance(frame, StationDefinedFrame):
             station = subject.target_of(frame, "socket_point_a")
             frame = (
@@ -195,7 +197,7 @@ def find_base(subject: Subject, frame: Component | None) -> Component | None:
         else:
             is_laid = "socket_parent" in type(frame).field_specs()
             frame = subject.target_of(frame, "socket_parent") if is_laid else None
-    base = known.get(id(frame), frame)
-    # All that were passed on the way are fixed to the same.
-    known.update(dict.fromkeys(way, base))
+    base = known_bases.get(id(frame), frame)
+    # All frames of the chain are fixed to the same base.
+    known_bases.update(dict.fromkeys(passed_frames, base))
     return base

@@ -62,7 +62,7 @@ class Subject(CheckTarget):
     check may find more.
     """
 
-    def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
+    def __init__(self, content: Survey | Model, config: Config | None = None) -> None:
         super().__init__(config)
         self.model: Model | None
         self.top: Object | None
@@ -73,20 +73,20 @@ class Subject(CheckTarget):
         self.cache: dict[object, object] = {}
         self.cache_folder: Path | None = None
         self.needs_remeasuring = False
-        if isinstance(found, Model):
-            self.model = self.top = found
+        if isinstance(content, Model):
+            self.model = self.top = content
         else:
-            self.source = found.source
-            self.file, self.data = found.source.file, found.source.data
-            self.faults = found.faults
-            self.sure_until = found.sure_until
-            self.top = found.document.top if found.document else None
+            self.source = content.source
+            self.file, self.data = content.source.file, content.source.data
+            self.faults = content.faults
+            self.sure_until = content.sure_until
+            self.top = content.document.top if content.document else None
             self.model = self.top if isinstance(self.top, Model) else None
-            self.notes = found.document.notes if found.document else []
-            self.version = found.document.version if found.document else None
-            self.changes = found.document.changes if found.document else []
+            self.notes = content.document.notes if content.document else []
+            self.version = content.document.version if content.document else None
+            self.changes = content.document.changes if content.document else []
             self.upgraded = bool(self.changes)
-            self.refusals = found.document.refusals if found.document else []
+            self.refusals = content.document.refusals if content.document else []
             if self.sure_until is not None:
                 # The reader guesses after a syntax error; findings on guesses would mislead.
                 self.notes = [note for note in self.notes if self._is_sure(note)]
@@ -193,8 +193,8 @@ class Subject(CheckTarget):
 
     def resolution(self, use: Use) -> Resolution:
         """Return what a reference resolves to."""
-        known = self._resolutions.get(id(use))
-        return self.tree.resolve(use) if known is None else known
+        resolution = self._resolutions.get(id(use))
+        return self.tree.resolve(use) if resolution is None else resolution
 
     @cached_property
     def has_unknown(self) -> bool:
@@ -358,17 +358,18 @@ class Subject(CheckTarget):
         if folder is None or self.model is None:
             return []
         # OpenSim looks for data files in the working folder as well.
-        places = [
-            os.path.abspath(folder / place) for place in (".", "Geometry", *self.config.mesh_paths)
+        folders = [
+            os.path.abspath(folder / folder_name)
+            for folder_name in (".", "Geometry", *self.config.mesh_paths)
         ]
-        places.append(os.getcwd())
+        folders.append(os.getcwd())
         result: dict[str, None] = {}
         for cls, items in self.by_class.items():
             for spec in get_file_specs(cls, "file"):
                 for item in items:
                     name = getattr(item, spec.name)
                     if name:
-                        paths = [os.path.join(place, name) for place in places]
+                        paths = [os.path.join(folder_name, name) for folder_name in folders]
                         result |= dict.fromkeys(paths)
                         if not any(map(os.path.isfile, paths)):
                             # Another file in the same folder may be what was meant.

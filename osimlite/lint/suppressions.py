@@ -52,17 +52,17 @@ def read_suppressions(source: Source) -> list[Suppression]:
     result = []
     root = source.spans[0].start if source.spans else len(source.text)
     for match in _COMMENT.finditer(source.text):
-        place = source.position(match.start(), match.end() - match.start())
+        position = source.position(match.start(), match.end() - match.start())
         line_before = source.text[source.text.rfind("\n", 0, match.start()) + 1 : match.start()]
-        first = last = place.line
+        first_line = last_line = position.line
         if match.start() < root:
-            first, last = 1, LAST_LINE
+            first_line, last_line = 1, LAST_LINE
         elif not line_before.strip():
             number = bisect_left(source.spans, match.end(), key=attrgetter("start"))
             if number < len(source.spans):
                 following = source.spans[number]
-                last = source.position(following.end - 1).line
-        result.append(Suppression(place, _split_codes(match[1]), first, last))
+                last_line = source.position(following.end - 1).line
+        result.append(Suppression(position, _split_codes(match[1]), first_line, last_line))
     return result
 
 

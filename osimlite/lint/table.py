@@ -71,28 +71,30 @@ class Table(CheckTarget):
         """Rows of the table with their faults, scanned on first access."""
         header, cells = self.header, len(self.labels)
         # Where labels are missing or too many, the first row says how many cells a row has.
-        first = _ROW.search(self.data, header.rows)
+        first_row = _ROW.search(self.data, header.rows)
         if isinstance(header, MarkerHeader):
-            markers = (len(first[0].rstrip().split(b"\t")) - 2) // 3 if first else 0
-            said = self.entries["NumMarkers"].value.text if "NumMarkers" in self.entries else ""
-            cells = markers if str(markers) == said else cells
+            markers = (len(first_row[0].rstrip().split(b"\t")) - 2) // 3 if first_row else 0
+            declared_count = (
+                self.entries["NumMarkers"].value.text if "NumMarkers" in self.entries else ""
+            )
+            cells = markers if str(markers) == declared_count else cells
             return RowScanner(cells * 3 + 2, markers=True).scan(
                 self.data, header.rows, header.row_line
             )
         if not header.labels or "," in header.labels[0].text:
             return TableRows()
-        if first and str(len(first[0].split())) == header.value("nColumns"):
-            cells = len(first[0].split())
+        if first_row and str(len(first_row[0].split())) == header.value("nColumns"):
+            cells = len(first_row[0].split())
         return RowScanner(cells, header.parts).scan(self.data, header.rows, header.row_line)
 
     def iterate_rows(self, time: float) -> Iterator[list[bytes]]:
         """Yield the cells of the rows from a time on; the first is found by bisection."""
-        data, place = self.data, int(self.is_markers)
+        data, time_column = self.data, int(self.is_markers)
         low, high = self.header.rows, len(data)
         while high - low > 2000:
             middle = data.find(b"\n", (low + high) // 2, high) + 1
             cells = data[middle : middle + 200].split(None, 2) if middle else []
-            if len(cells) <= place or not parse_number(cells[place]) < time:
+            if len(cells) <= time_column or not parse_number(cells[time_column]) < time:
                 high = (low + high) // 2
             else:
                 low = middle
@@ -100,7 +102,7 @@ class Table(CheckTarget):
             end = data.find(b"\n", low) + 1 or len(data)
             line = data[low:end].rstrip(b"\r\n")
             cells = line.split(b"\t") if self.is_markers else line.split()
-            if len(cells) > place and parse_number(cells[place]) >= time:
+            if len(cells) > time_column and parse_number(cells[time_column]) >= time:
                 yield cells
             low = end
 
@@ -128,12 +130,12 @@ class Table(CheckTarget):
 
     def label_of(self, number: int) -> str:
         """Return the label of a column by its index; in a marker file that of its marker."""
-        place = (number - 2) // 3 if self.is_markers else number
+        index = (number - 2) // 3 if self.is_markers else number
         return (
             "Time"
-            if place < 0
-            else self.labels[place].text
-            if place < len(self.labels)
+            if index < 0
+            else self.labels[index].text
+            if index < len(self.labels)
             else str(number)
         )
 
@@ -141,8 +143,8 @@ class Table(CheckTarget):
         """Return the position of the time in the row of a line."""
         start = self.line_start(line)
         text = self.data[start : self.line_start(2, start)]
-        first, *rest = islice(_CELL.finditer(text), 2)
-        result = rest[0] if self.is_markers else first
+        first, *other_cells = islice(_CELL.finditer(text), 2)
+        result = other_cells[0] if self.is_markers else first
         return Position(line, result.start() + 1, len(result[0]))
 
     def suppressions(self) -> list[Suppression]:
@@ -150,13 +152,13 @@ class Table(CheckTarget):
         return [] if self.is_markers else read_header_suppressions(self.header.lines)
 
     def make_replacement(
-        self, at: Position, named: object, text: str, *, certain: bool
+        self, position: Position, expected: object, text: str, *, certain: bool
     ) -> Fix | None:
         """Return the fix that replaces a text in the header or among the labels; None if the encoding is unknown.
 
-        `named` is what stands there, or None for whatever does.
+        `expected` is what stands there, or None for whatever does.
         """
-        start = self.line_start(at.line)
+        start = self.line_start(position.line)
         line = self.data[start : self.line_start(2, start)].rstrip(b"\r\n")
         if start == 0 and line.startswith(MARK):
             start, line = len(MARK), line.removeprefix(MARK)
@@ -164,7 +166,10 @@ class Table(CheckTarget):
             letters = line.decode()
         except UnicodeDecodeError:
             return None
-        before, old = letters[: at.column - 1], letters[at.column - 1 :][: at.length]
+        before, old = (
+            letters[: position.column - 1],
+            letters[position.column - 1 :][: position.length],
+        )
         start += len(before.encode())
         safe = certain or text.lower() == old.lower()
         return Fix((Edit(start, start + len(old.encode()), text),), safe)

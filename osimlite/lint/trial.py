@@ -143,19 +143,21 @@ class Trial(CheckTarget):
         for number in self.numbers:
             if number.rule != rule.name or number.kind != kind:
                 continue
-            parts = [
+            limit_values = [
                 self.config.value_of(limit)
                 * (number.scale / 100.0 if limit.unit == "%" != number.unit else 1.0)
                 if isinstance(limit, Threshold)
                 else limit
                 for limit in limits
             ]
-            known = [limit for limit in parts if isfinite(limit)]
-            if not known:
+            finite_limits = [limit for limit in limit_values if isfinite(limit)]
+            if not finite_limits:
                 continue
-            good, bad = min(known), max(known)
+            good_limit, bad_limit = min(finite_limits), max(finite_limits)
             # NaN is within no limit.
-            verdict = GOOD if number.value <= good else OKAY if number.value <= bad else BAD
+            verdict = (
+                GOOD if number.value <= good_limit else OKAY if number.value <= bad_limit else BAD
+            )
             self.verdicts.append(
                 TrialVerdict(
                     rule.code,
@@ -163,8 +165,8 @@ class Trial(CheckTarget):
                     f"{STATISTICS.get(kind, '')}{number.of}",
                     number.value,
                     number.unit,
-                    good,
-                    bad,
+                    good_limit,
+                    bad_limit,
                     verdict,
                     source,
                     number.where,
@@ -174,11 +176,15 @@ class Trial(CheckTarget):
             )
             if verdict != GOOD:
                 unit = "" if not number.unit else f" {number.unit}" if number.unit != "%" else " %"
-                more = f", and more than {bad:.3g}{unit} is bad" if bad > good else ""
+                bad_note = (
+                    f", and more than {bad_limit:.3g}{unit} is bad"
+                    if bad_limit > good_limit
+                    else ""
+                )
                 report(
                     f"{STATISTICS.get(kind, '')}{number.of} is "
                     f"{_format_number(number.value)}{unit}{f' ({number.where})' if number.where else ''}: "
-                    f"up to {good:.3g}{unit} is good{more} ({source}); "
+                    f"up to {good_limit:.3g}{unit} is good{bad_note} ({source}); "
                     f"{f'{number.side}; ' if number.side else ''}{advice}",
                     at=number.at,
                     severity=None if verdict == BAD and number.is_final else Severity.INFO,

@@ -53,41 +53,49 @@ def format_value(value: object) -> str:
     return str(value) if value not in (None, "") else "nothing"
 
 
-def find_nearest_name(text: str, right: list[str]) -> str | None:
+def find_nearest_name(text: str, valid_texts: list[str]) -> str | None:
     """Return the nearest valid text; paths are compared by their last names. None if none is near.
 
     Args:
         text: wrong text.
-        right: valid texts.
+        valid_texts: valid texts.
     """
-    whole = find_nearest(text, right, cutoff=70)
-    last = text.rstrip("/").rpartition("/")[2]
-    by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
-    near = find_nearest(last, by_last, cutoff=70)
-    if near is None:
-        return whole
-    if whole is not None and whole.rpartition("/")[2] == near:
-        return whole
-    return by_last[near]
+    nearest_text = find_nearest(text, valid_texts, cutoff=70)
+    last_name = text.rstrip("/").rpartition("/")[2]
+    by_last = {word.rpartition("/")[2]: word for word in reversed(valid_texts)}
+    nearest_last_name = find_nearest(last_name, by_last, cutoff=70)
+    if nearest_last_name is None:
+        return nearest_text
+    if nearest_text is not None and nearest_text.rpartition("/")[2] == nearest_last_name:
+        return nearest_text
+    return by_last[nearest_last_name]
 
 
-def suggest_names(wrong: Iterable[str], right: Iterable[str]) -> str:
+def suggest_names(unknown_texts: Iterable[str], valid_texts: Iterable[str]) -> str:
     """Return a question with suggestions for wrong texts, to end a message; empty without suggestions.
 
     Args:
-        wrong: wrong texts.
-        right: valid texts.
+        unknown_texts: wrong texts.
+        valid_texts: valid texts.
     """
-    known = sorted(right)
-    near = [f"'{name}' for '{text}'" for text in wrong if (name := find_nearest_name(text, known))]
-    return f"; is it {join_words(near)}?" if near else ""
+    sorted_texts = sorted(valid_texts)
+    suggestions = [
+        f"'{name}' for '{text}'"
+        for text in unknown_texts
+        if (name := find_nearest_name(text, sorted_texts))
+    ]
+    return f"; is it {join_words(suggestions)}?" if suggestions else ""
 
 
-def pick_closest(text: str, right: list[str]) -> str:
+def pick_closest(text: str, candidates: list[str]) -> str:
     """Return the text that is most similar to another.
 
     Args:
         text: the text.
-        right: texts to choose from.
+        candidates: texts to choose from.
     """
-    return right[0] if len(right) == 1 else find_nearest(text, right, cutoff=0) or right[0]
+    return (
+        candidates[0]
+        if len(candidates) == 1
+        else find_nearest(text, candidates, cutoff=0) or candidates[0]
+    )

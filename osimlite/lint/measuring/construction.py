@@ -135,14 +135,18 @@ class _Construction:
             yield self.describe(error, Stage.ASSEMBLY if is_pose else Stage.MECHANISM)
             return
         for path, distance in error.errors.items():
-            what = self.tree.by_path.get(path)
-            name = f"{type(what).__name__} '{what.name}'" if what is not None else f"'{path}'"
+            component = self.tree.by_path.get(path)
+            name = (
+                f"{type(component).__name__} '{component.name}'"
+                if component is not None
+                else f"'{path}'"
+            )
             size = f"{distance:.3g}" if isfinite(distance) else "an unknown amount"
-            others = "" if len(error.errors) == 1 else f", with {len(error.errors) - 1} others"
+            suffix = "" if len(error.errors) == 1 else f", with {len(error.errors) - 1} others"
             yield Obstacle(
                 Stage.ASSEMBLY,
                 path,
-                f"no pose near the default one fulfils {name}{others}: the best is off by {size}",
+                f"no pose near the default one fulfils {name}{suffix}: the best is off by {size}",
             )
 
     def find_clamps(self, mechanism: Mechanism, q: Array) -> Iterator[Obstacle]:
@@ -220,12 +224,16 @@ class _Construction:
         for variable, rate in zip(system.state.variables, rates, strict=True):
             if not isfinite(rate):
                 owner, _, name = variable.path.rpartition("/")
-                what = self.tree.by_path.get(owner)
-                called = f"{type(what).__name__} '{what.name}'" if what is not None else owner
+                component = self.tree.by_path.get(owner)
+                owner_description = (
+                    f"{type(component).__name__} '{component.name}'"
+                    if component is not None
+                    else owner
+                )
                 yield Obstacle(
                     Stage.RATE,
                     owner,
-                    f"the rate of {name} of {called} is not finite where the model starts: "
+                    f"the rate of {name} of {owner_description} is not finite where the model starts: "
                     "OpenSim's integrator stops there unless muscles are equilibrated first",
                 )
 
@@ -247,8 +255,8 @@ class _Construction:
             # Other rules report NaN among the numbers of the mechanism.
             return
         for element in forces.elements:
-            alone = Forces((element,), controls=forces.controls)
-            if _is_computed(mechanism, alone, q, u):
+            single_force = Forces((element,), controls=forces.controls)
+            if _is_computed(mechanism, single_force, q, u):
                 continue
             component: Any = self.tree.by_path.get(element.path)
             kind = type(component).__name__ if component is not None else "force"
@@ -264,10 +272,10 @@ class _Construction:
         """Return an error of the builder as an obstacle, at the component that it names."""
         if isinstance(error, UnsupportedError):
             stage = Stage.UNSUPPORTED
-        known = self.tree.by_path
-        for named in _QUOTED_PATH.findall(error.message):
-            if not path and named in known:
-                path = named
+        components = self.tree.by_path
+        for quoted_path in _QUOTED_PATH.findall(error.message):
+            if not path and quoted_path in components:
+                path = quoted_path
         return Obstacle(stage, path, error.message)
 
 

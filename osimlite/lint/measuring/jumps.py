@@ -63,19 +63,24 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
         return
     values = _bisect_suspects(paths, suspects)
     sides = np.array(
-        [_compute_side_poses(item, value) for item, value in zip(suspects, values, strict=True)]
+        [
+            _compute_side_poses(candidate, value)
+            for candidate, value in zip(suspects, values, strict=True)
+        ]
     )
     sides = sides.reshape(2 * len(suspects), -1)
-    both = paths.system.measure_one_path([item.path for item in suspects for _ in range(2)], sides)
-    sizes = np.abs(np.diff(both.reshape(-1, 2), axis=1))[:, 0].tolist()
+    side_lengths = paths.system.measure_one_path(
+        [candidate.path for candidate in suspects for _ in range(2)], sides
+    )
+    sizes = np.abs(np.diff(side_lengths.reshape(-1, 2), axis=1))[:, 0].tolist()
     greatest: dict[int, int] = {}
     # Suspects are sorted by their excess, so a jump already found makes those with a smaller excess
     # unnecessary.
     for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
         suspect, values_of = suspects[k], suspects[k].sweep.values
-        known = sizes[greatest[suspect.path]] if suspect.path in greatest else MIN_JUMP_M
+        least_size = sizes[greatest[suspect.path]] if suspect.path in greatest else MIN_JUMP_M
         is_inside = values_of[0] + SIDE_OFFSET < values[k] < values_of[-1] - SIDE_OFFSET
-        if is_inside and sizes[k] > known and not suspect.excess < known:
+        if is_inside and sizes[k] > least_size and not suspect.excess < least_size:
             greatest[suspect.path] = k
     names = [*paths.routes]
     for path, k in greatest.items():
@@ -111,36 +116,52 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
 
 def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[float]:
     """Return the value in each interval at which the length changes most beyond the usual change."""
-    low, high = np.array([item.ends for item in suspects]).T
-    first, last, active = low, high, high - low > SIDE_OFFSET
-    begin, end = (np.array([item.sweep.poses[item.pose + k] for item in suspects]) for k in (0, 1))
-    rate = np.array([item.usual for item in suspects]) / np.where(active, high - low, 1.0)
-    before, after = (
-        np.array([item.sweep.lengths[item.pose + k, item.path] for item in suspects])
+    low, high = np.array([suspect.ends for suspect in suspects]).T
+    start, stop, active = low, high, high - low > SIDE_OFFSET
+    begin, end = (
+        np.array([suspect.sweep.poses[suspect.pose + k] for suspect in suspects]) for k in (0, 1)
+    )
+    rate = np.array([suspect.usual for suspect in suspects]) / np.where(active, high - low, 1.0)
+    low_lengths, high_lengths = (
+        np.array([suspect.sweep.lengths[suspect.pose + k, suspect.path] for suspect in suspects])
         for k in (0, 1)
     )
     # Bisect all intervals at once: keep the half in which the length deviates more from the linear
     # change that neighbouring intervals predict.
-    while places := np.flatnonzero(active).tolist():
+    while active_indices := np.flatnonzero(active).tolist():
         middle = 0.5 * (low + high)
-        part = (middle - first) / (last - first)
-        poses = (begin + part[:, None] * (end - begin))[places]
-        here = np.full(len(suspects), np.nan)
-        here[places] = paths.system.measure_one_path([suspects[k].path for k in places], poses)
+        fraction = (middle - start) / (stop - start)
+        poses = (begin + fraction[:, None] * (end - begin))[active_indices]
+        middle_lengths = np.full(len(suspects), np.nan)
+        middle_lengths[active_indices] = paths.system.measure_one_path(
+            [suspects[k].path for k in active_indices], poses
+        )
         smooth = rate * (middle - low)
-        is_before = np.abs(here - before - smooth) > np.abs(after - here - smooth)
+        is_before = np.abs(middle_lengths - low_lengths - smooth) > np.abs(
+            high_lengths - middle_lengths - smooth
+        )
         moves = active & is_before
-        high, after = np.where(moves, middle, high), np.where(moves, here, after)
+        high, high_lengths = (
+            np.where(moves, middle, high),
+            np.where(moves, middle_lengths, high_lengths),
+        )
         moves = active & ~is_before
-        low, before = np.where(moves, middle, low), np.where(moves, here, before)
+        low, low_lengths = (
+            np.where(moves, middle, low),
+            np.where(moves, middle_lengths, low_lengths),
+        )
         active = high - low > SIDE_OFFSET
-    return np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
+    return np.where(
+        [suspect.excess < inf for suspect in suspects], 0.5 * (low + high), low
+    ).tolist()
 
 
 def _compute_side_poses(suspect: JumpSuspect, value: float) -> Array:
     """Return the poses (2, n) on both sides of a value."""
-    beside = np.array([value - SIDE_OFFSET, value + SIDE_OFFSET])
-    return suspect.sweep.interpolate_poses(beside, suspect.sweep.find_poses_before(beside))
+    side_values = np.array([value - SIDE_OFFSET, value + SIDE_OFFSET])
+    return suspect.sweep.interpolate_poses(
+        side_values, suspect.sweep.find_poses_before(side_values)
+    )
 
 
 def _find_changed_parts(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:

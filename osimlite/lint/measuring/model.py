@@ -53,7 +53,7 @@ def measure_model(
     model: Model,
     *,
     compiles: bool,
-    known: tuple[Measures, Measures] | None = None,
+    earlier: tuple[Measures, Measures] | None = None,
     mechanism: Mechanism | None = None,
 ) -> Measures:
     """Measure the paths and muscles of a model.
@@ -62,7 +62,7 @@ def measure_model(
         model: the model.
         compiles: whether to compile kernels that are in no library or cache yet; for a model with
             few surfaces that takes longer than running them as Python.
-        known: earlier measurements when some paths differed or were missing, and those of them that
+        earlier: earlier measurements when some paths differed or were missing, and those of them that
             are still valid.
         mechanism: mechanism of the model; built by default.
 
@@ -75,7 +75,7 @@ def measure_model(
         SimulationError: the constraints allow no default pose, or there are no lengths in it.
         NoMachineCodeError: the model has many surfaces, and kernels run as Python only.
     """
-    before, still = known if known is not None else (None, None)
+    earlier_measures, unchanged_measures = earlier if earlier is not None else (None, None)
     # Without machine code, models with many surfaces are measured when it is there.
     if compiles and not has_machine_code():
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
@@ -83,7 +83,10 @@ def measure_model(
     code = None if compiles else READY_CODE
     # What an earlier measurement found at rest need not be measured again.
     paths = Paths(
-        model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism
+        model,
+        code=code,
+        left_out=unchanged_measures.swept if unchanged_measures is not None else (),
+        mechanism=mechanism,
     )
     has_surfaces = any(
         isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
@@ -94,11 +97,13 @@ def measure_model(
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
     looked_at = sweep_coordinates(
-        paths, start, set() if still is None else find_swept_coordinates(still)
+        paths,
+        start,
+        set() if unchanged_measures is None else find_swept_coordinates(unchanged_measures),
     )
-    if before is not None and {sweep.place for sweep in looked_at} != find_swept_coordinates(
-        before
-    ):
+    if earlier_measures is not None and {
+        sweep.place for sweep in looked_at
+    } != find_swept_coordinates(earlier_measures):
         # The earlier measurements used other poses; all paths must be measured in the same ones.
         return measure_model(model, compiles=compiles, mechanism=mechanism)
     starts, reaches = [], []
@@ -110,17 +115,17 @@ def measure_model(
         )
     )
     for fibers in find_fibers(model, paths.mechanism, ends):
-        length, ((shortest, short), (longest, long)) = ends[fibers.path]
+        length, ((shortest, shortest_pose), (longest, longest_pose)) = ends[fibers.path]
         begun = compute_start(fibers, length)
         starts += [begun] if begun is not None else []
         reaches += [
-            compute_reach(fibers, shortest, True, short),
-            compute_reach(fibers, longest, False, long),
+            compute_reach(fibers, shortest, True, shortest_pose),
+            compute_reach(fibers, longest, False, longest_pose),
         ]
-    moved = {sweep.place: sweep.moved for sweep in looked_at}
+    moved_paths = {sweep.place: sweep.moved for sweep in looked_at}
     result = Measures(
         {
-            name: tuple(place for place, own in moved.items() if own[k])
+            name: tuple(index for index, is_moved in moved_paths.items() if is_moved[k])
             for k, name in enumerate(paths.names)
         },
         [*compare_wrappings(around, paths, start, looked_at)] if around is not None else [],
@@ -130,7 +135,7 @@ def measure_model(
         starts,
         reaches,
     )
-    return result if still is None else merge_measures(still, result)
+    return result if unchanged_measures is None else merge_measures(unchanged_measures, result)
 
 
 def _find_bad_surface_lengths(
@@ -138,8 +143,8 @@ def _find_bad_surface_lengths(
 ) -> Iterator[LengthOnSurface]:
     """Yield the first negative or NaN length of each path on each surface."""
     poses = [MeasuringPose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
-    every = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
-    for name, surface, lengths in paths.system.measure_all_on_surfaces(every, paths.routes):
+    all_poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
+    for name, surface, lengths in paths.system.measure_all_on_surfaces(all_poses, paths.routes):
         for k in np.flatnonzero(~(lengths >= 0.0))[:1]:
             yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
 
@@ -153,8 +158,8 @@ def _check_loop_count(mechanism: Mechanism) -> None:
         UnsupportedError: more than `MAX_LOOP_CONSTRAINTS` constraints close loops.
     """
     count = sum(
-        not isinstance(each, Coupler | Lock | PrescribedCoordinate)
-        for each in mechanism.constraints
+        not isinstance(constraint, Coupler | Lock | PrescribedCoordinate)
+        for constraint in mechanism.constraints
     )
     if count > MAX_LOOP_CONSTRAINTS:
         raise UnsupportedError(
@@ -171,11 +176,11 @@ def _find_length_extremes(
     for sweep in looked_at:
         low, high = sweep.info.range
         # Rounded, so that values at the bounds of the middle part belong to it.
-        inside = np.flatnonzero(
+        middle_indices = np.flatnonzero(
             np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE_PART
         )
-        poses += [sweep.pose(value) for value in sweep.values[inside]]
-        rows.append(sweep.lengths[inside])
+        poses += [sweep.pose(value) for value in sweep.values[middle_indices]]
+        rows.append(sweep.lengths[middle_indices])
     lengths = np.concatenate(rows)
     # Where a path has no length its pose is left out, unless it has none by default either.
     unknown = np.isnan(lengths) & ~np.isnan(default)
@@ -183,5 +188,8 @@ def _find_length_extremes(
         np.argmin(np.where(unknown, np.inf, lengths), axis=0),
         np.argmax(np.where(unknown, -np.inf, lengths), axis=0),
     )
-    for path, (short, long) in enumerate(zip(*ends, strict=True)):
-        yield (float(lengths[short, path]), poses[short]), (float(lengths[long, path]), poses[long])
+    for path, (shortest_index, longest_index) in enumerate(zip(*ends, strict=True)):
+        yield (
+            (float(lengths[shortest_index, path]), poses[shortest_index]),
+            (float(lengths[longest_index, path]), poses[longest_index]),
+        )

@@ -84,7 +84,7 @@ class MuscleFibers(NamedTuple):
         Returns:
             The outputs by name; tension in `max_isometric_force`, fiber length in optimal lengths.
         """
-        known = dict(
+        outputs = dict(
             zip(
                 self.kind.outputs,
                 # Tension and length are compared between muscles, hence relative to strength and
@@ -94,9 +94,9 @@ class MuscleFibers(NamedTuple):
             )
         )
         # A strength of 0 gives NaN, not an error.
-        known["tension"] /= self.component.max_isometric_force or nan
-        known["fiber_length"] /= self.component.optimal_fiber_length
-        return known
+        outputs["tension"] /= self.component.max_isometric_force or nan
+        outputs["fiber_length"] /= self.component.optimal_fiber_length
+        return outputs
 
     def _call_law(
         self, law: Callable[..., Any] | None, length: float, states: dict[str, float]
@@ -113,29 +113,31 @@ class MuscleFibers(NamedTuple):
 
 
 def find_fibers(
-    model: Model, mechanism: Mechanism, wanted: Container[str]
+    model: Model, mechanism: Mechanism, paths: Container[str]
 ) -> Iterator[MuscleFibers]:
     """Yield the muscles whose laws have only numeric parameters: Thelen, Millard, De Groote, Meyer.
 
     Args:
         model: the model.
         mechanism: its mechanism.
-        wanted: paths of the requested muscles.
+        paths: paths of the requested muscles.
     """
     builder = ElementBuilder(model, mechanism, Path())
     for muscle in model.components(Muscle):
         kind = FORCE_TYPES.find(type(muscle))
-        if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
+        if kind is None or not muscle.appliesForce or builder.path(muscle) not in paths:
             continue
         _, *terms = kind.terms
         # Terms that are bundled are looked at one by one.
-        parts = (
-            part
+        single_terms = (
+            single_term
             for term in terms
-            for part in (term.terms if isinstance(term, Together) else (term,))
+            for single_term in (term.terms if isinstance(term, Together) else (term,))
         )
         # Laws with curves or other objects as parameters would have to be compiled.
-        if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
+        if not all(
+            isinstance(single_term, Fields | Number | Numbers) for single_term in single_terms
+        ):
             continue
         # Other rules report what OpenSim rejects.
         with suppress(ModelError):
@@ -162,11 +164,13 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
     if not fibers.is_elastic:
         return None
     states = fibers.get_start_states()
-    one, two = (
+    at_start, at_equilibrium = (
         fibers.evaluate_law(length, states),
         fibers.evaluate_law(length, fibers.equilibrate(length, states)),
     )
-    lengths, tensions = ((one[name], two[name]) for name in ("fiber_length", "tension"))
+    lengths, tensions = (
+        (at_start[name], at_equilibrium[name]) for name in ("fiber_length", "tension")
+    )
     return MuscleStart(fibers.path, lengths, tensions)
 
 
@@ -184,7 +188,7 @@ def compute_reach(
     Returns:
         The fiber length, and whether it is at the limit of the muscle.
     """
-    known = fibers.evaluate_law(
+    outputs = fibers.evaluate_law(
         length,
         fibers.equilibrate(
             length,
@@ -193,9 +197,11 @@ def compute_reach(
     )
     # The names of the smallest fiber length differ between the muscle classes.
     numbers = fibers.values[0]
-    least = (
+    min_length = (
         getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0))
         / fibers.component.optimal_fiber_length
     )
-    is_limit = known["fiber_length"] <= least * (1.0 + ROUNDING) or known["cos_pennation"] <= 0.0
-    return FiberReach(fibers.path, is_active, pose, known["fiber_length"], is_limit)
+    is_limit = (
+        outputs["fiber_length"] <= min_length * (1.0 + ROUNDING) or outputs["cos_pennation"] <= 0.0
+    )
+    return FiberReach(fibers.path, is_active, pose, outputs["fiber_length"], is_limit)

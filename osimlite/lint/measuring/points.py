@@ -28,14 +28,14 @@ def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
             info = paths.mechanism.coordinates[point.coordinate]
             low, high = _find_defined_range(point)
             for end in info.range:
-                inside = min(max(end, low), high)
-                place, rate = _evaluate_point(point, end)
+                clamped = min(max(end, low), high)
+                position, rate = _evaluate_point(point, end)
                 yield MovingPoint(
                     name,
                     point.name,
                     CoordinateSetting(info.name, end, info.unit),
-                    abs(end - inside),
-                    float(np.linalg.norm(place - _evaluate_point(point, inside)[0])),
+                    abs(end - clamped),
+                    float(np.linalg.norm(position - _evaluate_point(point, clamped)[0])),
                     float(np.linalg.norm(rate)),
                 )
 
@@ -43,7 +43,7 @@ def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
 def _evaluate_point(point: Node, value: float) -> tuple[Array, Array]:
     """Return the position of a point at a value of its coordinate, and its derivative."""
     result = [function.evaluate(np.array([value])) for function in point.functions]
-    return np.array([place for place, _, _ in result]), np.array(
+    return np.array([coordinate for coordinate, _, _ in result]), np.array(
         [slope[0] for _, slope, _ in result]
     )
 

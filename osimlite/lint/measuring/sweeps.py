@@ -71,16 +71,18 @@ class Sweep:
         """Return the pose at a value of the coordinate, for messages."""
         return MeasuringPose((self.value(value),))
 
-    def interpolate_poses(self, values: Array, place: NDArray[np.intp]) -> Array:
+    def interpolate_poses(self, values: Array, indices: NDArray[np.intp]) -> Array:
         """Return all coordinates (k, n) at values of this one, by linear interpolation between the poses.
 
         Args:
             values: values of the coordinate (k,), rad or m.
-            place: indices (k,) of the poses before the values.
+            indices: indices (k,) of the poses before the values.
         """
-        before, after = self.poses[place], self.poses[place + 1]
-        part = (values - before[:, self.place]) / (after[:, self.place] - before[:, self.place])
-        return before + part[:, None] * (after - before)
+        lower_poses, upper_poses = self.poses[indices], self.poses[indices + 1]
+        fraction = (values - lower_poses[:, self.place]) / (
+            upper_poses[:, self.place] - lower_poses[:, self.place]
+        )
+        return lower_poses + fraction[:, None] * (upper_poses - lower_poses)
 
     def find_poses_before(self, values: Array) -> NDArray[np.intp]:
         """Return the indices (k,) of the poses before values of the coordinate."""
@@ -88,17 +90,19 @@ class Sweep:
         return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
 
 
-def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -> list[Sweep]:
+def sweep_coordinates(
+    paths: Paths, start: Array, required_coordinates: Container[int] = ()
+) -> list[Sweep]:
     """Return a sweep of each coordinate that changes the length of a path.
 
     Args:
         paths: the paths.
         start: default pose (n,).
-        others: indices of coordinates that change the length of a path which is not among these.
+        required_coordinates: indices of coordinates that change the length of a path which is not among these.
     """
-    are_tied, left = find_tied_coordinates(paths, start), TIED_POSES
+    are_tied, remaining_poses = find_tied_coordinates(paths, start), TIED_POSES
     result: list[tuple[int, Array, bool]] = []
-    for place, info in enumerate(paths.mechanism.coordinates):
+    for index, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
         if (
             info.locked
@@ -107,48 +111,48 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
             or not 0.0 < high - low <= MAX_RANGE
         ):
             continue
-        is_tied = bool(are_tied[place])
+        is_tied = bool(are_tied[index])
         # Each value of a tied coordinate needs an assembly, of which a check can afford few.
-        if is_tied and left < TIED_VALUES:
+        if is_tied and remaining_poses < TIED_VALUES:
             continue
-        left -= is_tied * TIED_VALUES
+        remaining_poses -= is_tied * TIED_VALUES
         poses = _find_poses(
             paths,
             start,
-            place,
+            index,
             np.linspace(low, high, TIED_VALUES if is_tied else FREE_VALUES),
             is_tied,
         )
         if len(poses) > 1:
-            result.append((place, poses, is_tied))
+            result.append((index, poses, is_tied))
     # All poses are measured in one call, which costs less than one call for each coordinate.
-    rows = paths.system.measure_poses(
+    lengths = paths.system.measure_poses(
         np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)])
     )
     swept = []
-    for place, poses, is_tied in result:
-        own, rows = np.split(rows, [len(poses)])
-        swept.append(Sweep(paths, place, poses, is_tied, own))
-    return [sweep for sweep in swept if sweep.place in others or sweep.moved.any()]
+    for index, poses, is_tied in result:
+        sweep_lengths, lengths = np.split(lengths, [len(poses)])
+        swept.append(Sweep(paths, index, poses, is_tied, sweep_lengths))
+    return [sweep for sweep in swept if sweep.place in required_coordinates or sweep.moved.any()]
 
 
-def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:
+def _find_poses(paths: Paths, start: Array, index: int, values: Array, is_tied: bool) -> Array:
     """Return poses with these values of a coordinate, from the default outwards as far as constraints allow."""
     poses = np.tile(start, (len(values), 1))
-    poses[:, place] = values
+    poses[:, index] = values
     if not is_tied:
         return poses
     result: list[Array] = []
-    above = values >= start[place]
+    above = values >= start[index]
     # From the default outwards, each pose is the guess of the next.
     for away in (poses[above], poses[~above][::-1]):
         for q in away:
             try:
-                result.append(paths.mechanism.assemble(q, kept=(place,)))
+                result.append(paths.mechanism.assemble(q, kept=(index,)))
             except SimulationError:
                 # Constraints allow no pose here, so poses farther out are not tried.
                 break
-    return np.array(sorted(result, key=lambda q: float(q[place]))).reshape(-1, len(start))
+    return np.array(sorted(result, key=lambda q: float(q[index]))).reshape(-1, len(start))
 
 
 def find_tied_coordinates(paths: Paths, start: Array) -> Array:

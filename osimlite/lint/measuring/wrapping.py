@@ -33,8 +33,8 @@ def compare_wrappings(
         start: default pose (n,).
         looked_at: sweeps of coordinates.
     """
-    free = [sweep for sweep in looked_at if not sweep.is_tied]
-    together = _sample_poses(start, free)
+    free_sweeps = [sweep for sweep in looked_at if not sweep.is_tied]
+    together = _sample_poses(start, free_sweeps)
     poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at), together])
     columns = [paths.names.index(name) for name in geodesic.names]
     swept = [sweep.lengths[:, columns] for sweep in looked_at]
@@ -42,16 +42,18 @@ def compare_wrappings(
         paths.system.measure_poses(np.concatenate([start[None], together]))[:, columns], [1]
     )
     excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.measure_poses(poses)
-    for own, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
-        route, excess = paths.routes[name], excesses[:, own]
+    for geodesic_index, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
+        route, excess = paths.routes[name], excesses[:, geodesic_index]
         around = tuple(
             surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law
         )
         if not around:
             continue
-        moved = [sweep for sweep in free if sweep.moved[path]]
+        moving_sweeps = [sweep for sweep in free_sweeps if sweep.moved[path]]
 
-        def describe_pose(k: int, moved: Sequence[Sweep] = moved) -> tuple[MeasuringPose, Array]:
+        def describe_pose(
+            k: int, moving_sweeps: Sequence[Sweep] = moving_sweeps
+        ) -> tuple[MeasuringPose, Array]:
             """Describe pose k for messages, with irrelevant coordinates at their defaults.
 
             Returns:
@@ -63,16 +65,16 @@ def compare_wrappings(
                 if k <= len(sweep.poses):
                     return sweep.pose(sweep.values[k - 1]), sweep.poses[k - 1]
                 k -= len(sweep.poses)
-            q, places = start.copy(), [sweep.place for sweep in moved]
-            q[places] = together[k - 1][places]
-            return MeasuringPose(tuple(sweep.value(q[sweep.place]) for sweep in moved)), q
+            q, indices = start.copy(), [sweep.place for sweep in moving_sweeps]
+            q[indices] = together[k - 1][indices]
+            return MeasuringPose(tuple(sweep.value(q[sweep.place]) for sweep in moving_sweeps)), q
 
         # Try the poses from the largest excess downwards until one is not a rounding error.
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
         certain = (
             k
             for k in order
-            if _is_certain(geodesic, paths, own, path, excess[k], describe_pose(k)[1])
+            if _is_certain(geodesic, paths, geodesic_index, path, excess[k], describe_pose(k)[1])
         )
         worst = next(certain, order[-1])
         yield WrappingError(
@@ -100,11 +102,11 @@ def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
 
 
 def _is_certain(
-    geodesic: Paths, paths: Paths, own: int, path: int, excess: float, q: Array
+    geodesic: Paths, paths: Paths, geodesic_index: int, path: int, excess: float, q: Array
 ) -> bool:
     """Return whether a path has the same excess next to a pose; otherwise rounding caused it."""
-    beside = np.array([q - REPEAT_OFFSET, q + REPEAT_OFFSET])
-    there = paths.system.measure_one_path([path] * 2, beside) - geodesic.system.measure_one_path(
-        [own] * 2, beside
-    )
-    return bool((np.abs(there - excess) < MAX_REPEAT_DIFFERENCE_M).all())
+    nearby_poses = np.array([q - REPEAT_OFFSET, q + REPEAT_OFFSET])
+    nearby_excesses = paths.system.measure_one_path(
+        [path] * 2, nearby_poses
+    ) - geodesic.system.measure_one_path([geodesic_index] * 2, nearby_poses)
+    return bool((np.abs(nearby_excesses - excess) < MAX_REPEAT_DIFFERENCE_M).all())

@@ -110,14 +110,14 @@ def render_junit(report: Report) -> str:
         case = etree.SubElement(
             suite, "testcase", name=escape_unprintable(file), classname="osimlite"
         )
-        bad = [finding for finding in findings if _is_failure(finding)]
-        if bad:
-            message = f"{len(bad)} finding{'s' if len(bad) != 1 else ''}"
-            etree.SubElement(case, "failure", message=message).text = "\n".join(map(str, bad))
-        rest = [finding for finding in findings if not _is_failure(finding)]
-        if rest:
+        failures = [finding for finding in findings if _is_failure(finding)]
+        if failures:
+            message = f"{len(failures)} finding{'s' if len(failures) != 1 else ''}"
+            etree.SubElement(case, "failure", message=message).text = "\n".join(map(str, failures))
+        remarks = [finding for finding in findings if not _is_failure(finding)]
+        if remarks:
             # Remarks do not fail a test; they are printed with it.
-            etree.SubElement(case, "system-out").text = "\n".join(map(str, rest))
+            etree.SubElement(case, "system-out").text = "\n".join(map(str, remarks))
     # Reports know the number of files without findings, not their names.
     for number in range(report.checked - len(by_file)):
         etree.SubElement(
@@ -144,7 +144,7 @@ def render_sarif(report: Report) -> str:
     from osimlite.lint.registry import all_rules
 
     broken = [rule for rule in all_rules() if rule.code in report.codes]
-    places = {rule.code: index for index, rule in enumerate(broken)}
+    rule_indices = {rule.code: index for index, rule in enumerate(broken)}
     driver = {
         "name": "osimlite",
         "version": __version__,
@@ -154,7 +154,9 @@ def render_sarif(report: Report) -> str:
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
         # Columns of osimlite count characters of Unicode, and SARIF's default is UTF-16.
-        "results": [_describe_result(finding, places[finding.code]) for finding in report.findings],
+        "results": [
+            _describe_result(finding, rule_indices[finding.code]) for finding in report.findings
+        ],
     }
     notes = [note.message for note in report.missing_package_notes()]
     if notes:

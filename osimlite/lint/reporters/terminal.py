@@ -49,10 +49,10 @@ def format_summary(report: Report, colour: bool = False) -> str:
         if count
     ]
     files = f"{report.checked} {_pluralize('file', report.checked)}"
-    known = f" ({report.known} more in the baseline)" if report.known else ""
+    baseline_note = f" ({report.known} more in the baseline)" if report.known else ""
     if not parts:
-        return paint(f"Nothing found in {files}{known}.", "good", colour)
-    return f"Found {', '.join(parts)} in {files}{known}."
+        return paint(f"Nothing found in {files}{baseline_note}.", "good", colour)
+    return f"Found {', '.join(parts)} in {files}{baseline_note}."
 
 
 def describe_unmeasured(report: Report) -> str:
@@ -60,8 +60,8 @@ def describe_unmeasured(report: Report) -> str:
     if not report.unmeasured:
         return ""
     count = len(report.unmeasured) - 1
-    more = f" (and {count} more {_pluralize('file', count)})" if count else ""
-    return escape_unprintable(f"{report.unmeasured[0]}{more}.")
+    other_files = f" (and {count} more {_pluralize('file', count)})" if count else ""
+    return escape_unprintable(f"{report.unmeasured[0]}{other_files}.")
 
 
 def describe_skipped(report: Report, everything: bool) -> str:
@@ -119,12 +119,12 @@ class Fold(NamedTuple):
                     str(finding.line) for finding in self.more if finding.line is not None
                 )
             )
-            places = (
+            line_list = (
                 f", on line{'s' * (len(lines) > 1)} {join_words(lines, max_count=4)}"
                 if lines
                 else ""
             )
-            result.append(f"{len(self.more)} more like this{places}")
+            result.append(f"{len(self.more)} more like this{line_list}")
         if self.elsewhere:
             files = dict.fromkeys(
                 os.path.basename(finding.file or "") for finding in self.elsewhere
@@ -145,14 +145,14 @@ def fold_findings(findings: Iterable[Finding], *, everything: bool = False) -> l
     Returns:
         A fold for each finding that is shown.
     """
-    every = list(findings)
+    all_findings = list(findings)
     if everything:
-        return [Fold(finding, [], []) for finding in every]
+        return [Fold(finding, [], []) for finding in all_findings]
     # 1. Fold similar findings of each file.
-    parts = [
+    groups = [
         part
         for group in _group_by(
-            every, lambda finding: (finding.file, *_fold_key(finding, names=False))
+            all_findings, lambda finding: (finding.file, *_fold_key(finding, names=False))
         )
         for part in (
             [group] if len(group) >= _min_fold_size(group[0]) else [[finding] for finding in group]
@@ -160,20 +160,24 @@ def fold_findings(findings: Iterable[Finding], *, everything: bool = False) -> l
     ]
     result: list[Fold] = []
     # Findings of other files are the same only if names agree, unless they have one cause.
-    for alike in _group_by(
-        parts, lambda part: _fold_key(part[0], names=part[0].code not in _ONE_CAUSE_RULES)
+    for similar_groups in _group_by(
+        groups, lambda part: _fold_key(part[0], names=part[0].code not in _ONE_CAUSE_RULES)
     ):
-        first, *rest = [finding for part in alike for finding in part]
-        if len({part[0].file for part in alike}) < _min_fold_size(first):
-            result += [Fold(part[0], part[1:], []) for part in alike]
+        first, *remaining = [finding for part in similar_groups for finding in part]
+        if len({part[0].file for part in similar_groups}) < _min_fold_size(first):
+            result += [Fold(part[0], part[1:], []) for part in similar_groups]
         else:
-            here = [finding for finding in rest if finding.file == first.file]
+            same_file = [finding for finding in remaining if finding.file == first.file]
             result.append(
-                Fold(first, here, [finding for finding in rest if finding.file != first.file])
+                Fold(
+                    first,
+                    same_file,
+                    [finding for finding in remaining if finding.file != first.file],
+                )
             )
     # 3. Back into the order of the findings.
-    place = {id(finding): number for number, finding in enumerate(every)}
-    return sorted(result, key=lambda fold: place[id(fold.first)])
+    order = {id(finding): number for number, finding in enumerate(all_findings)}
+    return sorted(result, key=lambda fold: order[id(fold.first)])
 
 
 def _min_fold_size(finding: Finding) -> int:
@@ -218,12 +222,14 @@ def render_concise(report: Report, *, colour: bool = False, everything: bool = F
 def _format_line(fold: Fold, colour: bool) -> str:
     finding = fold.first
     counts = (("like this", fold.more), ("in other files", fold.elsewhere))
-    more = "".join(f"; {len(result)} more {what}" for what, result in counts if result)
+    fold_notes = "".join(
+        f"; {len(result)} more {relation}" for relation, result in counts if result
+    )
     hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
-    words = escape_unprintable(f"{finding.message}{hint}{more}")
+    text = escape_unprintable(f"{finding.message}{hint}{fold_notes}")
     severity = paint(finding.severity.value, finding.severity, colour)
-    place = paint(escape_unprintable(finding.place), "strong", colour)
-    return f"{place}: {severity} {finding.code} {words}"
+    position = paint(escape_unprintable(finding.place), "strong", colour)
+    return f"{position}: {severity} {finding.code} {text}"
 
 
 _ELLIPSIS = "..."
@@ -244,26 +250,26 @@ def render_full(
         The text.
     """
     blocks: list[str] = []
-    every = fold_findings(report.findings, everything=everything)
-    for file, result in groupby(every, key=lambda fold: fold.first.file):
+    all_folds = fold_findings(report.findings, everything=everything)
+    for file, result in groupby(all_folds, key=lambda fold: fold.first.file):
         folds = list(result)
         lines = _split_lines(report, file, max(fold.first.line or 0 for fold in folds))
         blocks += [_format_block(fold, lines, colour, width) for fold in folds]
     closing, length = format_summary(report, colour), len(format_summary(report))
-    for more in filter(
+    for sentence in filter(
         None,
         (
             _describe_fixes(report),
-            hint_at_folds(every),
+            hint_at_folds(all_folds),
             describe_skipped(report, everything),
             describe_unmeasured(report),
         ),
     ):
         # A sentence that does not fit beside the summary gets its own line.
-        fits = length + 1 + len(more) <= width
+        fits = length + 1 + len(sentence) <= width
         closing, length = (
-            f"{closing}{' ' if fits else chr(10)}{more}",
-            (length + 1 if fits else 0) + len(more),
+            f"{closing}{' ' if fits else chr(10)}{sentence}",
+            (length + 1 if fits else 0) + len(sentence),
         )
     return "\n\n".join([*blocks, closing]) + "\n"
 
@@ -271,11 +277,11 @@ def render_full(
 def _describe_fixes(report: Report) -> str:
     """Return how many findings ``--fix`` fixes, and how many more ``--unsafe-fixes`` does."""
     safe = sum(finding.fixable for finding in report.findings)
-    rest = sum(finding.fix is not None for finding in report.findings) - safe
+    unsafe_count = sum(finding.fix is not None for finding in report.findings) - safe
     parts = [f"{safe} can be fixed with --fix"] if safe else []
-    if rest:
-        some = f"{rest} more" if safe else f"{rest} can be fixed"
-        parts.append(f"{some} with --unsafe-fixes")
+    if unsafe_count:
+        count_text = f"{unsafe_count} more" if safe else f"{unsafe_count} can be fixed"
+        parts.append(f"{count_text} with --unsafe-fixes")
     return f"{', '.join(parts)}." if parts else ""
 
 
@@ -289,11 +295,11 @@ def _split_lines(report: Report, file: str | None, last: int) -> list[str] | Non
 
 def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str:
     finding = fold.first
-    head = (
+    heading = (
         f"{paint(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
     )
-    place = paint(escape_unprintable(finding.place), "strong", colour)
-    rows = [f"{place}: {head}" if finding.place else head]
+    position = paint(escape_unprintable(finding.place), "strong", colour)
+    rows = [f"{position}: {heading}" if finding.place else heading]
     if (
         len(
             f"{escape_unprintable(finding.place)}: {finding.severity.value} {finding.code} {finding.name}"
@@ -301,7 +307,7 @@ def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int)
         > width
     ):
         # Break after the position, before the terminal breaks the line anywhere.
-        rows = [f"{place}:", f"  {head}"]
+        rows = [f"{position}:", f"  {heading}"]
     rows += [
         f"  {row}"
         for row in textwrap.wrap(
@@ -319,8 +325,8 @@ def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int)
         notes.append((f"in {finding.component}", "dim"))
     margin = " " * len(str(finding.line or ""))
     notes += [
-        (textwrap.shorten(it, width - len(margin) - 3, placeholder=" ..."), "strong")
-        for it in fold.remarks
+        (textwrap.shorten(remark, width - len(margin) - 3, placeholder=" ..."), "strong")
+        for remark in fold.remarks
     ]
     for note, style in notes:
         rows.append(
@@ -336,40 +342,53 @@ def _format_snippet(finding: Finding, line: str, colour: bool, width: int) -> li
     indent = len(line) - len(line.lstrip())
     # The indentation of a deep file would push the text out of sight.
     skipped = min(indent, start)
-    shown = line[skipped:].replace("\t", " ").rstrip()
+    display_line = line[skipped:].replace("\t", " ").rstrip()
     start -= skipped
-    length = max(1, min(finding.length, len(shown) - start))
+    length = max(1, min(finding.length, len(display_line) - start))
     margin = len(str(finding.line))
-    room = max(20, width - margin - 3)
+    available_width = max(20, width - margin - 3)
     before, marked, after = map(
-        escape_unprintable, (shown[:start], shown[start : start + length], shown[start + length :])
+        escape_unprintable,
+        (
+            display_line[:start],
+            display_line[start : start + length],
+            display_line[start + length :],
+        ),
     )
-    shown, start, length = before + marked + after, len(before), max(1, len(marked))
-    if len(shown) > room:
-        shown, start, length = _cut_line(shown, start, length, room)
+    display_line, start, length = before + marked + after, len(before), max(1, len(marked))
+    if len(display_line) > available_width:
+        display_line, start, length = _cut_line(display_line, start, length, available_width)
     bar = paint("|", "dim", colour)
     caret = paint("^" * length, finding.severity, colour)
     return [
         f"{' ' * margin} {bar}",
-        f"{paint(str(finding.line), 'dim', colour)} {bar} {shown}",
+        f"{paint(str(finding.line), 'dim', colour)} {bar} {display_line}",
         f"{' ' * margin} {bar} {' ' * start}{caret}",
     ]
 
 
-def _cut_line(shown: str, start: int, length: int, room: int) -> tuple[str, int, int]:
+def _cut_line(
+    display_line: str, start: int, length: int, available_width: int
+) -> tuple[str, int, int]:
     """Return the part of a long line around the caret, with dots where it is cut, and the caret's start and length."""
-    first = 0
+    cut_start = 0
     # The caret stays in sight, about in the middle of the line.
-    if start + length > room - len(_ELLIPSIS):
-        first = min(start, max(0, start + min(length, room // 2) - room // 2))
-    part = shown[first:]
-    if first:
-        part = (
-            _ELLIPSIS + part[len(_ELLIPSIS) :]
-            if start - first >= len(_ELLIPSIS)
-            else _ELLIPSIS + part
+    if start + length > available_width - len(_ELLIPSIS):
+        cut_start = min(
+            start, max(0, start + min(length, available_width // 2) - available_width // 2)
         )
-        start = start - first if start - first >= len(_ELLIPSIS) else start - first + len(_ELLIPSIS)
-    if len(part) > room:
-        part = part[: room - len(_ELLIPSIS)] + _ELLIPSIS
-    return part, start, max(1, min(length, room - start))
+    visible = display_line[cut_start:]
+    if cut_start:
+        visible = (
+            _ELLIPSIS + visible[len(_ELLIPSIS) :]
+            if start - cut_start >= len(_ELLIPSIS)
+            else _ELLIPSIS + visible
+        )
+        start = (
+            start - cut_start
+            if start - cut_start >= len(_ELLIPSIS)
+            else start - cut_start + len(_ELLIPSIS)
+        )
+    if len(visible) > available_width:
+        visible = visible[: available_width - len(_ELLIPSIS)] + _ELLIPSIS
+    return visible, start, max(1, min(length, available_width - start))

@@ -69,14 +69,14 @@ def report_impossible_inertia(subject: Subject, report: FindingCollector) -> Non
     """
     slack = subject.config.value_of(SLACK)
     for body, moments in _list_inertias(subject):
-        small, middle, large = moments
+        smallest, middle, large = moments
         # A negative moment has OSIM503.
-        if small >= 0 and large > (small + middle) * (1 + slack):
-            excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
+        if smallest >= 0 and large > (smallest + middle) * (1 + slack):
+            excess = 100 * (large / (smallest + middle) - 1) if smallest + middle > 0 else math.inf
             report(
                 f"the inertia of {describe_object(body)} is impossible: its largest principal "
                 f"moment, {format_quantity(large)}, is more than the sum of the others, "
-                f"{format_quantity(small + middle)}"
+                f"{format_quantity(smallest + middle)}"
                 + (f", by {excess:.3g} %" if math.isfinite(excess) else "")
                 + _describe_closest(body),
                 body,
@@ -165,10 +165,10 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
     # Inside a chain the bodies beyond give inertia.
     if len(links) != 1 or links[0].child_base is not body:
         return False
-    joint, place = links[0].joint, locate_frame(subject, links[0].child)
-    turns = [motion for motion in joint.motion_types or () if motion == "rotational"]
-    at_center = place is not None and place[1].position == body.mass_center
-    return len(turns) == 3 or bool(turns and at_center)
+    joint, location = links[0].joint, locate_frame(subject, links[0].child)
+    rotations = [motion for motion in joint.motion_types or () if motion == "rotational"]
+    at_center = location is not None and location[1].position == body.mass_center
+    return len(rotations) == 3 or bool(rotations and at_center)
 
 
 @rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))
@@ -222,9 +222,9 @@ class _Suggestion(TypedDict):
 def _describe_closest(body: Body) -> str:
     """Return a phrase about the nearest possible inertia and its distance."""
     nearest = find_possible_inertia(body.inertia)
-    parts = [new - old for new, old in zip(nearest, body.inertia, strict=True)]
+    differences = [new - old for new, old in zip(nearest, body.inertia, strict=True)]
     # Each product stands in the matrix twice.
-    distance, size = (math.hypot(*matrix, *matrix[3:]) for matrix in (parts, body.inertia))
+    distance, size = (math.hypot(*matrix, *matrix[3:]) for matrix in (differences, body.inertia))
     return (
         f"; the closest possible one, {' '.join(f'{number:.4g}' for number in nearest)}, is "
         f"{format_quantity(distance, 'kg m^2')} ({100 * distance / size:.2g} % of it) away"
@@ -234,12 +234,12 @@ def _describe_closest(body: Body) -> str:
 def _suggest_inertia(subject: Subject, body: Body) -> _Suggestion:
     """Return the nearest possible inertia as suggestion and fix."""
     text = " ".join(f"{number:.9g}" for number in find_possible_inertia(body.inertia))
-    place = (
+    position = (
         subject.position(body, tag="inertia")
         if subject.element_of(body, "inertia") is not None
         else None
     )
-    return {"suggestion": text, "fix": replace_text(subject.source, place, text, safe=False)}
+    return {"suggestion": text, "fix": replace_text(subject.source, position, text, safe=False)}
 
 
 def _list_inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:

@@ -43,12 +43,12 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     """
     for note, owner in subject.notes_of("unknown-class"):
         consequence = _describe_consequence(subject, note)
-        accepted = (
+        accepted_tags = (
             list_tags()
             if note.spec is None or note.spec.accepts is None
             else list_class_tags(note.spec.accepts)
         )
-        suggestion = _find_nearest_class(subject, note, accepted)
+        suggestion = _find_nearest_class(subject, note, accepted_tags)
         message = f"OpenSim has no class '{note.word}' and {consequence}"
         # Classes of plug-ins are not misspelt.
         plugin = find_plugin(note.word)
@@ -57,8 +57,8 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
         elif suggestion is None or suggestion.lower() != note.word.lower():
             # The class differs in letter case only: nothing else can be meant.
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
-        same = suggestion is not None and suggestion.lower() == note.word.lower()
-        fix = rename_tag(subject.source, note.number, suggestion, safe=same)
+        is_same_word = suggestion is not None and suggestion.lower() == note.word.lower()
+        fix = rename_tag(subject.source, note.number, suggestion, safe=is_same_word)
         report(message, owner, number=note.number, suggestion=suggestion, fix=fix)
 
 
@@ -75,7 +75,7 @@ def find_plugin(name: str) -> str:
     return next((plugin for start, plugin in PLUGINS.items() if name.startswith(start)), "")
 
 
-def _find_nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -> str | None:
+def _find_nearest_class(subject: Subject, note: Note, accepted_tags: Iterable[str]) -> str | None:
     """Return the class that a misspelt tag of an object means, or None.
 
     Another class is another physics, so the spelling must be a slip away: at most two letters
@@ -86,11 +86,13 @@ def _find_nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -
     word = note.word.rpartition(":")[2]
     if find_plugin(word):
         return None
-    known = [tag for tag in accepted if not _is_later(tag)]
-    whole = {note.word.lower(), word.lower()}
-    same = [tag for tag in known if tag.lower() in whole]
+    released_tags = [tag for tag in accepted_tags if not _is_later(tag)]
+    lower_words = {note.word.lower(), word.lower()}
+    same_words = [tag for tag in released_tags if tag.lower() in lower_words]
     # The tag with the namespace prefix is compared as well, as the colon may be the slip.
-    candidates = same or [tag for tag in known if _is_slip(note.word, tag) or _is_slip(word, tag)]
+    candidates = same_words or [
+        tag for tag in released_tags if _is_slip(note.word, tag) or _is_slip(word, tag)
+    ]
     best = find_nearest(note.word, candidates, cutoff=0) if candidates else None
     if best is None or subject.source is None:
         return best
@@ -106,13 +108,13 @@ def _is_slip(word: str, tag: str) -> bool:
     """Return whether a word is a misspelling of a tag, rather than a longer or another name."""
     from rapidfuzz.distance import OSA
 
-    one, other = word.lower(), tag.lower()
-    distance = OSA.distance(one, other)
+    lower_word, lower_tag = word.lower(), tag.lower()
+    distance = OSA.distance(lower_word, lower_tag)
     # Two letters of a short word are half of it.
     if distance > (2 if len(tag) > 6 else 1):
         return False
     # A prefix such as My or UW makes another class of it.
-    return distance < 2 or not (one.endswith(other) or one.startswith(other))
+    return distance < 2 or not (lower_word.endswith(lower_tag) or lower_word.startswith(lower_tag))
 
 
 def _is_later(tag: str) -> bool:
@@ -157,7 +159,7 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
         assert note.spec is not None and note.spec.accepts is not None
         kinds = note.spec.accepts.__name__
         home = find_set(note.value)
-        where = f"; it belongs in the {home}" if home else ""
+        home_hint = f"; it belongs in the {home}" if home else ""
         holder = (
             f"{describe_object(owner)}: {note.spec.tag}"
             if note.spec.tag != "objects"
@@ -165,7 +167,7 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
         )
         report(
             f"{holder} expects {add_article(kinds)}, found {add_article(note.word)}: OpenSim "
-            f"{_describe_consequence(subject, note)}{where}",
+            f"{_describe_consequence(subject, note)}{home_hint}",
             owner,
             number=note.number,
         )
@@ -253,16 +255,16 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
         # Such an object has OSIM108.
         return None
     lists = (
-        s
-        for s in get_field_specs(type(owner)).values()
-        if isinstance(s.kind, ObjectField) and s.kind.form == "list"
+        spec
+        for spec in get_field_specs(type(owner)).values()
+        if isinstance(spec.kind, ObjectField) and spec.kind.form == "list"
     )
     best = next(
         (
-            s
-            for s in lists
+            spec
+            for spec in lists
             # Components may stand there as well, but the specific list is what is meant.
-            if s.accepts and issubclass(note.value, s.accepts) and s.tag != "components"
+            if spec.accepts and issubclass(note.value, spec.accepts) and spec.tag != "components"
         ),
         None,
     )
@@ -313,7 +315,9 @@ def find_set(cls: type[Object] | None) -> str | None:
     for spec in get_field_specs(Model).values():
         members = get_field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
         # Any component fits into the ComponentSet, so that it says nothing.
-        taken = members.accepts if members is not None and spec.tag != "ComponentSet" else None
-        if taken is not None and issubclass(cls, taken):
+        member_class = (
+            members.accepts if members is not None and spec.tag != "ComponentSet" else None
+        )
+        if member_class is not None and issubclass(cls, member_class):
             return spec.tag
     return None

@@ -257,15 +257,15 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
         ):
             continue
         groups.setdefault(type(item), []).append(obstacle)
-    for first, *others in groups.values():
-        more = f"; {format_count(len(others), 'other')} of its class" if others else ""
-        known = subject.tree.by_path.get(first.path)
+    for first, *similar in groups.values():
+        similar_note = f"; {format_count(len(similar), 'other')} of its class" if similar else ""
+        component = subject.tree.by_path.get(first.path)
         reason = first.message.partition(";")[0]
-        if known is not None and reason.startswith(f"'{first.path}' ("):
+        if component is not None and reason.startswith(f"'{first.path}' ("):
             # Forces are named with their class, and why it cannot be computed.
             reason = reason.removeprefix(f"'{first.path}' (").removesuffix(")")
-            reason = f"'{known.name}', a {reason}"
-        message = f"osimlite cannot compute this, OpenSim can: {reason}{more}"
+            reason = f"'{component.name}', a {reason}"
+        message = f"osimlite cannot compute this, OpenSim can: {reason}{similar_note}"
         _report(subject, report, first, message)
 
 
@@ -313,28 +313,35 @@ def _select_unreported(
     subject: Subject, report: FindingCollector, stage: Stage
 ) -> Iterator[Obstacle]:
     """Yield the obstacles of a stage whose cause no other rule has reported."""
-    errors = [item for item in report.findings if item.severity == ERROR]
+    errors = [finding for finding in report.findings if finding.severity == ERROR]
     if stage == Stage.ACCELERATION:
         # An element that OpenSim ignores does not make what it computes NaN.
-        errors = [item for item in errors if not item.code.startswith("OSIM10")]
-    places = {item.component for item in errors if item.component}
+        errors = [finding for finding in errors if not finding.code.startswith("OSIM10")]
+    reported_paths = {finding.component for finding in errors if finding.component}
     # A file that is missing stops what needs it.
-    causes = [*errors, *(item for item in report.findings if item.code.startswith("OSIM7"))]
-    named = {word for item in causes for word in _QUOTED.findall(item.message)}
+    causes = [
+        *errors,
+        *(finding for finding in report.findings if finding.code.startswith("OSIM7")),
+    ]
+    reported_names = {word for finding in causes for word in _QUOTED.findall(finding.message)}
     for obstacle in obstacles_of(subject, stage):
-        words = {word.strip("/") for word in _QUOTED.findall(obstacle.message)}
-        if words & named or any(_is_related(obstacle.path, place) for place in places):
+        quoted_names = {word.strip("/") for word in _QUOTED.findall(obstacle.message)}
+        if quoted_names & reported_names or any(
+            _is_related(obstacle.path, reported_path) for reported_path in reported_paths
+        ):
             continue
         if not obstacle.path and errors:
             continue
         yield obstacle
 
 
-def _is_related(path: str, place: str) -> bool:
+def _is_related(path: str, other_path: str) -> bool:
     """Return whether two components are the same, or one is a part of the other, but not of the model."""
-    if not path or place == "/":
+    if not path or other_path == "/":
         return False
-    return path == place or place.startswith(f"{path}/") or path.startswith(f"{place}/")
+    return (
+        path == other_path or other_path.startswith(f"{path}/") or path.startswith(f"{other_path}/")
+    )
 
 
 def _has_error(report: FindingCollector, families: str) -> bool:

@@ -70,12 +70,14 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     if kind not in ("HuntCrossleyForce", "ElasticFoundationForce"):
         return ""
     surfaces = [subject.resolution(use).target for use in uses]
-    known = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
-    bases = [find_base(subject, subject.target_of(surface, "socket_frame")) for surface in known]
+    known_surfaces = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
+    bases = [
+        find_base(subject, subject.target_of(surface, "socket_frame")) for surface in known_surfaces
+    ]
     # An unresolved surface or frame may be the partner.
-    if len(known) != len(surfaces) or any(base is None for base in bases):
+    if len(known_surfaces) != len(surfaces) or any(base is None for base in bases):
         return ""
-    pairs = [*combinations(zip(known, bases, strict=True), 2)]
+    pairs = [*combinations(zip(known_surfaces, bases, strict=True), 2)]
     # Surfaces of one body do not move against each other.
     if all(first[1] is second[1] for first, second in pairs):
         return f"surfaces of {describe_object(bases[0])} alone" if bases[0] is not None else ""
@@ -86,7 +88,7 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     ):
         return ""
     shapes = join_words(
-        [f"{type(surface).__name__} '{surface.name}'" for surface in known], max_count=3
+        [f"{type(surface).__name__} '{surface.name}'" for surface in known_surfaces], max_count=3
     )
     return f"{shapes}, between which OpenSim computes no contact"
 
@@ -107,16 +109,16 @@ def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> N
     ```
     """
     for force, _, uses in _find_contact_lists(subject):
-        seen: set[int] = set()
-        words: dict[tuple[int, str], int] = {}
+        seen_targets: set[int] = set()
+        word_counts: dict[tuple[int, str], int] = {}
         for use in uses:
             target = subject.resolution(use).target
             # Equal words are told apart by their position in the list.
-            nth = words.get((id(use.holder), use.text), 0)
-            words[id(use.holder), use.text] = nth + 1
+            nth = word_counts.get((id(use.holder), use.text), 0)
+            word_counts[id(use.holder), use.text] = nth + 1
             if target is None:
                 continue
-            if id(target) in seen:
+            if id(target) in seen_targets:
                 report(
                     f"{describe_object(force)} lists '{target.name}' again: OpenSim counts it "
                     "twice and the force is doubled",
@@ -125,7 +127,7 @@ def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> N
                     word=use.text,
                     nth=nth,
                 )
-            seen.add(id(target))
+            seen_targets.add(id(target))
 
 
 @rule("OSIM323", "unused-contact-geometry", severity=INFO)
@@ -153,13 +155,13 @@ def report_unused_contact_geometry(subject: Subject, report: FindingCollector) -
     # A force that lacks a surface has a finding, and the unused surface may be the missing one.
     if any(len(uses) < 2 for _, _, uses in _find_contact_lists(subject)):
         return
-    used = {
+    used_surfaces = {
         id(subject.resolution(use).target)
         for use in subject.uses
         if use.reference.target in _SURFACES
     }
     for surface in surfaces:
-        if id(surface) not in used:
+        if id(surface) not in used_surfaces:
             report(f"no force uses {describe_object(surface)}", surface, attribute="name")
 
 

@@ -198,7 +198,7 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
       </PinJoint>
     ```
     """
-    turns, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
+    max_angle, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
     for joint in subject.find_instances(Joint):
         # Joints whose coordinates have no fixed meaning are left out.
         for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
@@ -208,7 +208,7 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
                 (abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0
             )
             # 99999.9 and the like stand for "no bound".
-            if turns < largest < unbounded:
+            if max_angle < largest < unbounded:
                 report(
                     f"the range of {describe_object(coordinate)}, "
                     f"{format_quantity(coordinate.range)}, is read in radians; is it in degrees?",
@@ -216,7 +216,7 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
                     tag="range",
                     suggestion=" ".join(f"{math.radians(bound):.6g}" for bound in coordinate.range),
                 )
-            if turns < abs(coordinate.default_value) < math.inf:
+            if max_angle < abs(coordinate.default_value) < math.inf:
                 report(
                     f"the default value of {describe_object(coordinate)}, "
                     f"{format_quantity(coordinate.default_value)}, is read in radians; is it in "

@@ -134,20 +134,20 @@ def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
             for index, axis in enumerate(kind):
                 twin = next(
                     (
-                        other
-                        for other in kind[:index]
+                        earlier_axis
+                        for earlier_axis in kind[:index]
                         # `not >=` counts NaN as parallel.
-                        if not norm(cross(axis.axis, other.axis)) >= _COLLINEAR
+                        if not norm(cross(axis.axis, earlier_axis.axis)) >= _COLLINEAR
                     ),
                     None,
                 )
                 # An axis without a length is parallel to every other one; the finding belongs to
                 # it.
-                short = math.hypot(*axis.axis) < _COLLINEAR
-                if short or (twin is not None and math.hypot(*twin.axis) >= _COLLINEAR):
+                has_no_length = math.hypot(*axis.axis) < _COLLINEAR
+                if has_no_length or (twin is not None and math.hypot(*twin.axis) >= _COLLINEAR):
                     state = (
                         "has no length"
-                        if short
+                        if has_no_length
                         else f"is parallel to that of {twin.name if twin else ''}"
                     )
                     report(
@@ -222,41 +222,60 @@ def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[floa
     for number, axis in enumerate(list_axes(joint)):
         names = axis.names
         # Of a name that stands twice the last place counts.
-        place = max(
-            (place for place, name in enumerate(names) if name == coordinate.name), default=None
+        variable_index = max(
+            (
+                variable_index
+                for variable_index, name in enumerate(names)
+                if name == coordinate.name
+            ),
+            default=None,
         )
-        known = (
+        rate = (
             0.0
-            if place is None
-            else _compute_slope(axis.function, place, values.get(names[0], 0.0))
+            if variable_index is None
+            else _compute_slope(axis.function, variable_index, values.get(names[0], 0.0))
         )
         # No combination of these numbers is 0 by chance.
-        result.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
+        result.append(math.sqrt(2 + number + 7 * (variable_index or 0)) if rate is None else rate)
     return result
 
 
-def _compute_slope(function: Function | None, place: int, first: float) -> float | None:
+def _compute_slope(
+    function: Function | None, variable_index: int, first_value: float
+) -> float | None:
     """Return the derivative of a function by one of its variables, at a value of the first; None if unknown."""
     match function:
         case None | Constant():
             return 0.0
         case LinearFunction():
-            return function.coefficients[place] if place < len(function.coefficients) else 0.0
+            return (
+                function.coefficients[variable_index]
+                if variable_index < len(function.coefficients)
+                else 0.0
+            )
         case MultiplierFunction():
-            inner = _compute_slope(function.function, place, first)
-            return 0.0 if function.scale == 0 else None if inner is None else function.scale * inner
-        case PolynomialFunction() if place == 0:
+            inner_slope = _compute_slope(function.function, variable_index, first_value)
+            return (
+                0.0
+                if function.scale == 0
+                else None
+                if inner_slope is None
+                else function.scale * inner_slope
+            )
+        case PolynomialFunction() if variable_index == 0:
             # OpenSim lists the highest power first.
             degree = len(function.coefficients) - 1
             powers = enumerate(function.coefficients[:-1])
-            return sum((degree - n) * weight * first ** (degree - n - 1) for n, weight in powers)
+            return sum(
+                (degree - n) * weight * first_value ** (degree - n - 1) for n, weight in powers
+            )
         case SimmSpline() | PiecewiseLinearFunction() | PiecewiseConstantFunction() | GCVSpline():
             # With different values the slope depends on the pose, which is not worth computing
             # here.
-            return 0.0 if place or len(set(function.y)) < 2 else None
+            return 0.0 if variable_index or len(set(function.y)) < 2 else None
     return (
         0.0
-        if place and not isinstance(function, Unknown | MultivariatePolynomialFunction)
+        if variable_index and not isinstance(function, Unknown | MultivariatePolynomialFunction)
         else None
     )
 
@@ -273,8 +292,8 @@ def _compute_rank(rows: list[list[float]]) -> int:
             continue
         rows[rank], rows[pivot] = rows[pivot], rows[rank]
         for below in rows[rank + 1 :]:
-            share = below[column] / rows[rank][column]
+            factor = below[column] / rows[rank][column]
             for index in range(column, 6):
-                below[index] -= share * rows[rank][index]
+                below[index] -= factor * rows[rank][index]
         rank += 1
     return rank

@@ -76,18 +76,18 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
         # A default of NaN that the file does not set is no value of the file.
         if _has_nan(spec.default) and spec.name not in item.model_fields_set:
             continue
-        bad = [
+        non_finite = [
             number
             for number in _to_numbers(value)
             if math.isnan(number) or (math.isinf(number) and not _may_be_infinite(item, spec))
         ]
-        if bad:
-            consequence = _describe_nan_consequence(subject, item, spec, bad[0])
+        if non_finite:
+            consequence = _describe_nan_consequence(subject, item, spec, non_finite[0])
             report(
                 f"{subject.describe_property(item, spec)} is {format_value(value)}: {consequence}",
                 item,
                 tag=spec.tag,
-                word=_find_word(subject, item, spec, bad[0]),
+                word=_find_word(subject, item, spec, non_finite[0]),
                 severity=WARNING if consequence in _MILD_CONSEQUENCES else None,
             )
 
@@ -220,16 +220,18 @@ def _report_size(
     item: Object,
     spec: FieldSpec,
     number: float,
-    what: str,
+    adjective: str,
     *,
     is_error: bool,
 ) -> None:
     """Report a number that is too large or too small."""
     value = item.__dict__[spec.name]
-    more = f"; its powers are {'infinite' if what == 'large' else 'zero'}" if is_error else ""
+    power_note = (
+        f"; its powers are {'infinite' if adjective == 'large' else 'zero'}" if is_error else ""
+    )
     report(
         f"{subject.describe_property(item, spec)} is {format_value(value)}: no physical "
-        f"quantity of a motion is this {what}{more}",
+        f"quantity of a motion is this {adjective}{power_note}",
         item,
         tag=spec.tag,
         word=_find_word(subject, item, spec, number),
@@ -346,39 +348,45 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
     for cls, items in subject.by_class.items():
         # The class of the value is compared, since most values are plain floats and this loop meets
         # every number of a model.
-        for spec, inside in _list_domains(cls):
+        for spec, is_inside in _list_domains(cls):
             assert isinstance(spec.kind, Value)
             for item in items:
                 value = item.__dict__[spec.name]
-                if value is None or (value.__class__ is float and inside(value)):
+                if value is None or (value.__class__ is float and is_inside(value)):
                     # Infinity and NaN have the rule OSIM205.
                     continue
-                wrong = [
+                outside_numbers = [
                     number
                     for number in _to_numbers(value)
-                    if not inside(number) and math.isfinite(number)
+                    if not is_inside(number) and math.isfinite(number)
                 ]
-                if not wrong and _is_missing(item, spec, value):
+                if not outside_numbers and _is_missing(item, spec, value):
                     consequence, fails = describe_consequence(cls, spec.name, math.nan)
                     if fails:
                         yield item, spec, value, DomainVerdict(math.nan, "", consequence, fails)
                     continue
                 # The reader noted that the text was not read and the default was used; that default
                 # is not the author's.
-                if not wrong or (
-                    subject.has_note(item, spec) and wrong == list(_to_numbers(spec.default))
+                if not outside_numbers or (
+                    subject.has_note(item, spec)
+                    and outside_numbers == list(_to_numbers(spec.default))
                 ):
                     continue
                 # A torus radius of 0 makes a sphere, which is a surface.
-                if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
+                if id(item) in obstacles and (spec.name, outside_numbers[0]) != ("torus_radius", 0):
                     consequence, fails = REFUSED, True
                 else:
                     rigid = bool(getattr(item, "ignore_tendon_compliance", False))
                     consequence, fails = describe_consequence(
-                        cls, spec.name, wrong[0], rigid_tendon=rigid
+                        cls, spec.name, outside_numbers[0], rigid_tendon=rigid
                     )
                 domain = _get_domain(cls, spec)
-                yield item, spec, value, DomainVerdict(wrong[0], domain, consequence, fails)
+                yield (
+                    item,
+                    spec,
+                    value,
+                    DomainVerdict(outside_numbers[0], domain, consequence, fails),
+                )
 
 
 def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
@@ -394,7 +402,7 @@ def _report_domain(
     value: Any,
     verdict: DomainVerdict,
 ) -> None:
-    given = spec.name in item.model_fields_set
+    is_given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:
         report(
@@ -406,18 +414,18 @@ def _report_domain(
         return
     size = (
         format_quantity(value, spec.kind.unit)
-        if given
+        if is_given
         else f"not given (default {format_quantity(value, spec.kind.unit)})"
     )
     # Domains are written as comparisons; the message needs words.
-    wanted = (
+    domain_text = (
         re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain)
         .replace(">", "more than")
         .replace("!=", "other than")
     )
     consequence = f": {verdict.consequence}" if verdict.consequence else ""
     report(
-        f"{subject.describe_property(item, spec)} is {size}, expected {wanted}{consequence}",
+        f"{subject.describe_property(item, spec)} is {size}, expected {domain_text}{consequence}",
         item,
         tag=spec.tag,
         word=_find_word(subject, item, spec, verdict.number),
@@ -450,9 +458,9 @@ def _list_domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float],
 def _find_small_sizes(subject: Subject) -> Iterator[tuple[Object, FieldSpec, float]]:
     """Yield every number that has to be positive and is smaller than any size."""
     for cls, items in subject.by_class.items():
-        for spec, inside in _list_domains(cls):
+        for spec, is_inside in _list_domains(cls):
             # A domain that excludes 0 and includes this number is one of sizes.
-            if inside(0.0) or not inside(TINY):
+            if is_inside(0.0) or not is_inside(TINY):
                 continue
             for item in items:
                 value = item.__dict__[spec.name]

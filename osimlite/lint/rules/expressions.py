@@ -55,14 +55,14 @@ def report_broken_expression(subject: Subject, report: FindingCollector) -> None
             Formula.parse(text, variables, "it")
         except ModelError as error:
             reason = error.message.removeprefix(f"it is '{text}': ")
-            shown = f"'{text}'" if text else "empty"
+            formula_text = f"'{text}'" if text else "empty"
             # OpenSim reads the formula of a force that is off, and does not compute it.
             is_read = isinstance(item, Force) and not isinstance(error, UnknownVariableError)
             is_off = is_unused(subject, item) and not is_read
             report(
                 f"{tag} of "
                 f"{subject.describe_part(item) if not item.name else describe_object(item)} is "
-                f"{shown}: {reason}; {UNUSED if is_off else 'OpenSim cannot compute it'}",
+                f"{formula_text}: {reason}; {UNUSED if is_off else 'OpenSim cannot compute it'}",
                 item,
                 tag=tag,
                 severity=WARNING if is_off else None,

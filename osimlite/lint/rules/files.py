@@ -35,21 +35,27 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
       </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    items: list[tuple[Object, str, str]] = [
+    mesh_files: list[tuple[Object, str, str]] = [
         (mesh, "mesh_file", mesh.mesh_file) for mesh in subject.find_instances(Mesh)
     ]
-    items += [(mesh, "filename", mesh.filename) for mesh in subject.find_instances(ContactMesh)]
-    folder = subject.folder if items else None
+    mesh_files += [
+        (mesh, "filename", mesh.filename) for mesh in subject.find_instances(ContactMesh)
+    ]
+    folder = subject.folder if mesh_files else None
     if folder is None:
         return
     # OpenSim's search order.
-    beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
-    places = [str(path) for path in beside]
-    tried = join_words(dict.fromkeys(places))
+    search_folders = (
+        folder,
+        folder / "Geometry",
+        *(folder / path for path in subject.config.mesh_paths),
+    )
+    folder_paths = [str(path) for path in search_folders]
+    tried = join_words(dict.fromkeys(folder_paths))
     # A hundred meshes lie in one folder, which is listed once.
     remedy = f"name its folder {MESH_FOLDER_HINT}"
     folders = _FolderListings()
-    for item, tag, name in items:
+    for item, tag, name in mesh_files:
         severity = ERROR if isinstance(item, ContactMesh) else None
         if not name:
             consequence = "" if severity is None else ": OpenSim rejects the model"
@@ -60,15 +66,15 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
                 severity=severity,
             )
             continue
-        if any(folders.has(place, name) for place in places):
+        if any(folders.has(folder_path, name) for folder_path in folder_paths):
             continue
-        twin = folders.find_other_case(places, name)
+        twin = folders.find_other_case(folder_paths, name)
         message = (
             f"the file '{name}' of {describe_object(item)} was not found; searched {tried}; "
             f"{remedy}"
         )
         # `lexists` is true also for broken links.
-        if any(os.path.lexists(os.path.join(place, name)) for place in places):
+        if any(os.path.lexists(os.path.join(folder_path, name)) for folder_path in folder_paths):
             message = (
                 f"'{name}' of {describe_object(item)} is a folder, a device or a broken link, not "
                 "a file"
@@ -80,11 +86,17 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
             )
         # First the same name with slashes, then one in another letter case.
         elif "\\" in name:
-            plain = name.replace("\\", "/")
-            twin = plain if any(folders.has(place, plain) for place in places) else None
-            other = None if twin is not None else folders.find_other_case(places, plain)
-            if other is not None:
-                twin = f"{plain.rpartition('/')[0]}/{other}"
+            slash_name = name.replace("\\", "/")
+            twin = (
+                slash_name
+                if any(folders.has(folder_path, slash_name) for folder_path in folder_paths)
+                else None
+            )
+            other_case_name = (
+                None if twin is not None else folders.find_other_case(folder_paths, slash_name)
+            )
+            if other_case_name is not None:
+                twin = f"{slash_name.rpartition('/')[0]}/{other_case_name}"
             if twin is not None:
                 message = (
                     f"the file '{name}' of {describe_object(item)} exists as '{twin}': only "
@@ -120,7 +132,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
             continue
         included = note.owner.layout is not None and note.owner.layout.include is not None
         # Without a folder the reader could not look for the file, and has no reason.
-        read = included or (subject.folder is None and not note.why)
+        is_read = included or (subject.folder is None and not note.why)
         if note.owner is subject.top:
             report(
                 f"OpenSim does not read {describe_object(note.owner)} from '{note.value}': it "
@@ -132,8 +144,12 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
             )
             continue
         ignored = _has_content(subject.source, note.number)
-        state = "is read from" if read else "should be read from"
-        why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
+        state = "is read from" if is_read else "should be read from"
+        reason = (
+            ""
+            if is_read
+            else f", which {note.why or 'OpenSim does not open for a member of a set'}"
+        )
         consequence = (
             ": OpenSim ignores the content given here"
             if ignored
@@ -143,18 +159,18 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
         )
         # What stays empty has no name either.
         uses = subject.uses if note.why and subject.model is not None else []
-        wanted = sum(subject.resolution(use).target is note.owner for use in uses)
-        if wanted:
+        use_count = sum(subject.resolution(use).target is note.owner for use in uses)
+        if use_count:
             consequence += (
-                f", while {format_count(wanted, 'reference')} to it "
-                f"{'leads' if wanted == 1 else 'lead'} nowhere"
+                f", while {format_count(use_count, 'reference')} to it "
+                f"{'leads' if use_count == 1 else 'lead'} nowhere"
             )
         report(
-            f"{describe_object(note.owner)} {state} '{note.value}'{why}{consequence}",
+            f"{describe_object(note.owner)} {state} '{note.value}'{reason}{consequence}",
             note.owner,
             number=note.number,
             attribute="file",
-            severity=ERROR if ignored or wanted else None if read else WARNING,
+            severity=ERROR if ignored or use_count else None if is_read else WARNING,
         )
 
 
@@ -198,19 +214,21 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
         "ExternalLoads": "datafile",
         "TableSource": "filename",
     }
-    items = [(item, cls, tag) for cls, tag in tags.items() for item in subject.find_by_class(cls)]
-    if not items or subject.folder is None:
+    data_files = [
+        (item, cls, tag) for cls, tag in tags.items() for item in subject.find_by_class(cls)
+    ]
+    if not data_files or subject.folder is None:
         return
-    places = [str(subject.folder), ""]
+    folder_paths = [str(subject.folder), ""]
     folders = _FolderListings()
-    for item, cls, tag in items:
+    for item, cls, tag in data_files:
         name = getattr(item, tag)
         # "Unassigned" stands for none, except where OpenSim reads the file without a test.
         if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
             continue
-        if name and any(folders.has(place, name) for place in places):
+        if name and any(folders.has(folder_path, name) for folder_path in folder_paths):
             continue
-        twin = folders.find_other_case(places, name)
+        twin = folders.find_other_case(folder_paths, name)
         consequence = (
             "it has no controls" if cls == "ControlSetController" else "OpenSim rejects the model"
         )
@@ -228,35 +246,37 @@ class _FolderListings:
     def __init__(self) -> None:
         self._known: dict[str, dict[str, str]] = {}
 
-    def has(self, place: str, name: str) -> bool:
-        """Return whether the folder `place` has a file `name`, which may contain folders."""
-        listing, last = self._listing(place, name)
+    def has(self, root: str, name: str) -> bool:
+        """Return whether the folder `root` has a file `name`, which may contain folders."""
+        listing, file_name = self._listing(root, name)
         # Of ASCII names the listing decides; it saves a call to the system for each mesh.
-        if last.isascii() and last.lower() not in listing:
+        if file_name.isascii() and file_name.lower() not in listing:
             return False
         # The file system may ignore letter case for other characters, and the name may be that of
         # a folder, so ask it.
-        return os.path.isfile(os.path.join(place, name))
+        return os.path.isfile(os.path.join(root, name))
 
-    def find_other_case(self, places: list[str], name: str) -> str | None:
+    def find_other_case(self, roots: list[str], name: str) -> str | None:
         """Return the first file that differs from `name` in letter case only; None without one."""
-        for place in places:
-            listing, last = self._listing(place, name)
-            twin = listing.get(last.lower(), last)
-            if twin != last and os.path.isfile(os.path.join(place, os.path.dirname(name), twin)):
+        for root in roots:
+            listing, file_name = self._listing(root, name)
+            twin = listing.get(file_name.lower(), file_name)
+            if twin != file_name and os.path.isfile(
+                os.path.join(root, os.path.dirname(name), twin)
+            ):
                 return twin
         return None
 
-    def _listing(self, place: str, name: str) -> tuple[dict[str, str], str]:
+    def _listing(self, root: str, name: str) -> tuple[dict[str, str], str]:
         """Return the names in the folder of a file by their lower case, and the name of the file."""
-        folder, last = place or ".", name
+        folder, file_name = root or ".", name
         if "/" in name or os.sep in name:
-            before, last = os.path.split(name)
-            folder = os.path.join(place, before)
-        known = self._known.get(folder)
-        if known is None:
-            known = self._known[folder] = _list_lower_case(folder)
-        return known, last
+            parent, file_name = os.path.split(name)
+            folder = os.path.join(root, parent)
+        names = self._known.get(folder)
+        if names is None:
+            names = self._known[folder] = _list_lower_case(folder)
+        return names, file_name
 
 
 def _list_lower_case(folder: str) -> dict[str, str]:

@@ -60,14 +60,14 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
         # abscissae at a step.
         strictly = isinstance(function, (SimmSpline, GCVSpline))
         for index in range(1, len(function.x)):
-            before, here = function.x[index - 1], function.x[index]
-            if here < before or (strictly and here == before):
+            previous_x, current_x = function.x[index - 1], function.x[index]
+            if current_x < previous_x or (strictly and current_x == previous_x):
                 rejected = isinstance(function, GCVSpline)
                 is_off = is_unused(subject, function)
                 # Where both values repeat, the slope of 0/0 is never used: SimmSpline gives the
                 # constant.
                 level = (
-                    here == before
+                    current_x == previous_x
                     and not rejected
                     and function.y[index - 1 : index] == function.y[index : index + 1]
                 )
@@ -80,11 +80,11 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     if level
                     else "the function values are wrong"
                 )
-                relation = "repeats" if here == before else "is smaller than"
+                relation = "repeats" if current_x == previous_x else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
                 report(
                     f"x of {subject.describe_part(function)}: number {index + 1}, "
-                    f"{format_quantity(here)}, {relation} the one before; {consequence}",
+                    f"{format_quantity(current_x)}, {relation} the one before; {consequence}",
                     function,
                     tag="x",
                     word=word,
@@ -153,34 +153,34 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for function in _find_tabulated(subject):
-        least, is_off = 1, is_unused(subject, function)
+        min_count, is_off = 1, is_unused(subject, function)
         severity = WARNING if is_off else None
         if isinstance(function, SimmSpline):
-            least = 2
+            min_count = 2
         elif isinstance(function, GCVSpline):
             # A GCVSpline of order 2 m needs 2 m points (Woltring's GCVSPL).
-            least = 2 * function.half_order
+            min_count = 2 * function.half_order
         if isinstance(function, GCVSpline) and function.half_order < 1:
-            given = (
+            given_text = (
                 str(function.half_order)
                 if "half_order" in function.model_fields_set
                 else "not given"
             )
             consequence = _describe_refusal(subject, function)
             report(
-                f"half_order of {subject.describe_part(function)} is {given}: {consequence}; 2 is a "
+                f"half_order of {subject.describe_part(function)} is {given_text}: {consequence}; 2 is a "
                 "cubic spline",
                 function,
                 tag="half_order",
                 severity=severity,
             )
-        elif len(function.x) < least:
+        elif len(function.x) < min_count:
             consequence = "it has no value"
             if is_off or isinstance(function, GCVSpline):
                 consequence = _describe_refusal(subject, function)
-            given = format_count(len(function.x), "point")
+            given_text = format_count(len(function.x), "point")
             report(
-                f"{subject.describe_part(function)} has {given} and needs {least}: {consequence}",
+                f"{subject.describe_part(function)} has {given_text} and needs {min_count}: {consequence}",
                 function,
                 tag="x",
                 severity=severity,
@@ -220,43 +220,45 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
                 severity=WARNING if is_off else ERROR,
             )
     for polynomial in subject.find_instances(MultivariatePolynomialFunction):
-        dimension, order, given = (
+        dimension, order, coefficient_count = (
             polynomial.dimension,
             polynomial.order,
             len(polynomial.coefficients),
         )
         # The number of monomials of n variables up to order m is (n + m)! / (n! m!). Larger orders
         # would take very long to compute.
-        wanted = (
-            comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
+        expected_count = (
+            comb(dimension + order, order)
+            if 0 <= dimension < 100 and 0 <= order < 100
+            else coefficient_count
         )
-        if given != wanted:
+        if coefficient_count != expected_count:
             is_off = is_unused(subject, polynomial)
             consequence = UNUSED if is_off else "OpenSim fails when it needs a value"
             report(
-                f"{subject.describe_part(polynomial)} has {format_count(given, 'coefficient')}; "
-                f"{format_count(dimension, 'variable')} to order {order} need {wanted}: {consequence}",
+                f"{subject.describe_part(polynomial)} has {format_count(coefficient_count, 'coefficient')}; "
+                f"{format_count(dimension, 'variable')} to order {order} need {expected_count}: {consequence}",
                 polynomial,
                 tag="coefficients",
                 severity=WARNING if is_off else ERROR,
             )
     for holder, names, function in _find_linear_functions(subject):
         # The last coefficient is the constant.
-        given, wanted = len(function.coefficients), names + 1
-        if given and given != wanted:
+        coefficient_count, expected_count = len(function.coefficients), names + 1
+        if coefficient_count and coefficient_count != expected_count:
             # Measured: of ten runs with no coordinate, three computed NaN.
-            is_broken = given < wanted or not names
+            is_broken = coefficient_count < expected_count or not names
             consequence = (
                 "OpenSim reads beyond the end of the list"
-                if given < wanted
+                if coefficient_count < expected_count
                 else "OpenSim ignores the rest"
                 if names
                 else "OpenSim reads memory that it has not set"
             )
             report(
                 f"the LinearFunction of {describe_object(holder)} has "
-                f"{format_count(given, 'coefficient')} for {format_count(names, 'coordinate')}, expected "
-                f"{wanted}; {consequence}",
+                f"{format_count(coefficient_count, 'coefficient')} for {format_count(names, 'coordinate')}, expected "
+                f"{expected_count}; {consequence}",
                 function,
                 tag="coefficients",
                 severity=ERROR if is_broken else None,
@@ -286,22 +288,24 @@ def report_function_of_several(subject: Subject, report: FindingCollector) -> No
       </CoordinateCouplerConstraint>
     ```
     """
-    for holder, count, held in _find_functions_of_coordinates(subject):
+    for holder, count, wrapped_function in _find_functions_of_coordinates(subject):
         # Scaling wraps functions in multipliers, maybe several times.
-        function = held
+        function = wrapped_function
         while isinstance(function, MultiplierFunction):
             function = function.function
         # Linear functions take any number, which the rule OSIM604 compares.
-        wanted = function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
+        dimension = (
+            function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
+        )
         if (
             not isinstance(function, (*_ONE_VARIABLE, MultivariatePolynomialFunction))
-            or count == wanted
+            or count == dimension
             or not count
         ):
             continue
         report(
             f"the {type(function).tag} of {describe_object(holder)} takes "
-            f"{format_count(wanted, 'variable')} but is given {format_count(count, 'coordinate')}: OpenSim "
+            f"{format_count(dimension, 'variable')} but is given {format_count(count, 'coordinate')}: OpenSim "
             "computes wrong values",
             holder,
         )
@@ -347,9 +351,9 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
         for name in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, name)
             if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
-                given = format_count(len(functions.objects), "function")
+                count_text = format_count(len(functions.objects), "function")
                 report(
-                    f"{name} of {describe_object(force)} has {given}, not three or none: OpenSim "
+                    f"{name} of {describe_object(force)} has {count_text}, not three or none: OpenSim "
                     "rejects the file",
                     functions,
                 )
@@ -407,8 +411,8 @@ def _find_functions_of_coordinates(
 
 def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
     """Yield the linear functions of several variables: their owner, the number of variables, the function."""
-    for holder, count, held in _find_functions_of_coordinates(subject):
-        function = held
+    for holder, count, wrapped_function in _find_functions_of_coordinates(subject):
+        function = wrapped_function
         while isinstance(function, MultiplierFunction):
             function = function.function
         # Functions that the upgrade adds have no element, so no author could correct them.

@@ -69,9 +69,9 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
         )
         if refuses_axes(custom) and all(name in declared_names for name in names):
             # Names that axes use and the joint does not declare belong to other rules.
-            unused = [f"'{name}'" for name in declared_names if name not in names]
-            reason = f"no axis of {describe_object(custom)} uses {join_words(unused)}"
-            if not unused:
+            unused_names = [f"'{name}'" for name in declared_names if name not in names]
+            reason = f"no axis of {describe_object(custom)} uses {join_words(unused_names)}"
+            if not unused_names:
                 reason = f"{describe_object(custom)} declares more coordinates than its axes use"
             report(
                 f"{reason}: OpenSim rejects the model",
@@ -87,24 +87,24 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
     for joint in subject.find_instances(Joint):
         if joint.motion_types is None:
             continue
-        wanted = len(joint.motion_types)
-        given = len(list_coordinates(joint))
+        expected_count = len(joint.motion_types)
+        declared_count = len(list_coordinates(joint))
         # An empty element says that there are no coordinates, where a missing one leaves them to
         # OpenSim.
         declared = "coordinates" in joint.model_fields_set and (
-            given > 0 or _declares_none(subject, joint)
+            declared_count > 0 or _declares_none(subject, joint)
         )
-        if not declared and wanted and subject.source is not None:
+        if not declared and expected_count and subject.source is not None:
             report(
-                f"{describe_object(joint)} has no coordinates; OpenSim creates {wanted}, named '_coord_0'"
-                + (f" to '_coord_{wanted - 1}'" if wanted > 1 else ""),
+                f"{describe_object(joint)} has no coordinates; OpenSim creates {expected_count}, named '_coord_0'"
+                + (f" to '_coord_{expected_count - 1}'" if expected_count > 1 else ""),
                 joint,
                 severity=WARNING,
             )
-        elif given != wanted and (declared or given):
+        elif declared_count != expected_count and (declared or declared_count):
             report(
-                f"{describe_object(joint)} has {format_count(given, 'coordinate')}, "
-                f"{add_article(type(joint).tag)} needs {wanted}: OpenSim rejects the model",
+                f"{describe_object(joint)} has {format_count(declared_count, 'coordinate')}, "
+                f"{add_article(type(joint).tag)} needs {expected_count}: OpenSim rejects the model",
                 joint,
                 number=subject.element_of(joint, "coordinates"),
             )
@@ -140,20 +140,26 @@ def report_shared_coordinate_name(subject: Subject, report: FindingCollector) ->
     - <CoordinateLimitForce name="knee_limit"> <coordinate>hip_flexion</coordinate> </CoordinateLimitForce>
     ```
     """
-    first: dict[str, Coordinate] = {}
+    first_by_name: dict[str, Coordinate] = {}
     tree = subject.tree
     # Forces look a coordinate up by its name, and find the first.
     for component in subject.find_instances(Coordinate):
         joint = tree.parent_of(component)
-        known = first.setdefault(component.name, component)
+        first_coordinate = first_by_name.setdefault(component.name, component)
         # Within one joint the rule on names reports it.
-        if known is component or not component.name or tree.parent_of(known) is joint:
+        if (
+            first_coordinate is component
+            or not component.name
+            or tree.parent_of(first_coordinate) is joint
+        ):
             continue
-        named = (use for use in subject.uses if use.reference.rule == "coordinate-name")
-        users = [describe_object(use.owner) for use in named if use.value == component.name]
+        coordinate_uses = (use for use in subject.uses if use.reference.rule == "coordinate-name")
+        users = [
+            describe_object(use.owner) for use in coordinate_uses if use.value == component.name
+        ]
         message = (
             f"{describe_object(component)} has the same name as a coordinate of "
-            f"{describe_object(tree.parent_of(known) or known)}"
+            f"{describe_object(tree.parent_of(first_coordinate) or first_coordinate)}"
         )
         if users:
             message += (
@@ -277,23 +283,25 @@ def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for joint in subject.find_instances(Joint):
-        turns = find_rotation_axes(subject, joint)
+        rotation_axes = find_rotation_axes(subject, joint)
         # With fewer rotations there is no gimbal lock.
-        if len(turns) == 3:
+        if len(rotation_axes) == 3:
             # The triple product is the volume that the three unit vectors span: 0 if they are in a
             # plane.
-            (first, one), (_, two), (third, three) = turns
-            across = (
-                two[1] * three[2] - two[2] * three[1],
-                two[2] * three[0] - two[0] * three[2],
-                two[0] * three[1] - two[1] * three[0],
+            (first_name, first_axis), (_, second_axis), (third_name, third_axis) = rotation_axes
+            normal = (
+                second_axis[1] * third_axis[2] - second_axis[2] * third_axis[1],
+                second_axis[2] * third_axis[0] - second_axis[0] * third_axis[2],
+                second_axis[0] * third_axis[1] - second_axis[1] * third_axis[0],
             )
-            if abs(dot(one, across)) < _LOCKED:
-                second = next(item for item in list_coordinates(joint) if item.name == turns[1][0])
+            if abs(dot(first_axis, normal)) < _LOCKED:
+                second_coordinate = next(
+                    item for item in list_coordinates(joint) if item.name == rotation_axes[1][0]
+                )
                 report(
-                    f"{describe_object(joint)} starts in gimbal lock: {first} and {third} rotate "
+                    f"{describe_object(joint)} starts in gimbal lock: {first_name} and {third_name} rotate "
                     "about the same axis, and accelerations are NaN or unbounded",
-                    second,
+                    second_coordinate,
                     tag="default_value",
                 )
 

@@ -51,11 +51,11 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
         )
         # Namespaces are added by editors and do no harm.
         of_xml = INFO if _is_xml_attribute(note.word) else None
-        place = subject.attribute_name(note.number, note.word)
+        position = subject.attribute_name(note.number, note.word)
         report(
             message,
             owner,
-            at=place,
+            at=position,
             severity=of_xml,
             suggestion=suggestion,
             fix=None if of_xml else fix,
@@ -81,24 +81,26 @@ def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]
     if source is None or not source.attributes:
         return
     # Attributes of objects have the findings above.
-    known = {(note.number, note.word) for note in subject.notes if note.kind == "unknown-attribute"}
+    reported = {
+        (note.number, note.word) for note in subject.notes if note.kind == "unknown-attribute"
+    }
     # What OpenSim does not read has a finding as a whole.
-    kept = {note.number for note in subject.notes if note.kind in _UNREAD_KINDS}
-    inside = 0
+    unread_elements = {note.number for note in subject.notes if note.kind in _UNREAD_KINDS}
+    unread_end = 0
     for number, span in enumerate(source.spans):
-        if span.start < inside:
+        if span.start < unread_end:
             continue
-        if number in kept:
-            inside = span.end
+        if number in unread_elements:
+            unread_end = span.end
             continue
-        head = source.text[span.start : span.tag_end]
-        for match in ATTRIBUTE.finditer(head) if "=" in head else ():
-            word = match["name"]
+        start_tag = source.text[span.start : span.tag_end]
+        for match in ATTRIBUTE.finditer(start_tag) if "=" in start_tag else ():
+            attribute_name = match["name"]
             # The root has a version; other elements may have a name, or the file of an included
             # object.
-            meant = ("Version",) if number == 0 else ("name", "file")
-            if word not in meant and (number, word) not in known:
-                yield number, span.tag, word
+            known_names = ("Version",) if number == 0 else ("name", "file")
+            if attribute_name not in known_names and (number, attribute_name) not in reported:
+                yield number, span.tag, attribute_name
 
 
 @rule("OSIM106", "stray-text", severity=WARNING, fixes="safe")
@@ -126,16 +128,19 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
     ]
     for start, stray in sorted(_find_stray_texts(source)):
         # Text outside the root is worse, and another rule speaks of it.
-        if any(first < start < last for first, last in in_values) or start >= source.spans[0].end:
+        if (
+            any(value_start < start < value_end for value_start, value_end in in_values)
+            or start >= source.spans[0].end
+        ):
             continue
         text = stray.splitlines()[0]
         # A byte-order mark is invisible.
-        shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
-        whole = remove_text(source, start, start + len(stray))
+        text_description = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
+        fix = remove_text(source, start, start + len(stray))
         report(
-            f"OpenSim ignores the text {shown} between elements",
+            f"OpenSim ignores the text {text_description} between elements",
             at=source.position(start, len(text)),
-            fix=whole,
+            fix=fix,
         )
 
 
@@ -188,13 +193,15 @@ def report_defaults_block(subject: Subject, report: FindingCollector) -> None:
             # OpenSim registers the defaults for all models of the process.
             number=number,
         )
-        for item in source.children(number):
-            tag = source.spans[item].tag
+        for child in source.children(number):
+            tag = source.spans[child].tag
             for name, kind in _TOOL_CLASSES.get(tag, {}).items():
-                value = source.child(item, name)
-                if value is not None and (wanted := _describe_unreadable(source, value, kind)):
+                value = source.child(child, name)
+                if value is not None and (
+                    expected_content := _describe_unreadable(source, value, kind)
+                ):
                     report(
-                        f"<{name}> of the {tag} in <defaults> is not {wanted}: OpenSim rejects "
+                        f"<{name}> of the {tag} in <defaults> is not {expected_content}: OpenSim rejects "
                         "the file",
                         model,
                         number=value,
@@ -222,19 +229,19 @@ def report_force_outside_set(subject: Subject, report: FindingCollector) -> None
     ```
     """
     # One finding for each place, since a model may hold all its muscles there.
-    places: dict[int, list[Component]] = {}
+    forces_by_owner: dict[int, list[Component]] = {}
     for force in subject.find_instances(Force):
         above = subject.tree.parent_of(force)
         if above is not None and subject.model is not None and above is not subject.model.force_set:
-            places.setdefault(id(above), []).append(force)
-    for forces in places.values():
-        first, others = forces[0], len(forces) - 1
-        more = f" and {others} more" if others else ""
+            forces_by_owner.setdefault(id(above), []).append(force)
+    for forces in forces_by_owner.values():
+        first_force, other_count = forces[0], len(forces) - 1
+        others_text = f" and {other_count} more" if other_count else ""
         report(
-            f"{describe_object(first)}{more} {'are' if others else 'is'} outside the ForceSet: "
-            f"{'they act' if others else 'it acts'}, but tools that list the forces or muscles of the "
-            "model do not find " + ("them" if others else "it"),
-            first,
+            f"{describe_object(first_force)}{others_text} {'are' if other_count else 'is'} outside the ForceSet: "
+            f"{'they act' if other_count else 'it acts'}, but tools that list the forces or muscles of the "
+            "model do not find " + ("them" if other_count else "it"),
+            first_force,
             attribute="name",
         )
 
@@ -275,10 +282,10 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
     if subject.sure_until is not None:
         # What is missing may stand behind the syntax error.
         return
-    told = {note.number for note in subject.notes if note.kind == "child-in-value"}
+    reported_numbers = {note.number for note in subject.notes if note.kind == "child-in-value"}
     for refusal in subject.refusals:
         # OSIM107 reports what makes the value unreadable.
-        if refusal.number in told:
+        if refusal.number in reported_numbers:
             continue
         report(
             f"{refusal.message}: OpenSim, which must upgrade a document of version "
@@ -289,15 +296,15 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
 
 def _describe_unreadable(source: Source, number: int, kind: str) -> str:
     """Return what an element should contain; empty if it does."""
-    span, inside = source.spans[number], source.children(number)
-    pieces = [
-        piece
-        for piece in _COMMENT.split(source.text[span.tag_end : span.inner_end])
-        if piece.strip()
+    span, children = source.spans[number], source.children(number)
+    texts = [
+        text_piece
+        for text_piece in _COMMENT.split(source.text[span.tag_end : span.inner_end])
+        if text_piece.strip()
     ]
-    if inside or len(pieces) > 1:
+    if children or len(texts) > 1:
         return "a value"
-    text = "".join(pieces)
+    text = "".join(texts)
     try:
         if kind == "number":
             make_converter(Value("double", legacy=True))(text)

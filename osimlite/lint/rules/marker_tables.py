@@ -49,7 +49,7 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
     usual = spreads[len(spreads) // 2]
     if not _MIN_SPREAD_M <= usual * unit <= _MAX_SPREAD_M:
         # The markers of a person or an animal are spread over 0.2 to 3 m.
-        right = next(
+        likely_unit = next(
             (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES_PER_UNIT[name] <= 3.0),
             None,
         )
@@ -57,7 +57,7 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
             f"the markers of a frame are spread over {usual * unit:.3g} m if the units are "
             f"'{units.value.text}'",
             at=units.value.at,
-            suggestion=right,
+            suggestion=likely_unit,
         )
 
 
@@ -94,13 +94,13 @@ def report_marker_gap(table: Table, report: FindingCollector) -> None:
     """
     for fault in table.rows.select("zero", "part"):
         name = table.label_of(fault.number)
-        what = (
+        problem = (
             "is at 0 0 0, which OpenSim takes for a measured position"
             if fault.kind == "zero"
             else "lacks some of its coordinates"
         )
         report(
-            f"the marker '{name}' {what}{fault.describe_rest()}",
+            f"the marker '{name}' {problem}{fault.describe_rest()}",
             at=Position(fault.line, fault.column, fault.length),
         )
     for label in [
@@ -130,12 +130,12 @@ def report_frame_number(table: Table, report: FindingCollector) -> None:
     ```
     """
     for fault in table.rows.select("frame"):
-        what = (
+        problem = (
             f"'{fault.text}' does not follow the number of the previous frame"
             if fault.text
             else "the frame number is missing"
         )
         report(
-            f"{what}{fault.describe_rest()}",
+            f"{problem}{fault.describe_rest()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
         )

@@ -43,9 +43,9 @@ def report_character_reference(subject: Subject, report: FindingCollector) -> No
             report(
                 f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character "
                 "itself",
-                at=(place := source.position(match.start(), len(match[0]))),
+                at=(position := source.position(match.start(), len(match[0]))),
                 suggestion=chr(number),
-                fix=replace_text(source, place, chr(number)),
+                fix=replace_text(source, position, chr(number)),
             )
 
 
@@ -74,52 +74,56 @@ def report_lenient_xml(subject: Subject, report: FindingCollector) -> None:
             continue
         # Notes are in the order of the text, so the search continues after the previous word.
         offset = _find_word(source, max(offset + 1, source.line_start(note.line or 1)), note.word)
-        place = source.position(offset, len(note.word.splitlines()[0]))
+        position = source.position(offset, len(note.word.splitlines()[0]))
         match note.kind:
             case "bare-ampersand":
-                known = note.value != note.word
-                better = str(note.value) if known else f"&amp;{note.word[1:]}"
-                does = f"leaves the & out and keeps '{note.word[1:]}'" if known else "leaves it out"
+                is_entity = note.value != note.word
+                better = str(note.value) if is_entity else f"&amp;{note.word[1:]}"
+                consequence = (
+                    f"leaves the & out and keeps '{note.word[1:]}'"
+                    if is_entity
+                    else "leaves it out"
+                )
                 report(
-                    f"'{note.word}' is not valid XML; OpenSim {does}, other programs reject the "
+                    f"'{note.word}' is not valid XML; OpenSim {consequence}, other programs reject the "
                     "file",
-                    at=place,
+                    at=position,
                     suggestion=better,
-                    fix=replace_text(source, place, better),
+                    fix=replace_text(source, position, better),
                 )
             case "hyphens-in-comment":
                 report(
                     f"'{note.word}' is not allowed in a comment; OpenSim reads it, other programs "
                     "reject the file",
-                    at=place,
+                    at=position,
                     suggestion="-",
-                    fix=replace_text(source, place, "-"),
+                    fix=replace_text(source, position, "-"),
                 )
             case "overlooked":
                 # A single unprintable character is named by its code point.
-                odd = len(note.word) == 1 and not note.word.isprintable()
-                what = (
+                is_unprintable = len(note.word) == 1 and not note.word.isprintable()
+                description = (
                     f"the character U+{ord(note.word):04X}"
-                    if odd
+                    if is_unprintable
                     else f"'{note.word.splitlines()[0][:40]}'"
                 )
                 report(
-                    f"{what} is not valid XML; {note.value}, other programs reject the file",
-                    at=place,
+                    f"{description} is not valid XML; {note.value}, other programs reject the file",
+                    at=position,
                 )
             case "control-character":
-                place = source.position(_find_control_character(source, offset))
+                position = source.position(_find_control_character(source, offset))
                 report(
                     f"the character {note.word} is not valid XML; OpenSim reads it as a blank, "
                     "other programs reject the file",
-                    at=place,
-                    fix=replace_text(source, place, " "),
+                    at=position,
+                    fix=replace_text(source, position, " "),
                 )
             case _:
                 report(
                     "the XML declaration belongs at the very beginning; OpenSim reads it here, "
                     "other programs reject the file",
-                    at=place,
+                    at=position,
                     fix=remove_text(source, offset, offset + len(note.word)),
                 )
     start = source.text.find("<?xml")
@@ -139,8 +143,8 @@ _OVERLOOKED = frozenset(
 
 
 def _find_word(source: Source, start: int, word: str) -> int:
-    place = source.text.find(word, start)
-    return place if place >= 0 else start
+    word_start = source.text.find(word, start)
+    return word_start if word_start >= 0 else start
 
 
 def _find_control_character(source: Source, start: int) -> int:
@@ -174,11 +178,11 @@ def report_text_outside_root(subject: Subject, report: FindingCollector) -> None
             if not start and note.kind == "byte-order-mark":
                 # Two of them at the beginning do no harm.
                 continue
-            what = (
+            description = (
                 "a byte-order mark" if note.kind == "byte-order-mark" else f"the text '{note.word}'"
             )
             report(
-                f"{what} is outside the root element: OpenSim rejects the file",
+                f"{description} is outside the root element: OpenSim rejects the file",
                 at=source.position(start, len(note.word)),
                 fix=remove_text(source, start, start + 1)
                 if note.kind == "byte-order-mark"

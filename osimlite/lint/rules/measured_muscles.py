@@ -40,7 +40,7 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
       </Millard2012EquilibriumMuscle>
     ```
     """
-    most = subject.config.value_of(OFF)
+    max_difference = subject.config.value_of(OFF)
     for start in get_measures(subject).starts:
         muscle = subject.tree.find(start.owner)
         (length, settled), (tension, settled_tension) = start.lengths, start.tensions
@@ -52,7 +52,10 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
                 muscle,
                 severity=WARNING,
             )
-        elif abs(length - settled) > most or abs(tension - settled_tension) > most:
+        elif (
+            abs(length - settled) > max_difference
+            or abs(tension - settled_tension) > max_difference
+        ):
             report(
                 f"{describe_object(muscle)} starts with fibers of {length:.3g} optimal lengths "
                 f"and a tension of {tension:.3g} max_isometric_force; in equilibrium these are "

@@ -59,11 +59,11 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
       </PathWrapSet>
     ```
     """
-    most, measures = subject.config.value_of(OFF), get_measures(subject)
+    max_error, measures = subject.config.value_of(OFF), get_measures(subject)
     # Paths through a surface have OSIM633, which says more.
-    told = {item.owner for item in measures.on_surfaces}
+    reported_owners = {item.owner for item in measures.on_surfaces}
     for wrapping in measures.wrappings:
-        if abs(wrapping.worst) >= most and wrapping.owner not in told:
+        if abs(wrapping.worst) >= max_error and wrapping.owner not in reported_owners:
             owner, surfaces = (
                 subject.tree.find(wrapping.owner),
                 join_words([f"'{name}'" for name in wrapping.surfaces]),
@@ -111,14 +111,14 @@ def report_path_jump(subject: Subject, report: FindingCollector) -> None:
         if jump.size < subject.config.value_of(JUMP):
             continue
         owner = subject.tree.find(jump.owner)
-        parts = join_words([f"'{part}'" for part in jump.parts])
-        why = (
-            f"{parts} {'appear or disappear' if len(jump.parts) > 1 else 'appears or disappears'}"
-            if parts
+        changed_parts = join_words([f"'{part}'" for part in jump.parts])
+        reason = (
+            f"{changed_parts} {'appear or disappear' if len(jump.parts) > 1 else 'appears or disappears'}"
+            if changed_parts
             else "its route changes"
         )
         length = f"the length of the path of {describe_object(owner)}"
-        report(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {why}", owner)
+        report(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {reason}", owner)
 
 
 @rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES)
@@ -203,18 +203,22 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
     made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)
     # A limit force keeps the coordinate in its range, so that the rate beyond does not matter.
     limits = subject.find_by_class("CoordinateLimitForce")
-    kept = {
+    limited_names = {
         item.name
         for force in limits
         if (item := subject.target_of(force, "coordinate")) is not None
     }
     worst: dict[tuple[str, str], MovingPoint] = {}
     for point in get_measures(subject).moving_points:
-        if point.moved >= made_up or (point.rate >= rate and point.end.coordinate not in kept):
+        if point.moved >= made_up or (
+            point.rate >= rate and point.end.coordinate not in limited_names
+        ):
             # One finding for each point: the largest motion, then the largest rate.
-            other = worst.setdefault((point.owner, point.point), point)
+            worst_point = worst.setdefault((point.owner, point.point), point)
             worst[point.owner, point.point] = max(
-                other, point, key=lambda it: (it.moved >= made_up, it.moved, it.rate)
+                worst_point,
+                point,
+                key=lambda candidate: (candidate.moved >= made_up, candidate.moved, candidate.rate),
             )
     for point in worst.values():
         owner, end = subject.tree.find(point.owner), point.end

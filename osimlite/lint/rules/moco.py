@@ -49,19 +49,19 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
         # Initial and final bounds are intervals inside the bounds of the phase.
         for tag in ("bounds", "initial_bounds", "final_bounds"):
             ends: tuple[float, ...] = getattr(item, tag, ())
-            whole: tuple[float, ...] = item.bounds
+            phase_bounds: tuple[float, ...] = item.bounds
             if len(ends) == 2 and ends[0] > ends[1]:
                 report(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
             # Reversed bounds of the phase have a finding of their own.
             elif (
                 ends
-                and whole
-                and whole[0] <= whole[-1]
-                and (ends[-1] < whole[0] or ends[0] > whole[-1])
+                and phase_bounds
+                and phase_bounds[0] <= phase_bounds[-1]
+                and (ends[-1] < phase_bounds[0] or ends[0] > phase_bounds[-1])
             ):
                 report(
-                    f"{tag} of {describe_object(item)} are outside its bounds from {whole[0]:g} "
-                    f"to {whole[-1]:g}: OpenSim fails",
+                    f"{tag} of {describe_object(item)} are outside its bounds from {phase_bounds[0]:g} "
+                    f"to {phase_bounds[-1]:g}: OpenSim fails",
                     item,
                     tag=tag,
                 )
@@ -168,44 +168,44 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
     for item in setup.items:
         # Disabled goals are not read.
         for spec in get_member_specs(type(item)) if getattr(item, "enabled", True) else ():
-            held = getattr(item, spec.name)
+            source = getattr(item, spec.name)
             assert spec.names is not None and spec.accepts is not None
             tag = next((file.tag for file in get_file_specs(spec.accepts, "file")), "")
-            name = getattr(held, tag, "").strip()
+            name = getattr(source, tag, "").strip()
             if not name and spec.names.required and tag:
                 report(f"{describe_object(item)} names no table to track: OpenSim rejects it", item)
             table = setup.read_table(name)
             if table is not None and spec.names.target == "state variable":
-                said = table.entries.get("inDegrees")
+                degrees_entry = table.entries.get("inDegrees")
                 # Moco accepts only these two spellings.
-                if said is None or said.value.text not in ("yes", "no"):
+                if degrees_entry is None or degrees_entry.value.text not in ("yes", "no"):
                     report(
                         f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim rejects the "
                         "study",
-                        held,
+                        source,
                         tag=tag,
                     )
             if table is not None and table.span is not None and is_a(item, "MocoTool"):
                 first, last = table.span
                 for time in ("initial_time", "final_time"):
-                    wanted = getattr(item, time)
-                    if wanted is not None and not first <= wanted <= last:
+                    tool_time = getattr(item, time)
+                    if tool_time is not None and not first <= tool_time <= last:
                         report(
-                            f"'{name}' has {first!r} to {last!r} s, not {wanted!r} s: OpenSim "
+                            f"'{name}' has {first!r} to {last!r} s, not {tool_time!r} s: OpenSim "
                             "rejects the tool",
                             item,
                             tag=time,
                         )
-            allowed = any(getattr(item, flag, False) for flag in _ALLOWING_FLAGS)
+            allows_more_columns = any(getattr(item, flag, False) for flag in _ALLOWING_FLAGS)
             for column in (
                 []
-                if allowed or table is None
-                else _find_unknown_columns(setup, spec.names, held, table)
+                if allows_more_columns or table is None
+                else _find_unknown_columns(setup, spec.names, source, table)
             ):
                 report(
                     f"'{name}' has a column '{column}', which is not in the model: OpenSim "
                     "rejects the study",
-                    held,
+                    source,
                     tag=tag,
                 )
     # Operators of a ModelProcessor may add muscles and reserves that the guess has columns for.
@@ -221,51 +221,73 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     """Return what is wrong with the columns of a trajectory; empty if nothing is."""
     # Parameters are columns of a guess as well.
-    wanted = set(find_variables(tree, "state or control variable")) | {
+    expected_columns = set(find_variables(tree, "state or control variable")) | {
         item.name for item in setup.find_by_class("MocoParameter")
     }
     columns = {
         column
         for column in guess.columns
         # Other columns, such as multipliers and slacks, are named without a path.
-        if column in wanted or (column.startswith("/") and "/implicitderiv_" not in column)
+        if column in expected_columns
+        or (column.startswith("/") and "/implicitderiv_" not in column)
     }
-    missing, more = sorted(wanted - columns), sorted(columns - wanted)
-    if missing or more:
+    missing, extra_columns = sorted(expected_columns - columns), sorted(columns - expected_columns)
+    if missing or extra_columns:
         return (
             f"lacks {join_words(missing)}"
             if missing
-            else f"has {join_words(more)}, which the model does not have"
+            else f"has {join_words(extra_columns)}, which the model does not have"
         )
-    said = {
-        what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else ""
-        for what in _COUNTED
+    counts_by_kind = {
+        column_kind: guess.entries[key].value.text
+        if (key := f"num_{column_kind}") in guess.entries
+        else ""
+        for column_kind in _COUNTED
     }
     # A number for input controls was added later, and older files lack it.
-    odd = next((what for what in _COUNTED[:-1] if not said[what].isdecimal()), None)
-    if odd is not None:
-        return f"must say how many of its columns are {odd} (num_{odd}=...)"
+    faulty = next(
+        (
+            column_kind
+            for column_kind in _COUNTED[:-1]
+            if not counts_by_kind[column_kind].isdecimal()
+        ),
+        None,
+    )
+    if faulty is not None:
+        return f"must say how many of its columns are {faulty} (num_{faulty}=...)"
     total, count = (
-        sum(int(number) for number in said.values() if number.isdecimal()),
+        sum(int(number) for number in counts_by_kind.values() if number.isdecimal()),
         len(guess.columns),
     )
     if total != count:
         return f"has {count} columns, and {total} by the counts in its header"
     states = find_variables(tree, "state variable")
     # OpenSim reads the first columns as states, by their number.
-    odd = next(
-        (column for column in guess.columns[: int(said["states"])] if column not in states), None
+    faulty = next(
+        (
+            column
+            for column in guess.columns[: int(counts_by_kind["states"])]
+            if column not in states
+        ),
+        None,
     )
-    return "" if odd is None else f"has '{odd}' among its first columns, which are those of states"
+    return (
+        ""
+        if faulty is None
+        else f"has '{faulty}' among its first columns, which are those of states"
+    )
 
 
-def _find_unknown_columns(setup: Setup, reference: Reference, held: Any, table: Table) -> list[str]:
+def _find_unknown_columns(
+    setup: Setup, reference: Reference, table_processor: Any, table: Table
+) -> list[str]:
     """Return the columns of a table that do not name what they should."""
     tree = setup.tree
     if tree is None or Unknown in tree.by_class or any(setup.find_by_class("ModelOperator")):
         return []
     if any(
-        is_a(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())
+        is_a(operator, "TabOpUseAbsoluteStateNames")
+        for operator in getattr(table_processor, "operators", ())
     ):
         return []
     return [
@@ -379,5 +401,9 @@ def _describe_property_fault(parameter: Any, component: Component) -> str:
         return f"{name} of {describe_object(component)} is not one, three or six numbers"
     if size == 1:
         return "" if element is None else f"{name} is one number and needs no property_element"
-    wrong = element is None or not 0 <= element < size
-    return f"property_element must select one of the {size} numbers of {name}" if wrong else ""
+    is_out_of_range = element is None or not 0 <= element < size
+    return (
+        f"property_element must select one of the {size} numbers of {name}"
+        if is_out_of_range
+        else ""
+    )

@@ -40,7 +40,7 @@ def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     steepest, shortest, longest = (
-        subject.config.value_of(known) for known in (PENNATION, SHORTEST, LONGEST)
+        subject.config.value_of(threshold) for threshold in (PENNATION, SHORTEST, LONGEST)
     )
     for muscle in subject.find_by_class("Muscle"):
         angle = muscle.pennation_angle_at_optimal
@@ -55,8 +55,8 @@ def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
             )
         length, optimal = getattr(muscle, "default_fiber_length", None), muscle.optimal_fiber_length
         # 0.1, the default, is what OpenSim prints of every muscle that does not say.
-        given = "default_fiber_length" in muscle.model_fields_set and length != 0.1
-        if given and length is not None and optimal > 0 and 0 < length < math.inf:
+        is_given = "default_fiber_length" in muscle.model_fields_set and length != 0.1
+        if is_given and length is not None and optimal > 0 and 0 < length < math.inf:
             ratio = length / optimal
             if not shortest <= ratio <= longest:
                 report(
@@ -132,17 +132,19 @@ def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
         if len(points) < 2:
             continue
         length = sum(math.dist(*pair) for pair in pairwise(points))
-        tells = f"the path of {describe_object(muscle)} is {length:.4g} m long in the default pose"
+        length_text = (
+            f"the path of {describe_object(muscle)} is {length:.4g} m long in the default pose"
+        )
         # A path around a surface is longer than its straight line.
         if length < slack and not path.path_wrap_set.objects:
             report(
-                f"{tells}, less than its tendon_slack_length, {slack:.4g} m",
+                f"{length_text}, less than its tendon_slack_length, {slack:.4g} m",
                 muscle,
                 tag="tendon_slack_length",
             )
         elif (ratio := (length - slack) / optimal) > longest:
             report(
-                f"{tells}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack "
+                f"{length_text}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack "
                 "tendon",
                 muscle,
                 tag="optimal_fiber_length",
@@ -171,19 +173,19 @@ def report_shared_time_constants(subject: Subject, report: FindingCollector) -> 
       </DeGrooteFregly2016Muscle>
     ```
     """
-    first = None
+    first_muscle = None
     for muscle in subject.find_by_class("DeGrooteFregly2016Muscle"):
         # Without activation dynamics the constants are not used.
         if muscle.ignore_activation_dynamics:
             continue
         # OpenSim 4.6 shares the constants by mistake: the first such muscle sets them.
-        first = first or muscle
+        first_muscle = first_muscle or muscle
         for tag in _SHARED_CONSTANTS:
-            own, counts = getattr(muscle, tag), getattr(first, tag)
-            if own != counts:
+            own_value, used_value = getattr(muscle, tag), getattr(first_muscle, tag)
+            if own_value != used_value:
                 report(
-                    f"{tag} of {describe_object(muscle)} is {format_quantity(own)}, and OpenSim "
-                    f"computes with {format_quantity(counts)}, that of {describe_object(first)}",
+                    f"{tag} of {describe_object(muscle)} is {format_quantity(own_value)}, and OpenSim "
+                    f"computes with {format_quantity(used_value)}, that of {describe_object(first_muscle)}",
                     muscle,
                     tag=tag if tag in muscle.model_fields_set else None,
                 )
@@ -198,10 +200,10 @@ _SHARED_CONSTANTS = (
 
 def _locate_path_points(subject: Subject, path: GeometryPath) -> list[Vector]:
     """Return the positions of the active points of a path in the default pose; empty if one is unknown."""
-    poses, places = compute_default_poses(subject), []
+    poses, positions = compute_default_poses(subject), []
     for point in path.path_point_set.objects:
-        placed = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
-        if not isinstance(point, PathPoint) or placed is None or id(placed[0]) not in poses:
+        location = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
+        if not isinstance(point, PathPoint) or location is None or id(location[0]) not in poses:
             return []
         if isinstance(point, ConditionalPathPoint):
             coordinate = subject.target_of(point, "socket_coordinate")
@@ -210,7 +212,7 @@ def _locate_path_points(subject: Subject, path: GeometryPath) -> list[Vector]:
             # A point outside its range is not a part of the path.
             if not point.range[0] <= coordinate.default_value <= point.range[1]:
                 continue
-        places.append(
-            poses[id(placed[0])].transform_point(placed[1].transform_point(point.location))
+        positions.append(
+            poses[id(location[0])].transform_point(location[1].transform_point(point.location))
         )
-    return places
+    return positions

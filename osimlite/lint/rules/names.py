@@ -82,36 +82,40 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     for component in components:
         if _ILLEGAL.isdisjoint(component.name):
             continue
-        bad = [
+        illegal_characters = [
             character
             for character in dict.fromkeys(component.name)
             if character in ILLEGAL_CHARACTERS
         ]
-        shown = join_words(
-            ["white space" if character.isspace() else f"'{character}'" for character in bad]
+        character_list = join_words(
+            [
+                "white space" if character.isspace() else f"'{character}'"
+                for character in illegal_characters
+            ]
         )
         report(
-            f"the name of {describe_object(component)} contains {shown}: OpenSim rejects the file",
+            f"the name of {describe_object(component)} contains {character_list}: OpenSim rejects the file",
             component,
             attribute="name",
             suggestion="".join(
-                "_" if character in bad else character for character in component.name
+                "_" if character in illegal_characters else character
+                for character in component.name
             ),
             severity=ERROR,
         )
     # In a file this old OpenSim fixes the name, but not what names it.
     for change in subject.changes:
         if change.step == "names" and subject.source is not None:
-            place = subject.source.locate_attribute(change.number, "name")
-            start = subject.source.line_start(place.line) + place.column - 1
-            name = subject.source.text[start : start + place.length]
+            position = subject.source.locate_attribute(change.number, "name")
+            start = subject.source.line_start(position.line) + position.column - 1
+            name = subject.source.text[start : start + position.length]
             if any(character.isspace() for character in name) and not name.startswith("<"):
                 better = "".join(name.split())
                 users = list_old_references(subject.source, name)
-                used = subject.source.text.count(name) > 1
+                is_used = subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
                 consequence = f"OpenSim makes it '{better}'" + (
-                    ", but not where others use it" if used else ""
+                    ", but not where others use it" if is_used else ""
                 )
                 if users:
                     consequence = f"OpenSim makes it '{better}', but not in <{users[0]}>, and refuses the file"
@@ -122,9 +126,9 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
                 report(
                     f"the name '{name}' contains white space: in a file of version "
                     f"{subject.version} {consequence}",
-                    at=place,
+                    at=position,
                     suggestion=better,
-                    severity=ERROR if frame or users else None if used else INFO,
+                    severity=ERROR if frame or users else None if is_used else INFO,
                 )
 
 
@@ -138,21 +142,23 @@ def list_old_references(source: Source, name: str) -> list[str]:
     # Almost no document has such a name, and every start would pay for the import.
     from osimlite.io.document.upgrade.version_3_structure import NAME_LIST_TAGS, TEXT_TAGS
 
-    words = " ".join(name.split())
+    collapsed_name = " ".join(name.split())
     result: list[str] = []
     owners: list[Span] = []
     for span in source.spans:
         while owners and owners[-1].end <= span.start:
             owners.pop()
-        inside = source.text[span.tag_end : span.inner_end]
-        text = " ".join(inside.split())
-        found = words == text or (span.tag in NAME_LIST_TAGS and f" {words} " in f" {text} ")
+        inner_text = source.text[span.tag_end : span.inner_end]
+        text = " ".join(inner_text.split())
+        is_reference = collapsed_name == text or (
+            span.tag in NAME_LIST_TAGS and f" {collapsed_name} " in f" {text} "
+        )
         # OpenSim leaves out what a group or most controllers name in vain.
         harmless = span.tag == "members" or (
             span.tag in ("actuator_list", "muscle_list")
             and not (owners and owners[-1].tag == "PrescribedController")
         )
-        if found and not harmless and span.tag not in TEXT_TAGS:
+        if is_reference and not harmless and span.tag not in TEXT_TAGS:
             result.append(span.tag)
         owners.append(span)
     return result
@@ -189,29 +195,29 @@ def report_missing_name(subject: Subject, report: FindingCollector) -> None:
         )
         if not frame and not _should_have_name(subject, component):
             continue
-        wanted = _list_missing_names(subject, component)
-        if not wanted and (frame or component.name):
+        missing_names = _list_missing_names(subject, component)
+        if not missing_names and (frame or component.name):
             continue
-        last = _get_last_part(tree.path_of(component) or "")
-        message = f"this {type(component).tag} has no name; OpenSim names it '{last}'"
-        if wanted:
+        last_name = _get_last_part(tree.path_of(component) or "")
+        message = f"this {type(component).tag} has no name; OpenSim names it '{last_name}'"
+        if missing_names:
             count = format_count(
                 sum(
-                    _get_last_part(b.text) == wanted[0]
+                    _get_last_part(b.text) == missing_names[0]
                     for b in _find_fixable_references(subject, component)
                 ),
                 "reference",
             )
             message += (
-                f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} "
+                f", while {count} to '{missing_names[0]}' {'leads' if count.startswith('1 ') else 'lead'} "
                 "nowhere"
             )
         report(
             message,
             component,
             attribute="name",
-            severity=ERROR if wanted else None,
-            suggestion=wanted[0] if len(wanted) == 1 else None,
+            severity=ERROR if missing_names else None,
+            suggestion=missing_names[0] if len(missing_names) == 1 else None,
         )
 
 
@@ -240,13 +246,17 @@ def _find_fixable_references(subject: Subject, component: Component) -> list[Bro
             continue
         if isinstance(parent, Joint) and not isinstance(component, Coordinate):
             # A joint names its own frames, where a frame elsewhere of that name is of no use.
-            near = (
+            is_fixable = (
                 use.owner is parent and "/" not in broken.text and broken.why in ("missing", "form")
             )
         else:
-            beside = f"{subject.path(component).rpartition('/')[0]}/{_get_last_part(broken.text)}"
-            near = broken.why == "missing" and ("/" not in broken.text or broken.text == beside)
-        if near:
+            sibling_path = (
+                f"{subject.path(component).rpartition('/')[0]}/{_get_last_part(broken.text)}"
+            )
+            is_fixable = broken.why == "missing" and (
+                "/" not in broken.text or broken.text == sibling_path
+            )
+        if is_fixable:
             result.append(broken)
     return result
 
@@ -267,10 +277,10 @@ def _get_last_part(text: str) -> str:
 @cache_per_subject
 def _find_holders(subject: Subject) -> dict[int, dict[str, None]]:
     """Return the components that refer to each component, by its identity."""
-    known: dict[int, dict[str, None]] = {}
+    holders: dict[int, dict[str, None]] = {}
     for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input"):
-            known.setdefault(id(subject.resolution(use).target), {})[describe_object(use.owner)] = (
-                None
-            )
-    return known
+            holders.setdefault(id(subject.resolution(use).target), {})[
+                describe_object(use.owner)
+            ] = None
+    return holders

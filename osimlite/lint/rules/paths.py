@@ -99,26 +99,28 @@ def report_coincident_path_points(subject: Subject, report: FindingCollector) ->
       </PathPointSet>
     ```
     """
-    nearest = subject.config.value_of(DISTANCE)
+    min_distance = subject.config.value_of(DISTANCE)
     for path in subject.find_instances(GeometryPath):
         points: list[Object] = list(path.path_point_set.objects)
-        for before, point in pairwise(points):
+        for previous_point, point in pairwise(points):
             # Conditional and moving points are not always there.
-            if type(before) is not PathPoint or type(point) is not PathPoint:
+            if type(previous_point) is not PathPoint or type(point) is not PathPoint:
                 continue
             if (
-                before.location != point.location
+                previous_point.location != point.location
                 # `not >` includes NaN.
-                and not math.dist(before.location, point.location) <= nearest
+                and not math.dist(previous_point.location, point.location) <= min_distance
             ):
                 continue
             frame = subject.target_of(point, "socket_parent_frame")
             # Equal coordinates in different frames are different points.
-            if frame is not None and frame is subject.target_of(before, "socket_parent_frame"):
+            if frame is not None and frame is subject.target_of(
+                previous_point, "socket_parent_frame"
+            ):
                 owner = subject.tree.parent_of(path)
                 report(
                     f"{describe_object(point)} of {describe_object(owner or path)} is at the same "
-                    f"location as '{before.name}' before it",
+                    f"location as '{previous_point.name}' before it",
                     point,
                     tag="location",
                 )
@@ -170,7 +172,7 @@ def _report_unreachable(
     if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
         return
     low, high = sorted(coordinate.range)
-    first, last = point.range
+    range_start, range_end = point.range
     joint = subject.tree.parent_of(coordinate)
     motion = (
         list_motions(joint).get(coordinate.name)
@@ -178,32 +180,32 @@ def _report_unreachable(
         else None
     )
     # Where the function of the joint is unknown, the coordinate is taken for an angle.
-    turns = motion != "translational"
+    is_angle = motion != "translational"
     # Two per cent of the range allow for rounded numbers of degrees.
     slack = 0.02 * (high - low) + 1e-5
-    meant = (radians(first), radians(last))
+    converted = (radians(range_start), radians(range_end))
     fits = (
-        turns
+        is_angle
         # An angle beyond half a turn is unusual in radians.
-        and max(abs(first), abs(last)) > pi
-        and low - slack <= meant[0]
-        and meant[1] <= high + slack
+        and max(abs(range_start), abs(range_end)) > pi
+        and low - slack <= converted[0]
+        and converted[1] <= high + slack
     )
-    never = last < low - 1e-5 or first > high + 1e-5
+    is_never_active = range_end < low - 1e-5 or range_start > high + 1e-5
     # A range in degrees may begin at 0 or end there, which is in the range in radians too.
     # Two turns: no joint's range in radians reaches so far.
-    if never or (fits and max(abs(first), abs(last)) > 4.0 * pi):
-        unit = "rad" if turns else "m"
-        verb = "lies outside of" if never else "goes far beyond"
+    if is_never_active or (fits and max(abs(range_start), abs(range_end)) > 4.0 * pi):
+        unit = "rad" if is_angle else "m"
+        verb = "lies outside of" if is_never_active else "goes far beyond"
         report(
-            f"the range of {describe_object(point)}, {format_quantity(first)} to "
-            f"{format_quantity(last, unit)}, {verb} that of '{coordinate.name}', "
+            f"the range of {describe_object(point)}, {format_quantity(range_start)} to "
+            f"{format_quantity(range_end, unit)}, {verb} that of '{coordinate.name}', "
             f"{format_quantity(low)} to {format_quantity(high, unit)}"
-            + (": the point is never active" if never else "")
+            + (": the point is never active" if is_never_active else "")
             + ("; is it in degrees?" if fits else ""),
             point,
             tag="range",
-            suggestion=f"{meant[0]:.6g} {meant[1]:.6g}" if fits else None,
+            suggestion=f"{converted[0]:.6g} {converted[1]:.6g}" if fits else None,
         )
 
 
@@ -227,13 +229,13 @@ def report_unused_wrap_object(subject: Subject, report: FindingCollector) -> Non
     # An unknown class may be a path.
     if not surfaces or subject.has_unknown:
         return
-    used = {
+    used_surfaces = {
         id(subject.resolution(use).target)
         for use in subject.uses
         if use.reference.target == "WrapObject"
     }
     for surface in surfaces:
-        if id(surface) not in used:
+        if id(surface) not in used_surfaces:
             report(f"no path wraps around {describe_object(surface)}", surface, attribute="name")
 
 
@@ -257,13 +259,17 @@ def report_moving_point_coordinates(subject: Subject, report: FindingCollector) 
     """
     for point in subject.find_by_class("MovingPathPoint"):
         tags = ("socket_x_coordinate", "socket_y_coordinate", "socket_z_coordinate")
-        x, *others = (subject.target_of(point, tag) for tag in tags)
+        x_coordinate, *other_coordinates = (subject.target_of(point, tag) for tag in tags)
         # Missing sockets have rules of their own.
-        for tag, other in zip(tags[1:], others, strict=True):
-            if x is not None and other is not None and other is not x:
+        for tag, other_coordinate in zip(tags[1:], other_coordinates, strict=True):
+            if (
+                x_coordinate is not None
+                and other_coordinate is not None
+                and other_coordinate is not x_coordinate
+            ):
                 report(
-                    f"{describe_object(point)} follows {describe_object(x)} along x and "
-                    f"{describe_object(other)} along {tag[7]}: OpenSim rejects the model",
+                    f"{describe_object(point)} follows {describe_object(x_coordinate)} along x and "
+                    f"{describe_object(other_coordinate)} along {tag[7]}: OpenSim rejects the model",
                     point,
                     tag=tag,
                 )

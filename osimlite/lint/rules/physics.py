@@ -149,11 +149,11 @@ def report_limit_outside_range(subject: Subject, report: FindingCollector) -> No
         unit = "m" if scale == 1.0 else "deg"
         # The limit force acts from the transition on; 1e-6 allows for rounded numbers.
         slack = abs(force.transition) + subject.config.value_of(BEYOND) * (high - low) + 1e-6
-        for tag, limit, outside in (
+        for tag, limit, is_outside in (
             ("upper_limit", force.upper_limit, force.upper_limit > high + slack),
             ("lower_limit", force.lower_limit, force.lower_limit < low - slack),
         ):
-            if outside:
+            if is_outside:
                 report(
                     f"{tag} of {describe_object(force)} is {format_quantity(limit, unit)}, beyond "
                     f"the range of '{coordinate.name}' ({format_quantity(low)} to "
@@ -184,7 +184,7 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
         unit = "m" if scale == 1.0 else "deg"
         slack = max(abs(force.transition), subject.config.value_of(INSIDE) * (high - low)) + 1e-6
         start = coordinate.default_value * scale
-        for tag, limit, inside, beyond in (
+        for tag, limit, is_inside, excess in (
             (
                 "upper_limit",
                 force.upper_limit,
@@ -198,19 +198,21 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
                 force.lower_limit - start,
             ),
         ):
-            acts = beyond > abs(force.transition)
+            acts = excess > abs(force.transition)
             # A range of many turns stands for none, or is in degrees; so does a limit that is not
             # given.
             widest = math.degrees(subject.config.value_of(UNLIMITED))
-            given = tag in force.model_fields_set and (unit == "m" or high - low < widest)
+            is_given = tag in force.model_fields_set and (unit == "m" or high - low < widest)
             # Swapped limits have OSIM507.
-            if inside and given and force.lower_limit <= force.upper_limit:
-                meant = math.degrees(limit)
+            if is_inside and is_given and force.lower_limit <= force.upper_limit:
+                in_degrees = math.degrees(limit)
                 # Both limits are as small as angles in radians are, and one is a bound of the range
                 # then.
-                small = max(abs(force.lower_limit), abs(force.upper_limit)) <= 2 * math.pi
-                near = min(abs(meant - low), abs(meant - high)) <= 0.1 * (high - low)
-                radians = unit == "deg" and small and near
+                is_small = max(abs(force.lower_limit), abs(force.upper_limit)) <= 2 * math.pi
+                is_near_bound = min(abs(in_degrees - low), abs(in_degrees - high)) <= 0.1 * (
+                    high - low
+                )
+                radians = unit == "deg" and is_small and is_near_bound
                 report(
                     f"{tag} of {describe_object(force)} is {format_quantity(limit, unit)}, inside "
                     f"the range of '{coordinate.name}' ({format_quantity(low)} to "
@@ -224,7 +226,7 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
                     force,
                     tag=tag,
                     severity=WARNING if acts or radians else None,
-                    suggestion=f"{meant:.6g}" if radians else None,
+                    suggestion=f"{in_degrees:.6g}" if radians else None,
                 )
 
 

@@ -70,20 +70,20 @@ def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -
     ```
     """
     for broken in _select_broken(subject, "wrong-type"):
-        other = broken.other
-        assert other is not None
-        kind = other.class_name if isinstance(other, Unknown) else type(other).tag
+        target = broken.other
+        assert target is not None
+        kind = target.class_name if isinstance(target, Unknown) else type(target).tag
         message = (
             f"{_format_subject(subject, broken.use)} '{broken.text}', which is "
             f"{add_article(kind)}, not {add_article(broken.use.reference.target)}"
         )
-        fixed = (
-            _list_contacts(subject, other)
+        fixed_contacts = (
+            _list_contacts(subject, target)
             if broken.use.reference.target == "ContactGeometry"
             else []
         )
-        if fixed:
-            message += f"; contact geometry fixed to it: {join_words(fixed)}"
+        if fixed_contacts:
+            message += f"; contact geometry fixed to it: {join_words(fixed_contacts)}"
         _report_broken(subject, report, broken, message)
 
 
@@ -112,8 +112,8 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
                 attribute="name",
             )
             continue
-        given = use.spec.name in use.holder.model_fields_set
-        state = "is empty" if given else "is not given"
+        is_given = use.spec.name in use.holder.model_fields_set
+        state = "is empty" if is_given else "is not given"
         report(
             f"{use.spec.tag} of {_describe_holder(subject, use)} {state}, expected the name of "
             f"{add_article(use.reference.target)}",
@@ -140,12 +140,14 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for broken in _select_broken(subject, "form"):
-        wanted = "a bare name" if broken.suggestion and "/" not in broken.suggestion else "a path"
-        if wanted == "a path" and "/" in broken.text and not broken.text.startswith("/"):
-            wanted = "a path that begins with a slash"
+        expected_form = (
+            "a bare name" if broken.suggestion and "/" not in broken.suggestion else "a path"
+        )
+        if expected_form == "a path" and "/" in broken.text and not broken.text.startswith("/"):
+            expected_form = "a path that begins with a slash"
         message = (
             f"{_format_subject(subject, broken.use)} '{broken.text}'; this property expects "
-            f"{wanted}"
+            f"{expected_form}"
         )
         _report_broken(subject, report, broken, message)
     for change in subject.changes:
@@ -154,15 +156,15 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
                 # OpenSim reads the first of several connectors of one name.
                 continue
             # In files of the time a name stood in an element of its own inside a connector.
-            inner = next(iter(subject.source.children(change.number)), change.number)
-            place = subject.source.locate_text(inner)
-            start = subject.source.line_start(place.line) + place.column - 1
-            text = subject.source.text[start : start + place.length]
+            name_element = next(iter(subject.source.children(change.number)), change.number)
+            position = subject.source.locate_text(name_element)
+            start = subject.source.line_start(position.line) + position.column - 1
+            text = subject.source.text[start : start + position.length]
             report(
                 f"{change.where} names '{text}', as files did during the development of version "
                 "4: OpenSim 4.6 finds nothing there and rejects the model; `osimlite upgrade` "
                 "rewrites the path",
-                at=place,
+                at=position,
             )
 
 
@@ -219,9 +221,9 @@ class BrokenReference(NamedTuple):
     hint: str = ""
 
 
-def _select_broken(subject: Subject, why: str) -> Iterator[BrokenReference]:
+def _select_broken(subject: Subject, failure: str) -> Iterator[BrokenReference]:
     """Return the broken references of one kind."""
-    return (broken for broken in find_broken_references(subject) if broken.why == why)
+    return (broken for broken in find_broken_references(subject) if broken.why == failure)
 
 
 @cache_per_subject
@@ -236,9 +238,11 @@ def _iterate_broken_references(subject: Subject) -> Iterator[BrokenReference]:
         resolution = subject.resolution(use) if use.value != "" else tree.resolve(use)
         if resolution.failure is None:
             if _needs_plain_path(use) and isinstance(use.value, str):
-                written = tree.path_of(resolution.target) if resolution.target is not None else None
-                if use.value != written:
-                    yield BrokenReference(use, use.value, "form", None, written)
+                target_path = (
+                    tree.path_of(resolution.target) if resolution.target is not None else None
+                )
+                if use.value != target_path:
+                    yield BrokenReference(use, use.value, "form", None, target_path)
             continue
         if resolution.failure != "illegal" and (
             _is_overwritten(subject, use) or _is_made_up(subject, use)
@@ -285,9 +289,9 @@ def _explain_reference(
     stripped = text.strip(",;")
     if stripped != text and tree.lookup(reference, stripped, use.owner).target is not None:
         return BrokenReference(use, text, "missing", None, stripped, "comma")
-    right = _list_right_words(subject, use)
-    last = text.rstrip("/").rpartition("/")[2]
-    same_name = [word for word in right if word.rpartition("/")[2] == last]
+    valid_texts = _list_right_words(subject, use)
+    last_name = text.rstrip("/").rpartition("/")[2]
+    same_name = [word for word in valid_texts if word.rpartition("/")[2] == last_name]
     if same_name and resolution.failure != "wrong-type" and _differs_in_form(text, same_name):
         return BrokenReference(
             use,
@@ -297,15 +301,19 @@ def _explain_reference(
             pick_closest(text, same_name),
             "" if len(same_name) == 1 else "several",
         )
-    other = resolution.found or _find_elsewhere(subject, use, text)
-    if other is not None and is_a(other, reference.target):
+    wrong_target = resolution.found or _find_elsewhere(subject, use, text)
+    if wrong_target is not None and is_a(wrong_target, reference.target):
         # A coordinate, but of another joint.
-        other = None
-    if other is not None and not same_name:
-        return BrokenReference(use, text, "wrong-type", other, find_nearest(text, right, cutoff=75))
+        wrong_target = None
+    if wrong_target is not None and not same_name:
+        return BrokenReference(
+            use, text, "wrong-type", wrong_target, find_nearest(text, valid_texts, cutoff=75)
+        )
     if same_name and resolution.failure == "wrong-type":
-        if other is not None and text.startswith("/"):
-            return BrokenReference(use, text, "wrong-type", other, pick_closest(text, same_name))
+        if wrong_target is not None and text.startswith("/"):
+            return BrokenReference(
+                use, text, "wrong-type", wrong_target, pick_closest(text, same_name)
+            )
         return BrokenReference(
             use,
             text,
@@ -314,30 +322,34 @@ def _explain_reference(
             pick_closest(text, same_name),
             "" if len(same_name) == 1 else "several",
         )
-    lowered = [word for word in right if word.lower() == text.lower()]
+    lowered = [word for word in valid_texts if word.lower() == text.lower()]
     if lowered:
         return BrokenReference(use, text, "case", None, lowered[0])
     hint = "illegal" if resolution.failure == "illegal" else ""
     # Nothing is meant twice in one list.
-    named = getattr(use.holder, use.spec.name)
-    free = right if isinstance(named, str) else sorted(set(right).difference(named or ()))
-    return BrokenReference(use, text, "missing", None, find_nearest_name(text, free), hint)
+    current_values = getattr(use.holder, use.spec.name)
+    unused_texts = (
+        valid_texts
+        if isinstance(current_values, str)
+        else sorted(set(valid_texts).difference(current_values or ()))
+    )
+    return BrokenReference(use, text, "missing", None, find_nearest_name(text, unused_texts), hint)
 
 
 def _list_right_words(subject: Subject, use: Use) -> list[str]:
     """Return every valid text; it is the same for all references of one kind in one component."""
-    known = cast(
+    texts_by_kind = cast(
         "dict[tuple[str, str, int], list[str]]", subject.cache.setdefault("right words", {})
     )
     key = (use.reference.rule, use.reference.target, id(use.owner))
-    if key not in known and use.reference.rule == "set-member":
+    if key not in texts_by_kind and use.reference.rule == "set-member":
         tree = subject.tree
-        known[key] = sorted(
+        texts_by_kind[key] = sorted(
             {item.name for item in tree.components if tree.parent_of(item) is use.owner}
         )
-    elif key not in known:
-        known[key] = subject.tree.list_spellings(use)
-    return known[key]
+    elif key not in texts_by_kind:
+        texts_by_kind[key] = subject.tree.list_spellings(use)
+    return texts_by_kind[key]
 
 
 def _differs_in_form(text: str, candidates: list[str]) -> bool:
@@ -437,14 +449,14 @@ def _report_broken(
 ) -> None:
     use = broken.use
     value = getattr(use.holder, use.spec.name)
-    before = value[: use.position] if isinstance(value, tuple) and use.position else ()
-    nth = sum(1 for word in before if word == broken.text)
+    earlier_values = value[: use.position] if isinstance(value, tuple) and use.position else ()
+    nth = sum(1 for word in earlier_values if word == broken.text)
     # OpenSim drops what a group names wrongly and continues.
     severity = WARNING if use.reference.rule == "set-member" else None
     by_name = use.spec.name == "name"
     if by_name:
         message += "; OpenSim disables the whole probe"
-    place = (
+    position = (
         None
         if by_name
         else subject.position(use.holder, tag=use.spec.tag, word=broken.text, nth=nth)
@@ -457,7 +469,7 @@ def _report_broken(
         for note in subject.notes
     ):
         # What OpenSim ignores here may hold what is meant.
-        place = None
+        position = None
     report(
         message,
         use.holder,
@@ -467,5 +479,5 @@ def _report_broken(
         nth=nth,
         suggestion=broken.suggestion,
         severity=severity,
-        fix=replace_text(subject.source, place, broken.suggestion, safe=certain),
+        fix=replace_text(subject.source, position, broken.suggestion, safe=certain),
     )

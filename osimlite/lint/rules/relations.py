@@ -70,8 +70,14 @@ def report_contradicting_values(subject: Subject, report: FindingCollector) -> N
                 for tag, message in (
                     relation(item, owner) if relation is not None else item.find_contradictions()
                 ):
-                    of = "" if item.name and item is owner else f" of {describe_object(owner)}"
-                    report(f"{describe_object(item)}{of}: {message}: {REFUSED}", item, tag=tag)
+                    owner_phrase = (
+                        "" if item.name and item is owner else f" of {describe_object(owner)}"
+                    )
+                    report(
+                        f"{describe_object(item)}{owner_phrase}: {message}: {REFUSED}",
+                        item,
+                        tag=tag,
+                    )
 
 
 @rule("OSIM510", "controls-swapped", severity=WARNING)
@@ -94,12 +100,12 @@ def report_controls_swapped(subject: Subject, report: FindingCollector) -> None:
     for actuator in subject.find_by_class("ScalarActuator"):
         low, high = actuator.min_control, actuator.max_control
         if low > high:
-            given = "min_control" if "min_control" in actuator.model_fields_set else "max_control"
+            tag = "min_control" if "min_control" in actuator.model_fields_set else "max_control"
             report(
                 f"min_control of {describe_object(actuator)}, {format_quantity(low)}, is above "
                 f"its max_control, {format_quantity(high)}",
                 actuator,
-                tag=given,
+                tag=tag,
             )
 
 
@@ -111,19 +117,19 @@ def _make_curve_relation(make: Callable[..., object]) -> _Relation:
     """Return the check of a muscle curve; `make` takes its properties and raises what is wrong."""
 
     def contradiction(curve: Any, owner: Any) -> Iterator[Contradiction]:
-        used = {name: getattr(curve, name) for name in type(curve).__annotations__}
+        values = {name: getattr(curve, name) for name in type(curve).__annotations__}
         # NaN and infinity have OSIM205.
-        if not all(value is None or math.isfinite(value) for value in used.values()):
+        if not all(value is None or math.isfinite(value) for value in values.values()):
             return
         # Muscles overwrite some properties of their curves.
         overwritten = owner.overwritten if is_a(owner, "Muscle") else {}
-        used |= {name: overwritten[name] for name in used.keys() & overwritten.keys()}
+        values |= {name: overwritten[name] for name in values.keys() & overwritten.keys()}
         try:
-            make(*used.values())
+            make(*values.values())
         except ValueError as error:
             # The message names the property as its second word.
             word = str(error).split()[1].rstrip(",")
-            yield word if word in used else None, str(error)
+            yield word if word in values else None, str(error)
 
     return contradiction
 
@@ -136,18 +142,18 @@ def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]
         yield "coordinate_paths", f"coordinate_paths names '{name}' twice"
     arms, count = path.moment_arm_functions, len(coordinates)
     if arms and len(arms) != count:
-        given = f"{len(arms)} functions for {format_count(count, 'coordinate')}"
-        yield "moment_arm_functions", f"moment_arm_functions has {given}"
+        counts = f"{len(arms)} functions for {format_count(count, 'coordinate')}"
+        yield "moment_arm_functions", f"moment_arm_functions has {counts}"
     # The speed depends on all coordinates and their speeds.
     functions = [("length_function", path.length_function, count)]
     functions += [("moment_arm_functions", arm, count) for arm in arms]
     functions.append(("lengthening_speed_function", path.lengthening_speed_function, 2 * count))
-    for tag, function, wanted in functions:
+    for tag, function, expected_count in functions:
         result = _count_arguments(function)
-        if result is not None and result != wanted:
+        if result is not None and result != expected_count:
             yield (
                 tag,
-                f"a function of its {tag} takes {format_count(result, 'argument')} instead of {wanted}",
+                f"a function of its {tag} takes {format_count(result, 'argument')} instead of {expected_count}",
             )
 
 

@@ -58,11 +58,11 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
         slashed = naming.name.replace("\\", "/")
         is_meant = slashed != naming.name and os.path.isfile(setup.resolve_path(slashed))
         twin = slashed if is_meant else _find_other_case(naming)
-        why = "; backslashes separate folders on Windows only" if "\\" in naming.name else ""
+        hint = "; backslashes separate folders on Windows only" if "\\" in naming.name else ""
         goes_on = is_a(naming.item, "ControlSetController")
         consequence = "OpenSim continues without it" if goes_on else "OpenSim rejects the setup"
         report(
-            f"the file '{naming.name}' of {describe_object(naming.item)} does not exist{why}: "
+            f"the file '{naming.name}' of {describe_object(naming.item)} does not exist{hint}: "
             f"{consequence}",
             naming.item,
             tag=naming.spec.tag,
@@ -102,19 +102,19 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
                 severity=WARNING,
             )
         if is_a(item, "AnalyzeTool"):
-            given = [
+            named_files = [
                 tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))
             ]
-            if len(given) != 1:
-                what = (
+            if len(named_files) != 1:
+                file_names = (
                     "both a states_file and a coordinates_file"
-                    if given
+                    if named_files
                     else "neither states nor coordinates"
                 )
-                severity = ERROR if given else WARNING
-                consequence = "OpenSim rejects it" if given else NO_FILE_CONSEQUENCE
+                severity = ERROR if named_files else WARNING
+                consequence = "OpenSim rejects it" if named_files else NO_FILE_CONSEQUENCE
                 report(
-                    f"{describe_object(item)} names {what}: {consequence}",
+                    f"{describe_object(item)} names {file_names}: {consequence}",
                     item,
                     tag="coordinates_file",
                     severity=severity,
@@ -158,24 +158,26 @@ def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None
     for naming in setup.find_named_files("file"):
         if not os.path.isfile(naming.path):
             continue
-        wanted, _, either = get_content_type(naming.spec).partition(" or ")
+        expected_type, _, either = get_content_type(naming.spec).partition(" or ")
         if either == "table" and is_table(naming.name):
             continue
-        if wanted in _ENDINGS:
-            if not naming.name.lower().endswith(_ENDINGS[wanted]):
+        if expected_type in _ENDINGS:
+            if not naming.name.lower().endswith(_ENDINGS[expected_type]):
                 report(
                     f"{naming.spec.tag} of {describe_object(naming.item)} must be a table "
-                    f"({', '.join(_ENDINGS[wanted])})",
+                    f"({', '.join(_ENDINGS[expected_type])})",
                     naming.item,
                     tag=naming.spec.tag,
                 )
-        elif wanted[:1].isupper():
-            top = None if is_table(naming.name) else setup.read_document(naming.name)
-            held = "a table" if top is None else add_article(type(top).__name__)
-            if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
+        elif expected_type[:1].isupper():
+            document = None if is_table(naming.name) else setup.read_document(naming.name)
+            actual_type = "a table" if document is None else add_article(type(document).__name__)
+            if is_table(naming.name) or (
+                document is not None and not is_a(document, expected_type)
+            ):
                 report(
-                    f"{naming.spec.tag} of {describe_object(naming.item)}: expected a {wanted}, "
-                    f"but '{naming.name}' holds {held}",
+                    f"{naming.spec.tag} of {describe_object(naming.item)}: expected a {expected_type}, "
+                    f"but '{naming.name}' holds {actual_type}",
                     naming.item,
                     tag=naming.spec.tag,
                 )
@@ -220,7 +222,9 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
             )
     # A tool makes its own folder before it writes.
     # Folders that a tool makes exist when it writes.
-    made = {os.path.normpath(naming.name) for naming in setup.find_named_files("output-folder")}
+    created_folders = {
+        os.path.normpath(naming.name) for naming in setup.find_named_files("output-folder")
+    }
     for naming in setup.find_named_files("output-file"):
         folder = os.path.dirname(naming.name)
         if is_a(naming.item, "InverseDynamicsTool"):
@@ -236,7 +240,7 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
         elif (
             folder
             and not os.path.isdir(os.path.join(setup.folder, folder))
-            and os.path.normpath(folder) not in made
+            and os.path.normpath(folder) not in created_folders
         ):
             report(
                 f"the folder of '{naming.name}' does not exist: OpenSim does not create it",
@@ -291,29 +295,29 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
         or not (mine := find_motion_file(*setup.tool))
     ):
         return
-    here = os.path.realpath(setup.tool[0])
-    told: set[str] = set()
-    for file, other in setup.neighbours:
-        place = os.path.realpath(file)
+    tool_path = os.path.realpath(setup.tool[0])
+    reported_tags: set[str] = set()
+    for file, other_tool in setup.neighbours:
+        other_path = os.path.realpath(file)
         if (
-            place == here
-            or os.path.dirname(place) != os.path.dirname(here)
-            or find_motion_file(file, other) != mine
+            other_path == tool_path
+            or os.path.dirname(other_path) != os.path.dirname(tool_path)
+            or find_motion_file(file, other_tool) != mine
         ):
             continue
-        for tag, what in _SHARED.items():
-            one, two = (getattr(tool, tag, None) for tool in (setup.top, other))
+        for tag, difference in _SHARED.items():
+            value, other_value = (getattr(tool, tag, None) for tool in (setup.top, other_tool))
             if (
-                one is not None
-                and two is not None
-                and _is_set(two)
-                and not _is_set(one)
+                value is not None
+                and other_value is not None
+                and _is_set(other_value)
+                and not _is_set(value)
                 # Each setting is reported once, however many tools differ.
-                and tag not in told
+                and tag not in reported_tags
             ):
-                told.add(tag)
+                reported_tags.add(tag)
                 report(
-                    f"'{os.path.basename(file)}' {what.format(two)} for the same motion, but this "
+                    f"'{os.path.basename(file)}' {difference.format(other_value)} for the same motion, but this "
                     "tool does not",
                     setup.top,
                     tag=tag,

@@ -65,10 +65,10 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
     ):
         if setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
             continue
-        said = table.entries.get("Units")
-        places, unit = (
+        units_entry = table.entries.get("Units")
+        positions, unit = (
             locate_markers(setup),
-            METRES_PER_UNIT.get(said.value.text, math.nan) if said else math.nan,
+            METRES_PER_UNIT.get(units_entry.value.text, math.nan) if units_entry else math.nan,
         )
         rows, columns = (
             list(iterate_rows_between(table, scaler.time_range)),
@@ -81,21 +81,27 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
                 else ()
             )
             for pair in pairs:
-                one, other = (
+                first_marker, second_marker = (
                     (str(name) for name in pair.markers) if len(pair.markers) == 2 else ("", "")
                 )
-                if {one, other} <= columns.keys() & places.keys() and one != other:
-                    apart = (
-                        sum(math.dist(row[columns[one]], row[columns[other]]) for row in rows)
+                if {
+                    first_marker,
+                    second_marker,
+                } <= columns.keys() & positions.keys() and first_marker != second_marker:
+                    measured_distance = (
+                        sum(
+                            math.dist(row[columns[first_marker]], row[columns[second_marker]])
+                            for row in rows
+                        )
                         * unit
                         / len(rows)
                     )
-                    before = math.dist(places[one], places[other])
-                    factor = apart / before if before else math.inf
+                    model_distance = math.dist(positions[first_marker], positions[second_marker])
+                    factor = measured_distance / model_distance if model_distance else math.inf
                     if factor < _MIN_FACTOR or factor > _MAX_FACTOR:
                         report(
-                            f"{one} and {other} are {apart:.3g} m apart in "
-                            f"'{scaler.marker_file}', and {before:.3g} m in the model: "
+                            f"{first_marker} and {second_marker} are {measured_distance:.3g} m apart in "
+                            f"'{scaler.marker_file}', and {model_distance:.3g} m in the model: "
                             f"{describe_object(measurement)} scales by {factor:.3g}",
                             pair,
                             tag="markers",
@@ -128,31 +134,31 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
     for user, table in find_marker_users(setup):
         if setup.tree is None or not table.is_markers:
             continue
-        places, columns = locate_markers(setup), dict(list_marker_cells(table))
+        positions, columns = locate_markers(setup), dict(list_marker_cells(table))
         pairs = [
             (name, fellow)
             for name in columns
-            if (fellow := _find_left_marker(name, places.keys() & columns.keys()))
-            and name in places
-            and 0.03 < math.dist(places[name], places[fellow]) < 0.5
+            if (fellow := _find_left_marker(name, positions.keys() & columns.keys()))
+            and name in positions
+            and 0.03 < math.dist(positions[name], positions[fellow]) < 0.5
         ]
         model = _compute_agreement(
-            [_compute_direction(places[left], places[right]) for right, left in pairs]
+            [_compute_direction(positions[left], positions[right]) for right, left in pairs]
         )
-        seen = [0] * len(pairs)
+        seen_counts = [0] * len(pairs)
         turned = [0] * len(pairs)
         for row in _select_rows(user, table):
             row = row + [math.nan] * (2 + 3 * len(columns) - len(row))
-            ways = [
+            directions = [
                 _compute_direction(
                     _hide_origin(row[columns[left]]), _hide_origin(row[columns[right]])
                 )
                 for right, left in pairs
             ]
-            for number, agreement in enumerate(_compute_agreement(ways)):
-                seen[number] += agreement == agreement
+            for number, agreement in enumerate(_compute_agreement(directions)):
+                seen_counts[number] += agreement == agreement
                 turned[number] += agreement * model[number] < -0.3
-        for (right, left), rows, wrong in zip(pairs, seen, turned, strict=True):
+        for (right, left), rows, wrong in zip(pairs, seen_counts, turned, strict=True):
             if rows and wrong >= 0.8 * rows:
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
                 report(
@@ -170,10 +176,12 @@ def _select_rows(user: Any, table: Table) -> list[list[float]]:
     span = tuple(getattr(user, "time_range", ()))
     if len(span) != 2 or not span[0] <= span[1]:
         return list(table.rows.samples)
-    within = [row for row in table.rows.samples if len(row) > 1 and span[0] <= row[1] <= span[1]]
+    rows_in_range = [
+        row for row in table.rows.samples if len(row) > 1 and span[0] <= row[1] <= span[1]
+    ]
     return (
-        within
-        if len(within) >= _MIN_ROWS
+        rows_in_range
+        if len(rows_in_range) >= _MIN_ROWS
         else list(islice(iterate_rows_between(table, span), _MAX_ROWS))
     )
 
@@ -206,16 +214,22 @@ def _compute_direction(start: Sequence[float], end: Sequence[float]) -> list[flo
     return [(b - a) / length for a, b in zip(start, end, strict=True)]
 
 
-def _compute_agreement(ways: list[list[float]]) -> list[float]:
+def _compute_agreement(directions: list[list[float]]) -> list[float]:
     """Return the cosine of each direction with the mean of the others; NaN if few are known or they disagree."""
-    known = [way for way in ways if way[0] == way[0]]
-    whole = [sum(parts) for parts in zip(*known, strict=True)] or [0.0, 0.0, 0.0]
+    known_directions = [direction for direction in directions if direction[0] == direction[0]]
+    sums = [sum(components) for components in zip(*known_directions, strict=True)] or [
+        0.0,
+        0.0,
+        0.0,
+    ]
     result = []
-    for way in ways:
-        rest = [total - part for total, part in zip(whole, way, strict=True)]
-        length = math.hypot(*rest)
-        agree = len(known) > 3 and length > 0.5 * (len(known) - 1)
+    for direction in directions:
+        others_sum = [total - component for total, component in zip(sums, direction, strict=True)]
+        length = math.hypot(*others_sum)
+        agree = len(known_directions) > 3 and length > 0.5 * (len(known_directions) - 1)
         result.append(
-            sum(a * b for a, b in zip(way, rest, strict=True)) / length if agree else math.nan
+            sum(a * b for a, b in zip(direction, others_sum, strict=True)) / length
+            if agree
+            else math.nan
         )
     return result

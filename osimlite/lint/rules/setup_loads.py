@@ -101,24 +101,26 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                     continue
                 # OpenSim compares the beginnings of labels, so that "ground_force_v" matches
                 # "ground_force_vx" and others.
-                own = [column for column in columns if column.startswith(prefix)]
-                if len(own) != 3 or len(set(own)) != 3:
-                    what = join_words(own) if own else "none"
+                matching_columns = [column for column in columns if column.startswith(prefix)]
+                if len(matching_columns) != 3 or len(set(matching_columns)) != 3:
+                    found_columns = join_words(matching_columns) if matching_columns else "none"
                     report(
                         f"expected three columns of '{loads.datafile}' that begin with '{prefix}' "
-                        f"({tag} of {describe_object(force)}), found {what}: OpenSim rejects the "
+                        f"({tag} of {describe_object(force)}), found {found_columns}: OpenSim rejects the "
                         "loads",
                         force,
                         tag=tag,
                         # Too many columns match if the identifier is too short, for which another
                         # spelling is no help.
-                        suggestion=None if len(own) > 3 else find_nearest_name(prefix, prefixes),
+                        suggestion=None
+                        if len(matching_columns) > 3
+                        else find_nearest_name(prefix, prefixes),
                     )
-                elif [column[-1:].lower() for column in own] != ["x", "y", "z"] and {
-                    column[-1:].lower() for column in own
+                elif [column[-1:].lower() for column in matching_columns] != ["x", "y", "z"] and {
+                    column[-1:].lower() for column in matching_columns
                 } == {"x", "y", "z"}:
                     report(
-                        f"'{loads.datafile}' has {join_words(own)} in this order: OpenSim uses the "
+                        f"'{loads.datafile}' has {join_words(matching_columns)} in this order: OpenSim uses the "
                         "first as x",
                         force,
                         tag=tag,
@@ -167,44 +169,46 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
     weight = math.hypot(*model.gravity)
     if motion is None or not weight:
         return
-    up = tuple(-part / weight for part in model.gravity)
+    up = tuple(-component / weight for component in model.gravity)
     mass = sum(body.mass for body in setup.tree.list_members("/bodyset", "Body").values())
     for loads in setup.find_by_class("ExternalLoads"):
         table = setup.read_table(loads.datafile)
-        whole = [0.0, 0.0, 0.0]
+        mean_force = [0.0, 0.0, 0.0]
         for force in select_members(loads, "ExternalForce") if table is not None else ():
             # The signs of axes show in the mean of all loads.
             acting = _sample_load(setup, force, table, motion)
-            for push in acting:
-                whole = [
-                    total + push.size * part / _SAMPLE_COUNT
-                    for total, part in zip(whole, push.direction, strict=True)
+            for sample in acting:
+                mean_force = [
+                    total + sample.size * component / _SAMPLE_COUNT
+                    for total, component in zip(mean_force, sample.direction, strict=True)
                 ]
-            far = [push.away for push in acting if push.away > _MAX_DISTANCE_M]
+            far_distances = [sample.away for sample in acting if sample.away > _MAX_DISTANCE_M]
             # At a few times the measured centre of pressure may be far off, when the foot touches
             # the ground.
-            if len(far) > max(2, len(acting) // 4):
+            if len(far_distances) > max(2, len(acting) // 4):
                 report(
-                    f"at {len(far)} of {len(acting)} times {describe_object(force)} acts more "
+                    f"at {len(far_distances)} of {len(acting)} times {describe_object(force)} acts more "
                     f"than {_MAX_DISTANCE_M:g} m from {force.applied_to_body}, by up to "
-                    f"{max(far):.3g} m: does it belong to another body, or are its points in "
+                    f"{max(far_distances):.3g} m: does it belong to another body, or are its points in "
                     "another frame or unit?",
                     force,
                     tag="applied_to_body",
                 )
-            elif sum(push.twist > _MAX_DISTANCE_M for push in acting) > max(2, len(acting) // 4):
+            elif sum(sample.twist > _MAX_DISTANCE_M for sample in acting) > max(
+                2, len(acting) // 4
+            ):
                 report(
                     f"the torque of {describe_object(force)} corresponds to its force at a "
-                    f"distance of {max(push.twist for push in acting):.3g} m: is it in newton "
+                    f"distance of {max(sample.twist for sample in acting):.3g} m: is it in newton "
                     "millimetres, or about another point?",
                     force,
                     tag="torque_identifier",
                 )
             lifted = [
                 # The rule compares the numbers as they are written with those rotated to ground.
-                dot(push.written, up) - dot(push.direction, up)
-                for push in acting
-                if push.written != push.direction
+                dot(sample.written, up) - dot(sample.direction, up)
+                for sample in acting
+                if sample.written != sample.direction
             ]
             # The numbers point up more than the rotated vector at all times: they are given in
             # ground.
@@ -215,12 +219,14 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
                     force,
                     tag="force_expressed_in_body",
                 )
-        lift = sum(part * share for part, share in zip(whole, up, strict=True))
+        lift = sum(
+            component * up_component for component, up_component in zip(mean_force, up, strict=True)
+        )
         # The sum of the reactions of a gait points up, apart from some braking.
-        if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * lift):
+        if math.hypot(*mean_force) > max(0.5 * mass * weight, 2.0 * lift):
             report(
-                f"the mean sum of these forces is {math.hypot(*whole):.0f} N "
-                f"({', '.join(f'{n:.0f}' for n in whole)}), which does not point up: are their "
+                f"the mean sum of these forces is {math.hypot(*mean_force):.0f} N "
+                f"({', '.join(f'{n:.0f}' for n in mean_force)}), which does not point up: are their "
                 "axes or signs wrong?",
                 loads,
                 tag="datafile",
@@ -254,16 +260,20 @@ def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -
     if setup.tree is None or table is None or table.span is None or motion.span is None:
         return []
     bodies = setup.tree.list_members("/bodyset", "Body")
-    places = [
+    column_indices = [
         [
-            place
-            for place, label in enumerate(table.columns, 1)
+            index
+            for index, label in enumerate(table.columns, 1)
             if prefix and label.startswith(prefix)
         ]
         for prefix in (force.force_identifier, force.point_identifier, force.torque_identifier)
     ]
     first, last = max(table.span[0], motion.span[0]), min(table.span[1], motion.span[1])
-    if [len(part) for part in places[:2]] != [3, 3] or not first < last or not force.appliesForce:
+    if (
+        [len(indices) for indices in column_indices[:2]] != [3, 3]
+        or not first < last
+        or not force.appliesForce
+    ):
         return []
     # Moments in the middle of equal parts of the time.
     rows = [
@@ -272,32 +282,34 @@ def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -
     ]
     # Missing data make a row useless.
     rows = [row for row in rows if len(row) == len(table.labels) and not any(map(math.isnan, row))]
-    sizes = [math.hypot(*(row[place] for place in places[0])) for row in rows]
+    sizes = [math.hypot(*(row[index] for index in column_indices[0])) for row in rows]
     result = []
     for row, size in zip(rows, sizes, strict=True):
         # Small forces have an undefined centre of pressure.
         if size > max(20.0, 0.2 * max(sizes)):
             poses = compute_poses_of_motion(setup, motion, row[0])
-            (x, y, z), (px, py, pz), torque = ([row[place] for place in part] for part in places)
+            (x, y, z), (px, py, pz), torque = (
+                [row[index] for index in indices] for indices in column_indices
+            )
             frames = (
                 force.applied_to_body,
                 force.force_expressed_in_body,
                 force.point_expressed_in_body,
             )
             names = [str(frame).rpartition("/")[2] for frame in frames]
-            within = [
+            frame_poses = [
                 FramePose() if name == "ground" else poses.get(id(bodies.get(name)))
                 for name in names
             ]
-            body, of_force, of_point = within
+            body, of_force, of_point = frame_poses
             # Frames on joints of unknown motion have no pose.
             if body is not None and of_force is not None and of_point is not None:
                 direction = (x / size, y / size, z / size)
                 point = of_point.transform_point((px, py, pz))
-                known = _list_body_points(setup).get(names[0], [])
+                body_points = _list_body_points(setup).get(names[0], [])
                 away = min(
-                    math.dist(body.transform_point(place), point)
-                    for place in [(0.0, 0.0, 0.0), *known]
+                    math.dist(body.transform_point(index), point)
+                    for index in [(0.0, 0.0, 0.0), *body_points]
                 )
                 result.append(
                     _LoadSample(

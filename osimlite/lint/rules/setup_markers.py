@@ -59,8 +59,8 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
             if task.apply and task.name
         ]
         model = setup.list_names("Marker")
-        both = [task for task in tasks if task.name in labels and task.name in model]
-        if tasks and model and not both:
+        usable_tasks = [task for task in tasks if task.name in labels and task.name in model]
+        if tasks and model and not usable_tasks:
             report(
                 f"no marker of the tasks is in both the model and '{user.marker_file}': OpenSim "
                 "crashes",
@@ -77,14 +77,18 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
                 tag=tag,
                 severity=ERROR,
             )
-        free = 0
-        if setup.tree is not None and both:
-            free = sum(not setup.is_bound(name) for name in setup.tree.find_by_class("Coordinate"))
-        others = sum(task.apply for task in select_members(user.ik_task_set, "IKCoordinateTask"))
-        if 3 * len(both) + others < free:
+        free_count = 0
+        if setup.tree is not None and usable_tasks:
+            free_count = sum(
+                not setup.is_bound(name) for name in setup.tree.find_by_class("Coordinate")
+            )
+        task_count = sum(
+            task.apply for task in select_members(user.ik_task_set, "IKCoordinateTask")
+        )
+        if 3 * len(usable_tasks) + task_count < free_count:
             report(
-                f"{format_count(len(both), 'marker')} and {format_count(others, 'coordinate task')} do not "
-                f"determine the {free} free coordinates of the model",
+                f"{format_count(len(usable_tasks), 'marker')} and {format_count(task_count, 'coordinate task')} do not "
+                f"determine the {free_count} free coordinates of the model",
                 user.ik_task_set,
             )
         for task in tasks:
@@ -98,7 +102,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
     for scaler, static in setup.iterate_with_tables(
         setup.find_by_class("ModelScaler"), "marker_file"
     ):
-        gone = _find_unseen_markers(static, scaler.time_range)
+        unseen_markers = _find_unseen_markers(static, scaler.time_range)
         for measurement in (
             select_members(scaler.measurement_set, "Measurement") if scaler.apply else ()
         ):
@@ -117,7 +121,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
                             word=str(name),
                             suggestion=find_nearest_name(str(name), static.columns),
                         )
-                    elif name in gone:
+                    elif name in unseen_markers:
                         report(
                             f"'{name}' is not seen in every row of '{scaler.marker_file}' that is "
                             f"averaged: OpenSim ignores the whole measurement '{measurement.name}'",
@@ -129,12 +133,12 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
 
 def _find_unseen_markers(table: Table, span: tuple[float, ...]) -> set[str]:
     """Return the markers that are missing in a row between two times."""
-    places = list_marker_cells(table)
+    cells_by_label = list_marker_cells(table)
     return {
         label
         for row in iterate_rows_between(table, span)
-        for label, place in places
-        if any(map(math.isnan, row[place]))
+        for label, cells in cells_by_label
+        if any(map(math.isnan, row[cells]))
     }
 
 

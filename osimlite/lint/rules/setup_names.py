@@ -56,7 +56,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     if tree is None:
         return
     # Parts of disabled goals are not looked up by OpenSim.
-    off = {
+    disabled_parts = {
         id(part)
         for goal in setup.find_by_class("MocoGoal")
         if not goal.enabled
@@ -64,17 +64,21 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     }
 
     def counts(item: Any) -> bool:
-        return id(item) not in off and vars(item).get("on", True) and vars(item).get("apply", True)
+        return (
+            id(item) not in disabled_parts
+            and vars(item).get("on", True)
+            and vars(item).get("apply", True)
+        )
 
     for cls, items in setup.by_class.items():
         for spec in get_reference_specs(cls):
             kind = spec.reference
-            what = _get_kind(kind) if kind.required and kind.shape != "list" else None
-            for item in items if what else ():
+            target_kind = _get_kind(kind) if kind.required and kind.shape != "list" else None
+            for item in items if target_kind else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
                     consequence, severity = _CONSEQUENCES[kind.consequence]
                     report(
-                        f"{describe_object(item)} names no {what}: {consequence}",
+                        f"{describe_object(item)} names no {target_kind}: {consequence}",
                         item,
                         tag=spec.tag,
                         severity=severity,
@@ -83,19 +87,19 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
 
     @cache
-    def list_known_names(what: str, rule: str) -> set[str]:
+    def list_known_names(target_kind: str, rule: str) -> set[str]:
         if rule in _PATHS:
-            return set(find_variables(tree, what))
+            return set(find_variables(tree, target_kind))
         # Actuators may be named by their path in the force set.
-        if what == "Actuator":
+        if target_kind == "Actuator":
             return {
-                *find_variables(tree, what),
-                *(f"/forceset/{name}" for name in setup.list_names(what)),
+                *find_variables(tree, target_kind),
+                *(f"/forceset/{name}" for name in setup.list_names(target_kind)),
             }
         return (
             set()
-            if what == "component"
-            else setup.list_names({"frame": "Body"}.get(what, what.capitalize()))
+            if target_kind == "component"
+            else setup.list_names({"frame": "Body"}.get(target_kind, target_kind.capitalize()))
         )
 
     for use in setup.uses:
@@ -110,10 +114,10 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
             continue
         if not counts(item):
             continue
-        what, text, target = _look_up_text(setup, tree, use, text)
-        if what is None or target is not None:
+        target_kind, text, target = _look_up_text(setup, tree, use, text)
+        if target_kind is None or target is not None:
             continue
-        names = list_known_names(what, kind.rule)
+        names = list_known_names(target_kind, kind.rule)
         # 1. Known names; 2. parts of unknown objects; 3. what operators of the study will create.
         if (
             text in names
@@ -124,21 +128,23 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         # Of names in the older <actuator_list> only those are missed that are to have a function
         # each.
         is_lost = (
-            kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
+            kind.rule == "socket"
+            and target_kind == "actuator"
+            and not is_a(item, "PrescribedController")
         )
         consequence, severity = _CONSEQUENCES["left out" if is_lost else kind.consequence]
-        more = "; write it in lower case" if text.lower() in kind.words else ""
-        where: Where = {"tag": use.spec.tag, "word": text}
+        hint = "; write it in lower case" if text.lower() in kind.words else ""
+        position: Where = {"tag": use.spec.tag, "word": text}
         if use.spec.tag == "@name":
-            where = {"attribute": "name"}
+            position = {"attribute": "name"}
             # Names that other objects of this class use already are no likely spelling.
-            names = names.difference(other.name for other in setup.by_class[type(item)])
+            names = names.difference(sibling.name for sibling in setup.by_class[type(item)])
         report(
-            f"the model has no {what} '{text}', which {describe_object(item)} names: {consequence}{more}",
+            f"the model has no {target_kind} '{text}', which {describe_object(item)} names: {consequence}{hint}",
             item,
-            **where,
+            **position,
             severity=severity,
-            suggestion=text.lower() if more else find_nearest_name(text, sorted(names)),
+            suggestion=text.lower() if hint else find_nearest_name(text, sorted(names)),
         )
     if setup.tool is not None and is_a(setup.tool[1], "AbstractTool"):
         _look_up_controls(setup, setup.tool[1], setup.list_names("Actuator") | unknown, report)
@@ -146,7 +152,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
 
 def _get_kind(kind: Reference) -> str | None:
     """Return what a reference names in the model; None if it is not looked up there."""
-    by_rule = (what for what in _KINDS if kind.rule.startswith(what))
+    by_rule = (target_kind for target_kind in _KINDS if kind.rule.startswith(target_kind))
     return kind.target if kind.rule in _PATHS else next(by_rule, None)
 
 
@@ -158,40 +164,46 @@ def _look_up_text(
     Returns:
         What it should name or None, the text as looked up, and the component or None.
     """
-    item, kind, what = use.holder, use.reference, _get_kind(use.reference)
+    item, kind, target_kind = use.holder, use.reference, _get_kind(use.reference)
     # In older formats controllers name their actuators without a path.
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.
         return "actuator", text.rpartition("/")[2], None
     if kind.rule == "socket" and kind.target.endswith(("Frame", "Actuator")):
-        place = next(
+        set_path = next(
             (f"{path}/{item.name}" for cls, path in _PLACES.items() if is_a(item, cls)), ""
         )
-        named = kind.target if kind.target == "Actuator" else "component"
-        what = named if place or text.startswith("/") else None
-        return what, text, tree.walk(text, place, kind.target).target
+        socket_kind = kind.target if kind.target == "Actuator" else "component"
+        target_kind = socket_kind if set_path or text.startswith("/") else None
+        return target_kind, text, tree.walk(text, set_path, kind.target).target
     if kind.rule == "state-path" and kind.target == "output":
         # A channel and another name may follow.
         # The channel of an output, and an alias, follow after ":" or in brackets.
         text = re.sub(r"(?<=\|)([^:(]*).*", r"\1", text if text.startswith("/") else f"/{text}")
-    target = tree.lookup(kind, text, tree.model).target if what is not None else None
-    return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
+    target = tree.lookup(kind, text, tree.model).target if target_kind is not None else None
+    return (
+        target_kind,
+        text,
+        target or (tree.walk(text, "", "Frame").target if target_kind == "frame" else None),
+    )
 
 
 def _look_up_controls(
-    setup: Setup, tool: Object, plain: set[str], report: FindingCollector
+    setup: Setup, tool: Object, actuator_names: set[str], report: FindingCollector
 ) -> None:
     """Report controls, and columns of controls, without an actuator."""
     # Without a model every control would be unknown.
-    if not plain:
+    if not actuator_names:
         return
     # Of tools that follow a motion these are bounds, and go by the whole name.
     follows = hasattr(tool, "desired_kinematics_file")
     consequence, severity = _CONSEQUENCES["left out" if follows else "refused"]
-    actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
+    actuators = {f"{name}.excitation" for name in actuator_names} | (
+        set() if follows else actuator_names
+    )
     controls = list(setup.find_by_class("Control"))
     # A free actuator is more likely to be meant than one that has a control.
-    free = sorted(actuators.difference(control.name for control in controls))
+    free_actuators = sorted(actuators.difference(control.name for control in controls))
     for control in controls:
         if control.name not in actuators:
             report(
@@ -199,7 +211,7 @@ def _look_up_controls(
                 control,
                 attribute="name",
                 severity=severity,
-                suggestion=find_nearest_name(control.name, free),
+                suggestion=find_nearest_name(control.name, free_actuators),
             )
         elif not follows and getattr(control, "x_nodes", None) == []:
             report(
@@ -214,9 +226,9 @@ def _look_up_controls(
     for controller, table in setup.iterate_with_tables(
         setup.find_by_class("ControlSetController"), "controls_file"
     ):
-        if lost := [column for column in table.columns if column not in actuators]:
+        if unknown_columns := [column for column in table.columns if column not in actuators]:
             report(
-                f"the model has no actuator for the columns {join_words(map(repr, lost))} of "
+                f"the model has no actuator for the columns {join_words(map(repr, unknown_columns))} of "
                 f"'{controller.controls_file}': OpenSim rejects it",
                 controller,
                 tag="controls_file",
@@ -225,9 +237,9 @@ def _look_up_controls(
 
 def _is_made_by_operators(setup: Setup, text: str) -> bool:
     """Return whether the model operators of a study may create the component with this path."""
-    makes = {type(operator).__name__ for operator in setup.find_by_class("ModelOperator")}
-    return ("ModOpAddReserves" in makes and "/reserve_" in text) or (
-        "ModOpReplaceMusclesWithDeGrooteFregly2016" in makes
+    operator_names = {type(operator).__name__ for operator in setup.find_by_class("ModelOperator")}
+    return ("ModOpAddReserves" in operator_names and "/reserve_" in text) or (
+        "ModOpReplaceMusclesWithDeGrooteFregly2016" in operator_names
         and text.endswith("/normalized_tendon_force")
     )
 
@@ -273,10 +285,10 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
             or word in (groups or names)
         ):
             continue
-        why = "; the model has groups, and OpenSim then looks at groups only"
+        hint = "; the model has groups, and OpenSim then looks at groups only"
         # If a model has groups, OpenSim compares with their names only.
         report(
-            f"the model has no force or group of forces '{word}'{why if word in names else ''}: "
+            f"the model has no force or group of forces '{word}'{hint if word in names else ''}: "
             "OpenSim excludes nothing for it",
             use.holder,
             tag="forces_to_exclude",

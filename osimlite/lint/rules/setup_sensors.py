@@ -48,8 +48,8 @@ def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
     for item, tag, ending, table in _find_orientations(setup):
         file = getattr(item, tag)
         # OpenSim takes any key that has this in it.
-        held = [entry.value.text for key, entry in table.entries.items() if "DataType" in key]
-        if held[:1] != ["Quaternion"]:
+        data_types = [entry.value.text for key, entry in table.entries.items() if "DataType" in key]
+        if data_types[:1] != ["Quaternion"]:
             report(
                 f"'{file}' must have DataType=Quaternion: OpenSim rejects it",
                 item,
@@ -75,22 +75,22 @@ def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
                     suggestion=find_nearest_name(weight.name, table.columns),
                 )
         frames = {name + ending for name in setup.list_names("PhysicalFrame")}
-        lost = [column for column in table.columns if column not in frames]
+        unknown_columns = [column for column in table.columns if column not in frames]
         if not frames:
             continue
-        if len(lost) == len(table.columns):
-            wanted = f", such as '{min(frames)}'" if ending else ""
+        if len(unknown_columns) == len(table.columns):
+            example = f", such as '{min(frames)}'" if ending else ""
             report(
-                f"no column of '{file}' has the name of a frame of the model{wanted}: OpenSim "
+                f"no column of '{file}' has the name of a frame of the model{example}: OpenSim "
                 "rejects it",
                 item,
                 tag=tag,
                 severity=ERROR,
             )
-        elif lost:
+        elif unknown_columns:
             report(
-                f"the model has no frame for {join_words(map(repr, lost))} of '{file}': OpenSim "
-                f"ignores them{suggest_names(lost, frames)}",
+                f"the model has no frame for {join_words(map(repr, unknown_columns))} of '{file}': OpenSim "
+                f"ignores them{suggest_names(unknown_columns, frames)}",
                 item,
                 tag=tag,
             )

@@ -40,10 +40,10 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
                 tasks,
                 severity=WARNING,
             )
-        seen: Counter[tuple[str, str]] = Counter()
+        task_counts: Counter[tuple[str, str]] = Counter()
         for task in applied:
-            seen[type(task).__name__, task.name] += 1
-            if seen[type(task).__name__, task.name] == 2:
+            task_counts[type(task).__name__, task.name] += 1
+            if task_counts[type(task).__name__, task.name] == 2:
                 report(
                     f"'{task.name}' has two tasks: only one of them counts",
                     task,
@@ -57,13 +57,13 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
                     tag="weight",
                 )
             elif task.weight == 0:
-                given = setup.element_of(task, "weight") is not None
-                what = "has the weight 0" if given else "has no weight, and the default is 0"
+                is_given = setup.element_of(task, "weight") is not None
+                problem = "has the weight 0" if is_given else "has no weight, and the default is 0"
                 report(
-                    f"{describe_object(task)} {what}: it is not tracked",
+                    f"{describe_object(task)} {problem}: it is not tracked",
                     task,
                     tag="weight",
-                    severity=INFO if given else WARNING,
+                    severity=INFO if is_given else WARNING,
                 )
             if (
                 is_a(task, "IKCoordinateTask")
@@ -113,47 +113,50 @@ def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
     angles = find_angles(setup)
     for user in setup.find_having("ik_task_set", "coordinate_file"):
         table = setup.read_table(user.coordinate_file)
-        given: dict[str, list[float]] = {}
+        values_by_column: dict[str, list[float]] = {}
         for index, column in enumerate(table.columns if table is not None else (), 1):
             # Whatever the header says, this file is taken to be in degrees.
-            turn = math.pi / 180.0 if column in angles else 1.0
+            radians_per_unit = math.pi / 180.0 if column in angles else 1.0
             rows = table.rows.samples if table is not None else []
-            given[column] = [
-                row[index] * turn for row in rows if index < len(row) and row[index] == row[index]
+            values_by_column[column] = [
+                row[index] * radians_per_unit
+                for row in rows
+                if index < len(row) and row[index] == row[index]
             ]
         for task in user.ik_task_set.objects:
             coordinate = coordinates.get(task.name)
             if coordinate is None or not is_a(task, "IKCoordinateTask") or not task.apply:
                 continue
-            values = {"manual_value": [task.value], "from_file": given.pop(task.name, [])}.get(
-                task.value_type, []
-            )
+            values = {
+                "manual_value": [task.value],
+                "from_file": values_by_column.pop(task.name, []),
+            }.get(task.value_type, [])
             low, high = coordinate.range
-            outside = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
+            outside_count = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
             if coordinate.locked:
                 report(
                     f"{describe_object(coordinate)} is locked: the task has no effect",
                     task,
                     attribute="name",
                 )
-            elif coordinate.clamped and 2 * outside > len(values):
+            elif coordinate.clamped and 2 * outside_count > len(values):
                 report(
                     f"most values for {describe_object(coordinate)} are outside the range from "
                     f"{low:.4g} to {high:.4g} that it is clamped to",
                     task,
                     attribute="name",
                 )
-        still = [
+        moving_locked = [
             name
-            for name, values in given.items()
+            for name, values in values_by_column.items()
             if values
             and name in coordinates
             and coordinates[name].locked
             and max(values) - min(values) > 0.1
         ]
-        if still:
+        if moving_locked:
             report(
-                f"{join_words(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and "
+                f"{join_words(moving_locked)} {'is' if len(moving_locked) == 1 else 'are'} locked in the model, and "
                 f"moves in '{user.coordinate_file}'",
                 user,
                 tag="coordinate_file",

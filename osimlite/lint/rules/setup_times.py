@@ -181,11 +181,11 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 continue
             # A tool with default times is reported only where the default cuts data off.
             specs = get_field_specs(type(item))
-            said = [
+            is_given = [
                 setup.element_of(item, tag) is not None and not setup.has_note(item, specs[tag])
                 for tag in tags
             ]
-            if not said[-1] and last < span[1] - slack:
+            if not is_given[-1] and last < span[1] - slack:
                 report(
                     f"{describe_object(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, but "
                     f"'{name}' continues to {span[1]:g} s",
@@ -193,14 +193,14 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                     tag=tags[-1],
                     fault="stops-at-default",
                 )
-            if said[-1] and math.isfinite(last) and last > span[1] + slack:
+            if is_given[-1] and math.isfinite(last) and last > span[1] + slack:
                 report(
                     f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}",
                     item,
                     tag=tags[-1],
                     fault="data-end-early",
                 )
-            if said[0] and math.isfinite(first) and first < span[0] - slack:
+            if is_given[0] and math.isfinite(first) and first < span[0] - slack:
                 report(
                     f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}",
                     item,
@@ -270,8 +270,8 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
         if loads is None or not hasattr(loads, "datafile"):
             continue
         # OpenSim searches the data beside the loads file, and in the working folder.
-        beside = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
-        table = setup.read_table(loads.datafile) or setup.read_table(beside)
+        path_beside_loads = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
+        table = setup.read_table(loads.datafile) or setup.read_table(path_beside_loads)
         span = table.span if table is not None and not table.rows.select("order", "time") else None
         if table is None or span is None:
             continue
@@ -353,15 +353,15 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
         if isinstance(header, MarkerHeader) or setup.tree is None:
             continue
         angles = find_angles(setup)
-        places = [
-            place
-            for place, column in enumerate(table.columns, 1)
+        angle_columns = [
+            column_index
+            for column_index, column in enumerate(table.columns, 1)
             if coordinate_name(column) in angles
         ]
-        largest, place = _find_largest(table, places)
-        label = table.labels[place].text
+        largest, column_index = _find_largest(table, angle_columns)
+        label = table.labels[column_index].text
         # Few joints may stay almost straight for a whole trial; many do not.
-        if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _MIN_JOINTS:
+        if header.in_degrees and 0.0 < largest < math.pi and len(angle_columns) >= _MIN_JOINTS:
             report(
                 f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is "
                 f"{largest:.3g}: is it in radians?",
@@ -385,29 +385,29 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
         tasks = select_members(user.ik_task_set, "IKCoordinateTask")
         # OpenSim's inverse kinematics converts the values of this file from degrees without a look
         # at `inDegrees` (4.6).
-        read = {
+        read_names = {
             task.name for task in tasks if task.apply and task.value_type == "from_file"
         } & find_angles(setup)
-        largest, place = _find_largest(
-            values, [k for k, column in enumerate(values.columns, 1) if column in read]
+        largest, column_index = _find_largest(
+            values, [k for k, column in enumerate(values.columns, 1) if column in read_names]
         )
         if 0.0 < largest < math.pi:
             report(
                 f"'{user.coordinate_file}' does not say inDegrees=yes, and "
-                f"'{values.labels[place].text}' is at most {largest:.3g} in it: inverse "
+                f"'{values.labels[column_index].text}' is at most {largest:.3g} in it: inverse "
                 "kinematics takes it for degrees, whatever the header says",
                 user,
                 tag="coordinate_file",
             )
 
 
-def _find_largest(table: Table, places: list[int]) -> tuple[float, int]:
+def _find_largest(table: Table, column_indices: list[int]) -> tuple[float, int]:
     """Return the largest absolute number in some columns, and its column; zeros without numbers."""
     numbers = (
-        (abs(sample[place]), place)
-        for place in places
+        (abs(sample[column_index]), column_index)
+        for column_index in column_indices
         for sample in table.rows.samples
         # Samples may be shorter than the header; NaN is missing.
-        if place < len(sample) and sample[place] == sample[place]
+        if column_index < len(sample) and sample[column_index] == sample[column_index]
     )
     return max(numbers, default=(0.0, 0))

@@ -36,13 +36,13 @@ _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
 
 
 def _make_tool_example(kind: str, *lines: str, model: str = "leg.osim") -> str:
-    inside = "".join(f"    {line}\n" for line in (f"<model_file>{model}</model_file>", *lines))
-    return f'```setup\n<{kind} name="run">\n{inside}</{kind}>\n```'
+    content = "".join(f"    {line}\n" for line in (f"<model_file>{model}</model_file>", *lines))
+    return f'```setup\n<{kind} name="run">\n{content}</{kind}>\n```'
 
 
 def _make_analysis_example(start: str, end: str = "", model: str = "leg.osim") -> str:
-    inside = f"{start}\n                {{}}\n            {end}" if end else "{}"
-    objects = f"        <objects>\n            {inside}\n        </objects>"
+    content = f"{start}\n                {{}}\n            {end}" if end else "{}"
+    objects = f"        <objects>\n            {content}\n        </objects>"
     analyses = f'<AnalysisSet name="analyses">\n{objects}\n    </AnalysisSet>'
     settled = "<solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>"
     return _make_tool_example(
@@ -189,11 +189,11 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
     Some make OpenSim crash or run forever, some give wrong results without a message.
     """
     # 1. Settings that one comparison decides.
-    for fault, of_class, tag, is_wrong, told in _SETTINGS:
+    for fault, of_class, tag, is_wrong, message in _SETTINGS:
         for item in setup.find_by_class(of_class):
             value = getattr(item, tag)
             if is_wrong(value):
-                report(told.format(value), item, fault=fault, tag=tag)
+                report(message.format(value), item, fault=fault, tag=tag)
     # 2. Settings of tools that depend on each other.
     for tool in setup.find_by_class("AbstractTool"):
         # AnalyzeTool integrates nothing, so its tolerance does not matter; `not >` includes NaN.
@@ -272,10 +272,10 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                     analysis,
                     fault="unactuated-root",
                 )
-        for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
+        for tag, part_kind in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
                 report(
-                    f"{describe_object(analysis)} names no {what}: nothing is written",
+                    f"{describe_object(analysis)} names no {part_kind}: nothing is written",
                     analysis,
                     tag=tag,
                     fault="nothing-analyzed",
@@ -330,11 +330,11 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
     # Without `replace_force_set` a force of the same name replaces that of the model; OpenSim adds
     # it by name.
     if setup.tree is not None and getattr(user, "replace_force_set", True) is False:
-        present = {force.name for force in setup.tree.model.force_set.objects}
+        model_forces = {force.name for force in setup.tree.model.force_set.objects}
         for force in (
             force for forces in setup.find_by_class("ForceSet") for force in forces.objects
         ):
-            if force.name in present:
+            if force.name in model_forces:
                 report(
                     f"the model has a force '{force.name}', which this one replaces",
                     force,

@@ -60,23 +60,23 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
         # A task that is not applied reads no markers.
         if not getattr(user, "apply", True):
             continue
-        places, columns = locate_markers(setup), dict(list_marker_cells(table))
-        names = [name for name in columns if name in places]
+        positions, columns = locate_markers(setup), dict(list_marker_cells(table))
+        names = [name for name in columns if name in positions]
         sizes = []
         # A few frames tell the size; some markers may be hidden in each.
         for row in islice(iterate_rows_between(table, user.time_range), _MAX_ROWS):
-            seen = {name: row[columns[name]] for name in names}
+            cells_by_name = {name: row[columns[name]] for name in names}
             # A marker exactly at the origin is a missing one in some files.
-            seen = {
+            cells_by_name = {
                 name: cells
-                for name, cells in seen.items()
+                for name, cells in cells_by_name.items()
                 if not any(map(math.isnan, cells)) and any(cells)
             }
-            if len(seen) >= _MIN_MARKERS and (
+            if len(cells_by_name) >= _MIN_MARKERS and (
                 # Markers at one place have no size to compare.
-                own := _measure_size([places[name] for name in seen])
+                model_size := _measure_size([positions[name] for name in cells_by_name])
             ):
-                sizes.append(_measure_size([*seen.values()]) / own)
+                sizes.append(_measure_size([*cells_by_name.values()]) / model_size)
         if not sizes:
             continue
         # The median is not moved by frames with swapped markers.
@@ -149,13 +149,13 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
 def _find_largest_load(forces: Sequence[Any], table: Table) -> float:
     """Return the largest sum, N, of the sizes of some forces in a row of their table."""
     prefixes = [str(force.force_identifier) for force in forces if force.force_identifier]
-    places = [
-        [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)]
+    triples = [
+        [index for index, label in enumerate(table.columns, 1) if label.startswith(prefix)]
         for prefix in prefixes
     ]
-    places = [own for own in places if len(own) == 3]
+    triples = [indices for indices in triples if len(indices) == 3]
     sums = (
-        sum(math.hypot(*(row[place] for place in own)) for own in places)
+        sum(math.hypot(*(row[index] for index in indices)) for indices in triples)
         # Incomplete rows are left out.
         for row in table.rows.samples
         if len(row) == len(table.labels)
@@ -199,16 +199,16 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
             for force in select_members(loads, "ExternalForce")
             if force.appliesForce
         }
-        twice = [
+        doubled_contacts = [
             (force, body)
             for force, bodies in _find_ground_contacts(setup)
             if not _is_excluded(setup, tool, force)
             # The body must be both loaded and in contact with ground.
             for body in sorted(bodies & loaded)
         ]
-        if twice:
-            names = join_words([f"'{force.name}'" for force, _ in twice], max_count=3)
-            bodies = join_words(sorted({body for _, body in twice}), max_count=3)
+        if doubled_contacts:
+            names = join_words([f"'{force.name}'" for force, _ in doubled_contacts], max_count=3)
+            bodies = join_words(sorted({body for _, body in doubled_contacts}), max_count=3)
             tag = (
                 "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
             )

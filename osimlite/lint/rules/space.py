@@ -59,14 +59,18 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
     # Each frame is followed once, so that long chains do not take quadratic time.
     followed: set[int] = set()
     for offset in subject.find_instances(PhysicalOffsetFrame):
-        way: dict[int, PhysicalOffsetFrame] = {}
-        here: Component | None = offset
-        while isinstance(here, PhysicalOffsetFrame) and id(here) not in followed:
-            followed.add(id(here))
-            way[id(here)] = here
-            here = subject.target_of(here, "socket_parent")
-        # The way ends on itself: what it passed since it was here first is the circle.
-        circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
+        visited: dict[int, PhysicalOffsetFrame] = {}
+        current: Component | None = offset
+        while isinstance(current, PhysicalOffsetFrame) and id(current) not in followed:
+            followed.add(id(current))
+            visited[id(current)] = current
+            current = subject.target_of(current, "socket_parent")
+        # The chain ends on itself: the frames since the first visit of the current one form the circle.
+        circle = (
+            list(visited.values())[list(visited).index(id(current)) :]
+            if id(current) in visited
+            else []
+        )
         consequence = _describe_circle(subject, circle) if circle else ""
         for link in circle:
             report(f"{describe_object(link)} is fixed to {consequence}", link, tag="socket_parent")
@@ -82,7 +86,7 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
             continue
         points = [subject.target_of(frame, tag) for tag in POINTS]
         stations = [point for point in points if isinstance(point, Station)]
-        places = [
+        locations = [
             locate_frame(subject, subject.target_of(station, "socket_parent_frame"))
             for station in stations
         ]
@@ -106,18 +110,21 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
                 tag=POINTS[stray],
             )
             continue
-        spots = [
-            place[1].transform_point(station.location) if place else None
-            for place, station in zip(places, stations, strict=True)
+        points_in_frame = [
+            location[1].transform_point(station.location) if location else None
+            for location, station in zip(locations, stations, strict=True)
         ]
         # Exactly equal locations: points that are near to each other still define a frame.
-        for one, other in combinations(range(3), 2):
-            if spots[one] is not None and spots[one] == spots[other]:
+        for first, second in combinations(range(3), 2):
+            if (
+                points_in_frame[first] is not None
+                and points_in_frame[first] == points_in_frame[second]
+            ):
                 report(
-                    f"{POINTS[one]} and {POINTS[other]} of {describe_object(frame)} are at the "
+                    f"{POINTS[first]} and {POINTS[second]} of {describe_object(frame)} are at the "
                     "same location: OpenSim rejects the model",
                     frame,
-                    tag=POINTS[other],
+                    tag=POINTS[second],
                 )
                 break
 
@@ -132,11 +139,11 @@ def _describe_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) ->
     for joint in subject.find_instances(Joint):
         for tag in ("socket_parent_frame", "socket_child_frame"):
             frame = subject.target_of(joint, tag)
-            seen: set[int] = set()
-            while isinstance(frame, PhysicalOffsetFrame) and id(frame) not in seen:
+            seen_frames: set[int] = set()
+            while isinstance(frame, PhysicalOffsetFrame) and id(frame) not in seen_frames:
                 if id(frame) in members:
                     return f"{through}: OpenSim hangs"
-                seen.add(id(frame))
+                seen_frames.add(id(frame))
                 frame = subject.target_of(frame, "socket_parent")
     return f"{through}: OpenSim rejects the model"
 
@@ -169,16 +176,23 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
       </ContactSphere>
     ```
     """
-    deep, share = subject.config.value_of(DEPTH), subject.config.value_of(DEPTH_SHARE)
+    min_depth, min_depth_share = (
+        subject.config.value_of(DEPTH),
+        subject.config.value_of(DEPTH_SHARE),
+    )
     for force, surfaces in _find_contact_groups(subject):
-        for one, other in combinations(surfaces, 2):
+        for surface, other_surface in combinations(surfaces, 2):
             # The pair is tried in both orders: a force may name the half-space first or second.
-            ball, against = (one, other) if isinstance(one, ContactSphere) else (other, one)
+            ball, against = (
+                (surface, other_surface)
+                if isinstance(surface, ContactSphere)
+                else (other_surface, surface)
+            )
             if not isinstance(ball, ContactSphere):
                 continue
             depth = _compute_depth(subject, ball, against)
             # `not >` excludes NaN.
-            if depth is None or not depth > max(deep, share * ball.radius):
+            if depth is None or not depth > max(min_depth, min_depth_share * ball.radius):
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
             report(
@@ -308,10 +322,10 @@ def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
         while entering is not None or pending:
             # 1. Enter a component: give it a number, and put it on the path.
             if entering is not None:
-                here = id(entering)
-                number[here] = lowest[here] = len(number)
+                component_id = id(entering)
+                number[component_id] = lowest[component_id] = len(number)
                 path.append(entering)
-                open_ids.add(here)
+                open_ids.add(component_id)
                 pending.append((entering, _list_supports(subject, entering)))
             # 2. Look at the next component that it depends on.
             owner, below = pending[-1]
@@ -380,7 +394,7 @@ def _find_contact_groups(subject: Subject) -> Iterator[tuple[Component, list[Con
             target = subject.resolution(use).target
             if isinstance(target, ContactGeometry):
                 group = groups.setdefault(id(use.owner), (use.owner, []))[1]
-                if not any(known is target for known in group):
+                if not any(surface is target for surface in group):
                     group.append(target)
     yield from groups.values()
 
@@ -404,10 +418,10 @@ def _locate_surface(
     subject: Subject, surface: ContactGeometry
 ) -> tuple[Component, FramePose] | None:
     """Return the body of a surface, and the pose of the surface in ground; None if unknown."""
-    place = locate_frame(subject, subject.target_of(surface, "socket_frame"))
-    pose = compute_default_poses(subject).get(id(place[0])) if place is not None else None
-    if place is None or pose is None:
+    location = locate_frame(subject, subject.target_of(surface, "socket_frame"))
+    pose = compute_default_poses(subject).get(id(location[0])) if location is not None else None
+    if location is None or pose is None:
         return None
-    return place[0], pose.compose(place[1]).compose(
+    return location[0], pose.compose(location[1]).compose(
         make_offset(surface.orientation, surface.location)
     )

@@ -52,24 +52,24 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
         # Wrappers and parts have rules that say more.
         if find_wrapper(note, owner) is not None or find_part(note, owner) is not None:
             continue
-        old = successor(type(owner), note.word)
-        if old is not None:
-            _report_old(subject, report, note, owner, old)
+        old_successor = successor(type(owner), note.word)
+        if old_successor is not None:
+            _report_old(subject, report, note, owner, old_successor)
             continue
         # Equal faults in many objects, such as a tag that a program writes everywhere, are one
         # finding.
         item = _describe_unknown(subject, note, owner)
         groups.setdefault((note.word, item.suggestion, item.severity), []).append(item)
-    for first, *others in groups.values():
-        more = (
-            f"; {format_count(len(others), 'more element')} <{first.note.word}>" if others else ""
+    for first, *similar in groups.values():
+        count_note = (
+            f"; {format_count(len(similar), 'more element')} <{first.note.word}>" if similar else ""
         )
         report(
-            first.message + more,
+            first.message + count_note,
             first.owner,
             number=first.note.number,
             suggestion=first.suggestion,
-            fix=_merge_fixes([first.fix, *(other.fix for other in others)]),
+            fix=_merge_fixes([first.fix, *(similar_tag.fix for similar_tag in similar)]),
             severity=first.severity,
         )
 
@@ -109,10 +109,10 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
         suggestion = None
     message = f"{describe_object(owner)} has no property <{note.word}>; OpenSim ignores it"
     if suggestion is not None:
-        kept = _format_default(specs[suggestion])
+        default_text = _format_default(specs[suggestion])
         # If the correct tag stands beside it, the default is not what OpenSim uses.
         message += (
-            f" and keeps the default of {suggestion}{kept}"
+            f" and keeps the default of {suggestion}{default_text}"
             if suggestion not in _list_given(owner)
             else ""
         )
@@ -125,15 +125,23 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
         homes = list_homes(note.word, type(owner))
         message += f": it is a property of {join_words(homes, max_count=3)}" if homes else ""
     # Only the letter case is wrong: the fix is certain.
-    same = suggestion is not None and suggestion.lower() == note.word.lower()
+    is_same_word = suggestion is not None and suggestion.lower() == note.word.lower()
     # Renaming is no fix if the property is given as well: it would be there twice.
-    free = suggestion is not None and suggestion not in _list_given(owner)
-    fix = rename_tag(subject.source, note.number, suggestion, safe=same) if free else None
+    is_missing = suggestion is not None and suggestion not in _list_given(owner)
+    fix = (
+        rename_tag(subject.source, note.number, suggestion, safe=is_same_word)
+        if is_missing
+        else None
+    )
     severity = ERROR
     # Old setups keep switched-off properties of tools that no longer have them.
-    if not free and subject.model is None:
+    if not is_missing and subject.model is None:
         severity = INFO if _is_switched_off(subject, note.number) else WARNING
-    elif free and suggestion is not None and _is_default(subject, note.number, specs[suggestion]):
+    elif (
+        is_missing
+        and suggestion is not None
+        and _is_default(subject, note.number, specs[suggestion])
+    ):
         severity = WARNING
     return _UnknownTag(note, owner, message, severity, suggestion, fix)
 
@@ -151,11 +159,14 @@ def _can_hold(subject: Subject, note: Note, spec: FieldSpec) -> bool:
 
 def _merge_fixes(fixes: Sequence[Fix | None]) -> Fix | None:
     """Return one fix that does what several do; None if one of them is missing."""
-    known = [fix for fix in fixes if fix is not None]
+    existing_fixes = [fix for fix in fixes if fix is not None]
     # A single finding keeps its fix; a fix of a group must correct all.
-    if len(known) < len(fixes) or not known:
-        return known[0] if len(fixes) == 1 and known else None
-    return Fix(tuple(edit for fix in known for edit in fix.edits), all(fix.safe for fix in known))
+    if len(existing_fixes) < len(fixes) or not existing_fixes:
+        return existing_fixes[0] if len(fixes) == 1 and existing_fixes else None
+    return Fix(
+        tuple(edit for fix in existing_fixes for edit in fix.edits),
+        all(fix.safe for fix in existing_fixes),
+    )
 
 
 def _get_inner_text(subject: Subject, number: int) -> str:
@@ -195,18 +206,18 @@ def _repeats_first(subject: Subject, owner: Object, number: int) -> bool:
 
 
 def _report_old(
-    subject: Subject, report: FindingCollector, note: Note, owner: Object, old: Successor
+    subject: Subject, report: FindingCollector, note: Note, owner: Object, successor_tag: Successor
 ) -> None:
     """Report a tag of an older format."""
-    instead = f"write <{old.tag}>" if old.tag is not None else ""
-    words = "; " + ", ".join(part for part in (instead, old.hint) if part)
+    replacement = f"write <{successor_tag.tag}>" if successor_tag.tag is not None else ""
+    advice = "; " + ", ".join(part for part in (replacement, successor_tag.hint) if part)
     version = subject.version or CURRENT_VERSION
     report(
-        f"<{note.word}> of {describe_object(owner)} belongs to files before version {old.since}; "
-        f"in one of version {version} OpenSim ignores it{words}",
+        f"<{note.word}> of {describe_object(owner)} belongs to files before version {successor_tag.since}; "
+        f"in one of version {version} OpenSim ignores it{advice}",
         owner,
         number=note.number,
-        suggestion=old.tag,
+        suggestion=successor_tag.tag,
     )
 
 
@@ -227,7 +238,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
     for note, owner in subject.notes_of("duplicate-tag"):
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
-        taken = "" if isinstance(note.spec.kind, ObjectField) else f", {format_value(value)},"
+        used_value = "" if isinstance(note.spec.kind, ObjectField) else f", {format_value(value)},"
         # Two objects of different classes in a property that holds one.
         if note.word != note.spec.tag:
             report(
@@ -240,7 +251,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
             continue
         report(
             f"{describe_object(owner)} has <{note.word}> more than once; OpenSim takes the "
-            f"first{taken} and ignores this one",
+            f"first{used_value} and ignores this one",
             owner,
             number=note.number,
             fix=remove_element(subject.source, note.number),
@@ -267,11 +278,11 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
         assert note.spec is not None
         # The reader marks comments, processing instructions and CDATA sections alike.
         if note.word == "!--":
-            what = _describe_interruption(subject, note.number)
-            if not what:
+            interruption = _describe_interruption(subject, note.number)
+            if not interruption:
                 continue
             report(
-                f"there is {what} in the middle of {subject.describe_property(owner, note.spec)}: "
+                f"there is {interruption} in the middle of {subject.describe_property(owner, note.spec)}: "
                 "OpenSim rejects the file",
                 owner,
                 number=note.number,
@@ -292,23 +303,23 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
 
 def _describe_interruption(subject: Subject, number: int) -> str:
     """Return what stands in the middle of a value; nothing if it is a CDATA section, which is reported apart."""
-    inside = _get_inner_text(subject, number)
-    if "<![CDATA[" in inside:
+    inner_text = _get_inner_text(subject, number)
+    if "<![CDATA[" in inner_text:
         return ""
-    return "a comment" if "<!--" in inside else "a processing instruction"
+    return "a comment" if "<!--" in inner_text else "a processing instruction"
 
 
 def _find_cdata_elements(source: Source) -> Iterator[int]:
     """Yield the elements without children that hold a CDATA section."""
     holders: set[int] = set()
     starts = [span.start for span in source.spans]
-    place = source.text.find("<![CDATA[")
-    while place >= 0:
+    offset = source.text.find("<![CDATA[")
+    while offset >= 0:
         # The element that begins last before a section holds it, unless it ends before.
-        number = bisect_right(starts, place) - 1
-        if number >= 0 and place < source.spans[number].inner_end and not source.children(number):
+        number = bisect_right(starts, offset) - 1
+        if number >= 0 and offset < source.spans[number].inner_end and not source.children(number):
             holders.add(number)
-        place = source.text.find("<![CDATA[", place + 1)
+        offset = source.text.find("<![CDATA[", offset + 1)
     yield from sorted(holders)
 
 
@@ -318,19 +329,21 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
     if spec is None:
         return
     span = source.spans[number]
-    inside = source.text[span.tag_end : span.inner_end]
-    texts = [part for part in _SECTIONS.split(inside) if part.strip()]
-    sections = _SECTION.findall(inside)
-    place = source.position(span.tag_end + inside.index("<![CDATA["), len("<![CDATA["))
+    inner_text = source.text[span.tag_end : span.inner_end]
+    texts = [part for part in _SECTIONS.split(inner_text) if part.strip()]
+    sections = _SECTION.findall(inner_text)
+    position = source.position(span.tag_end + inner_text.index("<![CDATA["), len("<![CDATA["))
     # A value of several pieces is rejected, whatever the pieces are.
     if len(texts) + len(sections) > 1:
-        report("a CDATA section is only a part of this value: OpenSim rejects the file", at=place)
+        report(
+            "a CDATA section is only a part of this value: OpenSim rejects the file", at=position
+        )
     elif sections and not texts and sections[0] != sections[0].strip():
         if isinstance(spec.kind, Reference) and spec.kind.shape != "list":
             report(
                 "OpenSim takes the white space in this CDATA section for a part of the name, and "
                 "rejects the model",
-                at=place,
+                at=position,
             )
         elif (
             isinstance(spec.kind, Value)
@@ -340,7 +353,7 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
             report(
                 "OpenSim does not read a value with white space around it in a CDATA section: it "
                 "keeps the default, or rejects the model",
-                at=place,
+                at=position,
             )
 
 
@@ -358,8 +371,12 @@ def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec |
         for item in items:
             if item._index == above:
                 specs = get_field_specs(type(item))
-                old = successor(type(item), span.tag)
-                tag = old.tag if old is not None and old.tag is not None else span.tag
+                old_successor = successor(type(item), span.tag)
+                tag = (
+                    old_successor.tag
+                    if old_successor is not None and old_successor.tag is not None
+                    else span.tag
+                )
                 spec = specs.get(tag)
                 return spec if spec is not None and not isinstance(spec.kind, ObjectField) else None
     return None

@@ -70,7 +70,7 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
     """
     rows = table.rows
     for fault in rows.select("row", "comment", "blank"):
-        at = Position(fault.line, fault.column, fault.length)
+        position = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
             # A tab too many at the end of each line is what several programs write.
             fix = (
@@ -78,32 +78,32 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
                 if table.is_markers and fault.number > rows.cells
                 else None
             )
-            has = format_count(fault.number, "cell")
+            cell_count = format_count(fault.number, "cell")
             report(
-                f"the row has {has} and needs {rows.cells}{fault.text}{fault.describe_rest()}",
-                at=at,
+                f"the row has {cell_count} and needs {rows.cells}{fault.text}{fault.describe_rest()}",
+                at=position,
                 fix=fix,
             )
         elif fault.kind == "comment":
             report(
                 f"OpenSim does not allow comments among the rows{fault.describe_rest('line')}",
-                at=at,
+                at=position,
             )
         # Blank lines after the last row do no harm.
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
             # The newer reader stops at a blank line; the older one passes over it.
             if table.is_markers or table.is_strict:
-                lost = rows.line_of(rows.count - 1) - fault.line
+                lost_count = rows.line_of(rows.count - 1) - fault.line
                 report(
-                    f"a blank line ends the table for OpenSim: {format_count(lost, 'row')} after it "
+                    f"a blank line ends the table for OpenSim: {format_count(lost_count, 'row')} after it "
                     "are lost",
-                    at=at,
+                    at=position,
                     fix=_remove_blank_lines(table, fault.line),
                 )
             else:
                 report(
                     f"there is a blank line among the rows{fault.describe_rest('line')}",
-                    at=at,
+                    at=position,
                     severity=INFO,
                 )
 
@@ -165,14 +165,14 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
             consequence = "OpenSim reads it as NaN"
         # The older reader stops at a word, and fills what is left with zeros.
         else:
-            lost = max(0, end - fault.line)
+            lost_count = max(0, end - fault.line)
             consequence = (
-                f"OpenSim reads 0 and loses the rest of the table, {format_count(lost, 'row')}, without "
+                f"OpenSim reads 0 and loses the rest of the table, {format_count(lost_count, 'row')}, without "
                 "a message"
             )
-        what = f"'{fault.text}' is not a number" if fault.text else "the number is missing"
+        problem = f"'{fault.text}' is not a number" if fault.text else "the number is missing"
         report(
-            f"{what} (column '{label}'): {consequence}{fault.describe_rest()}",
+            f"{problem} (column '{label}'): {consequence}{fault.describe_rest()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING
             if fault.kind == "cell" and (table.is_markers or table.is_strict)
@@ -208,25 +208,31 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
     if not table.is_markers and table.labels and table.labels[0].text.lower() != "time":
         return
     # OpenSim itself writes the last row of some results twice.
-    last = table.rows.line_of(table.rows.count - 1) if table.rows.count else None
+    last_line = table.rows.line_of(table.rows.count - 1) if table.rows.count else None
     for fault in table.rows.select("order"):
-        time, before = fault.text.split()
-        what = (
-            f"goes back from {before} to {time}"
+        time, previous_time = fault.text.split()
+        problem = (
+            f"goes back from {previous_time} to {time}"
             if fault.number
             else f"{time} repeats that of the row before"
         )
         # Repeated times are kept apart from times that go back, which no spline can be put through.
         severity = (
-            None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
+            None
+            if fault.number or table.is_markers
+            else INFO
+            if fault.line == last_line
+            else WARNING
         )
-        at = Position(fault.line, fault.column, fault.length)
-        report(f"the time {what}{fault.describe_rest()}", at=at, severity=severity)
+        position = Position(fault.line, fault.column, fault.length)
+        report(f"the time {problem}{fault.describe_rest()}", at=position, severity=severity)
     times = table.rows.times
     # Times grow: what is too large is at the ends. A time that goes back is reported above.
-    far = [row for row in (0, len(times) - 1) if times and abs(times[row]) >= MAX_TIME_S]
-    if far:
-        row = far[0] if len(far) > 1 or far[0] == 0 else bisect_left(times, MAX_TIME_S)
+    far_rows = [row for row in (0, len(times) - 1) if times and abs(times[row]) >= MAX_TIME_S]
+    if far_rows:
+        row = (
+            far_rows[0] if len(far_rows) > 1 or far_rows[0] == 0 else bisect_left(times, MAX_TIME_S)
+        )
         report(
             f"the time {times[row]:g} s is no time of a motion: splines through the table overflow, "
             "and osimlite does not read it",
@@ -270,19 +276,19 @@ def report_time_gap(table: Table, report: FindingCollector) -> None:
         return
     # OpenSim starts some results one step before the others.
     gaps = [row for row, step in enumerate(steps, 1) if step >= longest and row > 1]
-    even = sum(abs(step - table.step) <= 0.2 * table.step for step in steps)
+    even_count = sum(abs(step - table.step) <= 0.2 * table.step for step in steps)
     # Few gaps in otherwise even steps; a table with variable steps has no gaps.
-    if len(gaps) <= max(1, len(steps) // 50) and even + len(gaps) >= 0.95 * len(steps):
+    if len(gaps) <= max(1, len(steps) // 50) and even_count + len(gaps) >= 0.95 * len(steps):
         # The first twenty gaps show the cause.
         for row in gaps[:20]:
-            missing = steps[row - 1] / table.step - 1
-            lost = (
-                f": {format_count(round(missing), 'row')} seem to be missing"
-                if 0.5 <= missing < 1e9
+            missing_count = steps[row - 1] / table.step - 1
+            loss_note = (
+                f": {format_count(round(missing_count), 'row')} seem to be missing"
+                if 0.5 <= missing_count < 1e9
                 else ""
             )
             report(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} "
-                f"s{lost}",
+                f"s{loss_note}",
                 at=table.locate_time(rows.line_of(row)),
             )

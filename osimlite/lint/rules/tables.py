@@ -48,8 +48,8 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
         _check_marker_header(table, header, report)
     elif header.end.text != "endheader":
         # Of a misnamed marker file only the name is wrong; its lines need no further findings.
-        words = table.data[:100].lstrip()
-        if words.startswith(b"PathFileType"):
+        beginning = table.data[:100].lstrip()
+        if beginning.startswith(b"PathFileType"):
             report("this is marker data; the name of its file must end with .trc", at=start)
         # The first line as the end of the header means that no line looks like one.
         elif header.end.at.line == 1:
@@ -81,18 +81,18 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
                 # A misspelt key keeps its value, so that its line is changed and none is added.
-                near = find_nearest(key, table.entries, cutoff=75)
-                entry = table.entries[near] if near else None
-                at = entry.key.at if entry else header.end.at
+                similar_key = find_nearest(key, table.entries, cutoff=75)
+                entry = table.entries[similar_key] if similar_key else None
+                position = entry.key.at if entry else header.end.at
                 fix = (
                     _set_count(table, entry, key, count)
                     if entry
-                    else table.insert_line(at.line, f"{key}={count}")
+                    else table.insert_line(position.line, f"{key}={count}")
                 )
                 report(
                     f"the header lacks '{key}': OpenSim rejects the table",
-                    at=at,
-                    suggestion=near and key,
+                    at=position,
+                    suggestion=similar_key and key,
                     fix=fix,
                     # What is written for the newer reader is taken by it without a version too.
                     severity=WARNING if "DataType" in table.entries else None,
@@ -111,13 +111,13 @@ def _set_count(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
 def _check_marker_header(table: Table, header: MarkerHeader, report: FindingCollector) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
-        why = (
+        problem = (
             "starts with a byte order mark; save it as UTF-8 without one"
             if mark
             else "must start with PathFileType"
         )
         report(
-            f"a marker file {why}: OpenSim rejects it",
+            f"a marker file {problem}: OpenSim rejects it",
             at=Position(1, 1),
             fix=Fix((Edit(0, 3, ""),)) if mark else None,
         )
@@ -131,15 +131,15 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
         # Without these lines nothing of the following can be located.
         return
     keys, values = header.words(2), header.words(3)
-    for key, right in zip(keys, MARKER_KEYS, strict=False):
-        if key.text != right:
+    for key, expected_key in zip(keys, MARKER_KEYS, strict=False):
+        if key.text != expected_key:
             # With a key missing or too many, the keys stand in other columns, and a replacement by
             # position would be wrong.
-            meant = right if len(keys) == len(MARKER_KEYS) else None
+            suggestion = expected_key if len(keys) == len(MARKER_KEYS) else None
             report(
-                f"expected '{right}' in the header, found '{key.text}'",
+                f"expected '{expected_key}' in the header, found '{key.text}'",
                 at=key.at,
-                suggestion=meant,
+                suggestion=suggestion,
                 certain=True,
             )
             # All following keys would differ as well.
@@ -160,14 +160,20 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
     fifth = header.lines[4] if len(header.lines) > 4 else b""
     subscripts = [word.text for word in header.words(5)] if fifth else []
     count = len(table.labels)
-    wanted = [f"{axis}{number}" for number in range(1, count + 1) for axis in "XYZ"]
-    if subscripts[: 3 * count] != wanted:
-        wrong = next((k for k, word in enumerate(wanted) if subscripts[k : k + 1] != [word]), 0)
-        place = header.words(5)[wrong].at if wrong < len(subscripts) else Position(5, 1)
-        line = "\t\t" + "\t".join(wanted)
+    expected_subscripts = [f"{axis}{number}" for number in range(1, count + 1) for axis in "XYZ"]
+    if subscripts[: 3 * count] != expected_subscripts:
+        wrong_index = next(
+            (k for k, word in enumerate(expected_subscripts) if subscripts[k : k + 1] != [word]), 0
+        )
+        position = (
+            header.words(5)[wrong_index].at if wrong_index < len(subscripts) else Position(5, 1)
+        )
+        line = "\t\t" + "\t".join(expected_subscripts)
         fix = None
         # Complete but wrongly numbered subscripts are replaced as a line.
-        if len(subscripts) == len(wanted) and all(word[:1] in "XYZ" for word in subscripts):
+        if len(subscripts) == len(expected_subscripts) and all(
+            word[:1] in "XYZ" for word in subscripts
+        ):
             fix = table.make_replacement(
                 Position(5, 1, len(fifth.rstrip())), None, line, certain=True
             )
@@ -178,8 +184,8 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
         ]:
             fix = table.insert_line(5, line)
         report(
-            f"expected '{wanted[wrong]}' here in the fifth line: OpenSim rejects the file",
-            at=place,
+            f"expected '{expected_subscripts[wrong_index]}' here in the fifth line: OpenSim rejects the file",
+            at=position,
             fix=fix,
         )
 
@@ -215,24 +221,29 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
             ("NumMarkers", labels, "labels", ERROR),
         )
     else:
-        known = WARNING if table.is_strict else ERROR
-        counts = (("nRows", rows.count, "rows", known), ("nColumns", labels, "labels", known))
+        severity_if_wrong = WARNING if table.is_strict else ERROR
+        counts = (
+            ("nRows", rows.count, "rows", severity_if_wrong),
+            ("nColumns", labels, "labels", severity_if_wrong),
+        )
     # Rows that are odd have findings of their own, and may be the reason for the difference.
     odd_rows = rows.select("row", "blank", "comment")
-    for key, count, what, severity in counts:
+    for key, count, row_kind, severity in counts:
         entry = table.entries.get(key)
-        if entry is None or (what in ("rows", "frames") and (odd_rows or not count)):
+        if entry is None or (row_kind in ("rows", "frames") and (odd_rows or not count)):
             continue
-        said = entry.value.text
-        number = float(said) if _WHOLE.fullmatch(said) else nan
+        count_text = entry.value.text
+        number = float(count_text) if _WHOLE.fullmatch(count_text) else nan
         if number == count:
             continue
         consequence = ""
         # Too large a number of rows is harmless: OpenSim stops at the end of the file.
-        if severity is ERROR and what == "rows" and number == number:
-            lost = count - number
+        if severity is ERROR and row_kind == "rows" and number == number:
+            lost_count = count - number
             severity, consequence = (
-                (ERROR, f": OpenSim ignores the last {lost:g}") if lost > 0 else (WARNING, "")
+                (ERROR, f": OpenSim ignores the last {lost_count:g}")
+                if lost_count > 0
+                else (WARNING, "")
             )
         elif severity is ERROR:
             consequence = (
@@ -245,12 +256,12 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
         report(
-            f"'{entry.key.text}' is '{said}', but there are {count} {what}{consequence}",
+            f"'{entry.key.text}' is '{count_text}', but there are {count} {row_kind}{consequence}",
             at=entry.value.at,
             severity=severity,
             suggestion=str(count) if is_right else None,
             certain=True,
-            fix=_set_count(table, entry, key, count) if is_right and not said else None,
+            fix=_set_count(table, entry, key, count) if is_right and not count_text else None,
         )
 
 
@@ -283,19 +294,21 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
         units = entries.get("Units")
         # OpenSim knows km as well, but no measured marker is in kilometres.
         if units is not None and units.value.text not in ("m", "mm", "cm", "km"):
-            near = {
+            unit_names = {
                 "millimetre": "mm",
                 "millimeter": "mm",
                 "metre": "m",
                 "meter": "m",
                 "centimeter": "cm",
             }
-            right = near.get(units.value.text.lower().rstrip("s"), units.value.text.lower())
+            expected = unit_names.get(
+                units.value.text.lower().rstrip("s"), units.value.text.lower()
+            )
             # The suggestion is limited to the units of motion capture.
             report(
                 f"unknown units '{units.value.text}': OpenSim rejects the file",
                 at=units.value.at,
-                suggestion=right if right in ("m", "mm", "cm") else None,
+                suggestion=expected if expected in ("m", "mm", "cm") else None,
                 certain=True,
             )
         rate = entries.get("DataRate")
@@ -320,32 +333,36 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
         return
     # OpenSim's keys depend on the letter case.
     for key, entry in entries.items():
-        right = next(
-            (known for known in ("inDegrees", "version", *COUNTS) if known.lower() == key.lower()),
+        expected = next(
+            (
+                known_key
+                for known_key in ("inDegrees", "version", *COUNTS)
+                if known_key.lower() == key.lower()
+            ),
             key,
         )
-        if right != key and right not in entries:
+        if expected != key and expected not in entries:
             # Without a version a table is read as one of version 1.
-            severity = WARNING if right == "version" else None
+            severity = WARNING if expected == "version" else None
             report(
                 f"OpenSim does not know '{key}' and ignores it",
                 at=entry.key.at,
-                suggestion=right,
+                suggestion=expected,
                 severity=severity,
             )
     degrees = entries.get("inDegrees")
     # OpenSim's reader looks for yes and no only, in any letter case.
     if degrees is not None and degrees.value.text.lower() not in ("yes", "y", "no", "n"):
-        meant = {"true": "yes", "1": "yes", "false": "no", "0": "no"}.get(
+        suggestion = {"true": "yes", "1": "yes", "false": "no", "0": "no"}.get(
             degrees.value.text.lower()
         )
         # A word that means no is read as no.
-        harmless = meant == "no"
+        harmless = suggestion == "no"
         report(
             f"'inDegrees' must be 'yes' or 'no', found '{degrees.value.text}': OpenSim reads no, "
             "and takes the angles for radians",
             at=degrees.value.at,
-            suggestion=meant,
+            suggestion=suggestion,
             certain=True,
             severity=WARNING if harmless else None,
         )
@@ -469,23 +486,23 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
     """
     labels, header = table.labels, table.header
     if isinstance(header, MarkerHeader):
-        for word, right in zip(header.words(4), ("Frame#", "Time"), strict=False):
-            if word.text != right:
+        for word, expected_label in zip(header.words(4), ("Frame#", "Time"), strict=False):
+            if word.text != expected_label:
                 report(
-                    f"expected the label '{right}', found '{word.text}': OpenSim rejects the file",
+                    f"expected the label '{expected_label}', found '{word.text}': OpenSim rejects the file",
                     at=word.at,
-                    suggestion=find_nearest(word.text, [right], cutoff=60),
+                    suggestion=find_nearest(word.text, [expected_label], cutoff=60),
                     certain=True,
                     fault="frame-and-time-label",
                 )
         # Each marker has a label and two empty cells; an empty label is a cell where a label should
         # be.
         cells = header.lines[3].split("\t") if header.lines[3:] else []
-        empty = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
-        if empty and len(labels) < len(cells[2:]) // 3:
+        empty_cells = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
+        if empty_cells and len(labels) < len(cells[2:]) // 3:
             report(
                 "a marker has no label: OpenSim rejects the file",
-                at=Position(4, len("\t".join(cells[: empty[0]])) + 2),
+                at=Position(4, len("\t".join(cells[: empty_cells[0]])) + 2),
                 fault="marker-label",
             )
         for label in labels:
@@ -501,29 +518,29 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
             report("the table ends before its labels", at=header.end.at, fault="no-labels")
         return
     elif labels[0].text != "time":
-        first, at = labels[0]
+        first_label, position = labels[0]
         # These labels mean the time beyond doubt; of another the author must decide.
-        near = "time" if first.lower() in ("time", "t", "times", "time(s)") else None
-        if "," in first:
+        suggestion = "time" if first_label.lower() in ("time", "t", "times", "time(s)") else None
+        if "," in first_label:
             report(
                 "tabs or blanks separate the columns of a storage file, not commas: OpenSim "
                 "rejects it",
-                at=at,
+                at=position,
                 fault="commas-between-labels",
             )
         # The older reader also accepts a column "range".
         elif all(label.text not in ("time", "range") for label in labels):
             report(
-                f"the first column is '{first}', expected 'time'",
-                at=at,
-                suggestion=near,
+                f"the first column is '{first_label}', expected 'time'",
+                at=position,
+                suggestion=suggestion,
                 certain=True,
                 fault="no-time-column",
             )
         else:
             report(
-                f"the first column is '{first}': OpenSim reads it as the time",
-                at=at,
+                f"the first column is '{first_label}': OpenSim reads it as the time",
+                at=position,
                 fault="time-not-first",
             )
     elif header.is_strict and labels[1:] and not header.has_tabs:
@@ -533,23 +550,23 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
             at=labels[1].at,
             fault="blanks-between-labels",
         )
-    places: dict[str, list[Position]] = {}
+    positions_by_label: dict[str, list[Position]] = {}
     for label in labels:
-        places.setdefault(label.text, []).append(label.at)
-    for name, (_, *again) in places.items():
-        if again:
+        positions_by_label.setdefault(label.text, []).append(label.at)
+    for name, (_, *repeated) in positions_by_label.items():
+        if repeated:
             consequence = (
                 "rejects the file" if table.is_markers else "does not find this one by its name"
             )
-            more = (
-                f"; there are {format_count(len(again) - 1, 'more column')} of this name"
-                if again[1:]
+            repeated_note = (
+                f"; there are {format_count(len(repeated) - 1, 'more column')} of this name"
+                if repeated[1:]
                 else ""
             )
             severity = ERROR if table.is_markers else None
             report(
-                f"another column has the label '{name}': OpenSim {consequence}{more}",
-                at=again[0],
+                f"another column has the label '{name}': OpenSim {consequence}{repeated_note}",
+                at=repeated[0],
                 severity=severity,
                 fault="label-twice",
             )

@@ -201,8 +201,8 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
         return
     for fault in subject.faults:
         if isinstance(fault, VersionError):
-            wanted = None if fault.version is not None else str(CURRENT_VERSION)
-            report(fault.message, number=0, attribute="Version", suggestion=wanted)
+            suggested_version = None if fault.version is not None else str(CURRENT_VERSION)
+            report(fault.message, number=0, attribute="Version", suggestion=suggested_version)
     spans = subject.source.spans
     # A bare <Model> is read by OpenSim as a document without a version.
     has_root = bool(spans) and spans[0].tag != "Model"
@@ -251,8 +251,8 @@ def _find_late_socket(source: Source) -> str:
     for number, span in enumerate(source.spans):
         for cls, sockets in _LATE:
             if cls.fullmatch(span.tag):
-                inside = {source.spans[child].tag for child in source.children(number)}
-                late = [socket for socket in sockets if socket in inside]
+                child_tags = {source.spans[child].tag for child in source.children(number)}
+                late = [socket for socket in sockets if socket in child_tags]
                 if late:
                     return f"<{late[0]}> in <{span.tag}>"
     return ""

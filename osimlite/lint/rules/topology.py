@@ -60,10 +60,10 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     # OpenSim connects loose bodies by free joints, which needs a mass.
     massless = any(not any(body.mass for body in group) for group in loose.values())
     fails = massless or grow_tree(subject).fails
-    for body, *others in loose.values():
+    for body, *other_bodies in loose.values():
         message = f"no joint connects {describe_object(body)}"
-        if others:
-            names = join_words((f"'{other.name}'" for other in others), max_count=3)
+        if other_bodies:
+            names = join_words((f"'{other_body.name}'" for other_body in other_bodies), max_count=3)
             message = (
                 f"{describe_object(body)} is not connected to ground, nor {names}, which joints "
                 "connect with it"
@@ -107,14 +107,16 @@ def report_closed_loop(subject: Subject, report: FindingCollector) -> None:
     for link in grow_tree(subject).loops:
         # Parallel joints have OSIM404.
         if pairs[_make_pair(link)] == 1 and link.child_base is not None:
-            others = (
+            other_joints = (
                 other.joint
                 for other in bones.links
                 if other is not link and other.child_base is link.child_base
             )
-            before = next(others, None)
+            first_joint = next(other_joints, None)
             other = (
-                f", which {describe_object(before)} already places" if before is not None else ""
+                f", which {describe_object(first_joint)} already places"
+                if first_joint is not None
+                else ""
             )
             report(
                 f"{describe_object(link.joint)} closes a loop at "
@@ -232,9 +234,9 @@ class _Groups:
             key = self._up[key]
         return key
 
-    def join(self, one: Object | None, other: Object | None) -> None:
-        if one is not None and other is not None:
-            self._up[self.find_root(one)] = self.find_root(other)
+    def join(self, first: Object | None, second: Object | None) -> None:
+        if first is not None and second is not None:
+            self._up[self.find_root(first)] = self.find_root(second)
 
 
 def _find_massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]]:

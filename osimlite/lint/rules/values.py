@@ -52,7 +52,7 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
             continue
         text = _get_text(owner, spec)
         better = _make_readable(text, kind)
-        taken = spec.default if note.value is None and not kind.legacy else note.value
+        used_value = spec.default if note.value is None and not kind.legacy else note.value
         report(
             f"{subject.describe_property(owner, spec)} is '{text}', expected "
             f"{kind.words()}{_describe_foreign_characters(text)}: "
@@ -66,7 +66,7 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
             if "\n" not in text
             else None,
             # If OpenSim happens to read the intended value, the motion is right.
-            severity=WARNING if better is not None and reads_as(better, kind, taken) else None,
+            severity=WARNING if better is not None and reads_as(better, kind, used_value) else None,
         )
 
 
@@ -159,16 +159,16 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
                 severity=ERROR if _is_refused(note, spec, kind) else WARNING,
             )
     for note in subject.notes:
-        held = note.spec
+        note_spec = note.spec
         if (
             note.kind == "empty"
             and note.owner is not None
-            and held is not None
-            and held.accepts is not None
+            and note_spec is not None
+            and note_spec.accepts is not None
         ):
             report(
-                f"<{held.tag}> of {describe_object(note.owner)} is empty: OpenSim then has no "
-                f"{held.accepts.tag} there, not even the default, and fails where it needs one; "
+                f"<{note_spec.tag}> of {describe_object(note.owner)} is empty: OpenSim then has no "
+                f"{note_spec.accepts.tag} there, not even the default, and fails where it needs one; "
                 "leave the element out",
                 note.owner,
                 number=note.number,
@@ -241,21 +241,24 @@ def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value
 def _describe_foreign_characters(text: str) -> str:
     """Return which characters of a number only look like ASCII; empty without any."""
     # Such characters come from PDF files and word processors.
-    odd = [character for character in dict.fromkeys(text) if not character.isascii()]
-    if not odd:
+    foreign = [character for character in dict.fromkeys(text) if not character.isascii()]
+    if not foreign:
         return ""
     import unicodedata
 
-    names = [f"U+{ord(c):04X} ({unicodedata.name(c, 'without a name').lower()})" for c in odd]
+    names = [
+        f"U+{ord(letter):04X} ({unicodedata.name(letter, 'without a name').lower()})"
+        for letter in foreign
+    ]
     return f" (there is {join_words(names, max_count=3)} in it)"
 
 
 def _make_readable(text: str, kind: Value) -> str | None:
     """Return the value as OpenSim would read it, if it is obvious; otherwise None."""
     if kind.scalar == "bool":
-        known = {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}
+        flag_words = {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}
         # A slip such as "ture" is taken for the nearest word.
-        return known.get(text.lower()) or find_nearest(text.lower(), ("true", "false"))
+        return flag_words.get(text.lower()) or find_nearest(text.lower(), ("true", "false"))
     if kind.scalar == "double":
         # Brackets and separators of other languages, and invisible characters.
         words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _replace_digits(text)).split()

@@ -35,18 +35,21 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     target = subject.config.target_version or NEWEST
-    later = load_later_changes(target)
+    later_changes = load_later_changes(target)
     # OSIM004 reports versions newer than all releases.
-    if subject.source is not None and later.format < (subject.version or 0) <= CURRENT_VERSION:
+    if (
+        subject.source is not None
+        and later_changes.format < (subject.version or 0) <= CURRENT_VERSION
+    ):
         report(
-            f"the file has the format {subject.version}, OpenSim {target} writes {later.format} "
+            f"the file has the format {subject.version}, OpenSim {target} writes {later_changes.format} "
             "and reads the file as such",
             number=0,
             attribute="Version",
             severity=INFO,
         )
     for cls, items in subject.by_class.items():
-        first = cls.since or later.classes.get(cls.tag)
+        first = cls.since or later_changes.classes.get(cls.tag)
         if first:
             for item in items:
                 # What is there by default stands in no file.
@@ -57,15 +60,15 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
                         item,
                     )
             continue
-        for spec, version, before in find_new_properties(cls, target):
-            was = f"; before it was called {before}" if before else ""
+        for spec, version, earlier_name in find_new_properties(cls, target):
+            rename_note = f"; before it was called {earlier_name}" if earlier_name else ""
             for item in items:
                 if not _is_given(subject, item, spec):
                     continue
                 is_default = spec.factory is None and getattr(item, spec.name) == spec.default
                 report(
                     f"{describe_object(item)}: OpenSim has {spec.tag} since version {version}; "
-                    f"{target} ignores it{was}",
+                    f"{target} ignores it{rename_note}",
                     item,
                     tag=spec.tag,
                     severity=INFO if is_default else None,

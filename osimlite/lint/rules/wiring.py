@@ -88,13 +88,13 @@ def report_broken_input(subject: Subject, report: FindingCollector) -> None:
             continue
         value = getattr(use.holder, use.spec.name)
         nth = value[: use.position].count(use.value) if isinstance(value, tuple) else 0
-        place = subject.position(use.holder, tag=use.spec.tag, word=use.value, nth=nth)
+        position = subject.position(use.holder, tag=use.spec.tag, word=use.value, nth=nth)
         report(
             f"{describe_object(use.holder)}: {use.spec.tag} names '{use.value}'{fault.message}",
             use.holder,
-            at=place,
+            at=position,
             suggestion=fault.suggestion,
-            fix=replace_text(subject.source, place, fault.suggestion, safe=False),
+            fix=replace_text(subject.source, position, fault.suggestion, safe=False),
         )
 
 
@@ -118,7 +118,7 @@ def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
       </PrescribedController>
     ```
     """
-    seen: dict[tuple[int, str], list[tuple[Component, str]]] = {}
+    targets_by_list: dict[tuple[int, str], list[tuple[Component, str]]] = {}
     for use in subject.uses:
         if use.reference.rule != "socket" or use.position is None:
             continue
@@ -126,17 +126,17 @@ def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
         if target is None:
             continue
         text = use.text
-        known = seen.setdefault((id(use.holder), use.spec.tag), [])
-        if any(other is target for other, _ in known):
+        list_targets = targets_by_list.setdefault((id(use.holder), use.spec.tag), [])
+        if any(listed is target for listed, _ in list_targets):
             report(
                 f"{describe_object(use.holder)} lists {describe_object(target)} again: OpenSim "
                 "rejects the model",
                 use.holder,
                 tag=use.spec.tag,
                 word=text,
-                nth=sum(1 for _, word in known if word == text),
+                nth=sum(1 for _, word in list_targets if word == text),
             )
-        known.append((target, text))
+        list_targets.append((target, text))
 
 
 class _InputFault(NamedTuple):
@@ -159,40 +159,48 @@ def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault 
         return _InputFault("; expected the path of a component, a bar and an output")
     tree, path = subject.tree, match["path"]
     base = tree.path_of(use.owner) or "/"
-    whole = normalize_path(path if path.startswith("/") else f"{base}/{path}")
-    component = tree.by_path.get(whole) if whole is not None else None
+    component_path = normalize_path(path if path.startswith("/") else f"{base}/{path}")
+    component = tree.by_path.get(component_path) if component_path is not None else None
     if component is None:
         if subject.has_unknown:
             return None
-        right = find_nearest(
-            path, [known for known, item in tree.by_path.items() if list_outputs(type(item))]
+        nearest = find_nearest(
+            path,
+            [
+                known_output
+                for known_output, item in tree.by_path.items()
+                if list_outputs(type(item))
+            ],
         )
         return _InputFault(
-            f", but there is no component '{path}'", text.replace(path, right, 1) if right else None
+            f", but there is no component '{path}'",
+            text.replace(path, nearest, 1) if nearest else None,
         )
     if isinstance(component, Unknown):
         return None
     outputs = list_outputs(type(component))
     kind = use.reference.target
-    known = outputs.get(match["output"])
-    if known is None:
-        right = find_nearest(
+    known_output = outputs.get(match["output"])
+    if known_output is None:
+        nearest = find_nearest(
             match["output"], [name for name, output in outputs.items() if output.type == kind]
         )
-        suggestion = None if right is None else f"{path}|{right}" + text[match.end("output") :]
+        suggestion = None if nearest is None else f"{path}|{nearest}" + text[match.end("output") :]
         return _InputFault(
             f", but {describe_object(component)} has no output '{match['output']}'", suggestion
         )
-    if known.type != kind:
-        return _InputFault(f", which is {_describe_type(known.type)}, not {_describe_type(kind)}")
-    if match["channel"] and not known.channels:
+    if known_output.type != kind:
+        return _InputFault(
+            f", which is {_describe_type(known_output.type)}, not {_describe_type(kind)}"
+        )
+    if match["channel"] and not known_output.channels:
         return _InputFault(f", but that output has no channel '{match['channel']}'")
     parent = tree.parent_of(use.owner)
     if isinstance(use.owner, Geometry) and isinstance(parent, Frame):
-        held = any(item is use.owner for item in parent.subcomponents)
+        is_drawn = any(item is use.owner for item in parent.subcomponents)
         return (
             None
-            if held
+            if is_drawn
             else _InputFault(
                 f"; {describe_object(parent)} draws it and moves it already: OpenSim rejects the "
                 "model"

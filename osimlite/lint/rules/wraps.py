@@ -50,14 +50,14 @@ def report_swallowed_point(subject: Subject, report: FindingCollector) -> None:
                 continue
             assert isinstance(surface, WrapObject)
             body, pose = base
-            first, last = wrap.range
-            for point in points[max(first, 1) - 1 : last if last > 0 else None]:
-                placed = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
-                if not isinstance(point, PathPoint) or placed is None or placed[0] is not body:
+            first_point, last_point = wrap.range
+            for point in points[max(first_point, 1) - 1 : last_point if last_point > 0 else None]:
+                location = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
+                if not isinstance(point, PathPoint) or location is None or location[0] is not body:
                     continue
                 depth = _compute_depth(
                     surface,
-                    pose.inverse().transform_point(placed[1].transform_point(point.location)),
+                    pose.inverse().transform_point(location[1].transform_point(point.location)),
                 )
                 if depth > 0:
                     owner = subject.tree.parent_of(path)
@@ -95,7 +95,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
             first, last = wrap.range
             surface = subject.target_of(wrap, "wrap_object")
             is_off = isinstance(surface, WrapObject) and not surface.active
-            tells = (
+            range_text = (
                 f"the range of {describe_object(wrap)} of {describe_object(owner or path)}, "
                 f"{first} {last},"
             )
@@ -104,7 +104,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
                 consequence = "OpenSim fails when it computes its length"
                 consequence += ", unless an earlier wrap has no points there" if may_leave else ""
                 report(
-                    f"{tells} ends beyond the {format_count(count, 'point')} of the path: {consequence}",
+                    f"{range_text} ends beyond the {format_count(count, 'point')} of the path: {consequence}",
                     wrap,
                     tag="range",
                     # OpenSim does not compute the length for a disabled force.
@@ -113,34 +113,35 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
                     else ERROR,
                 )
             elif start >= end or end > count:
-                others = (
+                ignored_note = (
                     ", and OpenSim ignores the wraps after it" if start > end and not is_off else ""
                 )
                 report(
-                    f"{tells} contains no segment of the path: it never wraps{others}",
+                    f"{range_text} contains no segment of the path: it never wraps{ignored_note}",
                     wrap,
                     tag="range",
                 )
             is_left = is_left or (start > end and not is_off)
-            held = points[start - 1 : end]
+            covered_points = points[start - 1 : end]
             may_leave = may_leave or not (
-                is_off or any(not isinstance(point, ConditionalPathPoint) for point in held)
+                is_off
+                or any(not isinstance(point, ConditionalPathPoint) for point in covered_points)
             )
 
 
 def _locate_wrap(subject: Subject, surface: WrapObject) -> tuple[Component, FramePose] | None:
     """Return the body that a surface is fixed to, and its pose there; None if unknown."""
     holder = subject.tree.parent_of(surface)
-    placed = locate_frame(subject, subject.tree.parent_of(holder) if holder is not None else None)
-    return placed and (
-        placed[0],
-        placed[1].compose(make_offset(surface.xyz_body_rotation, surface.translation)),
+    location = locate_frame(subject, subject.tree.parent_of(holder) if holder is not None else None)
+    return location and (
+        location[0],
+        location[1].compose(make_offset(surface.xyz_body_rotation, surface.translation)),
     )
 
 
-def _compute_depth(surface: WrapObject, place: Vector) -> float:
+def _compute_depth(surface: WrapObject, point: Vector) -> float:
     """Return the depth of a point inside a surface in its frame, m; 0 where OpenSim would wrap."""
-    x, y, z = place
+    x, y, z = point
     match surface:
         case WrapCylinder():
             return surface.radius - math.hypot(x, y)
@@ -148,7 +149,10 @@ def _compute_depth(surface: WrapObject, place: Vector) -> float:
             return surface.radius - math.hypot(x, y, z)
         case WrapEllipsoid() if min(surface.dimensions) > 0:
             size = math.hypot(
-                *(part / half for part, half in zip(place, surface.dimensions, strict=True))
+                *(
+                    coordinate / half
+                    for coordinate, half in zip(point, surface.dimensions, strict=True)
+                )
             )
             if size * size < 1 - 1e-4:
                 return math.hypot(x, y, z) * (1 / size - 1) if size > 0 else min(surface.dimensions)
