@@ -88,8 +88,8 @@ def check_bands(bands: Mapping[str, Band], titles: Sequence[str], *, cyclic: boo
     """
     if not bands.keys() & {*titles}:
         raise SettingError(
-            f"no panel is named {join_words([*bands], most=3)}, as the bands are; the panels are "
-            f"{join_words(list(dict.fromkeys(titles)), most=12)}"
+            f"no panel is named {join_words([*bands], max_count=3)}, as the bands are; the panels are "
+            f"{join_words(list(dict.fromkeys(titles)), max_count=12)}"
         )
     if not cyclic:
         raise SettingError(
