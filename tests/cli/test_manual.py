@@ -68,7 +68,7 @@ def test_whatever_raises_errors_has_a_page():
             "build dynamic-walker -p thigh=1 -o x.osim",
             "docs/errors.md#models-from-python-yaml-and-json",
         ),
-        ("build dynamic-walker -o nowhere/x.osim", "docs/errors.md#files"),
+        ("build dynamic-walker -o damaged.osim/x.osim", "docs/errors.md#files"),
         ("translate walker.osim -o damaged.osim", "docs/errors.md#files"),
         ("rule OSIM999", "docs/rules.md"),
         ("simulate walker.osim --set RHip=1", "docs/from-opensim.md#simulate-a-model"),

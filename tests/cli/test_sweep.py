@@ -145,7 +145,10 @@ def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
             ["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-above", "platform_rz=2"],
             "is locked",
         ),
-        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "nowhere/r.parquet"], "nowhere"),
+        (
+            ["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "walker.osim/r.parquet"],
+            "a file, not a folder",
+        ),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "."], "folder"),
         (["sweep", "dynamic-walker", "--vary", "slope=1:5:2", "-p", "slope=2"], "slope"),
         (
