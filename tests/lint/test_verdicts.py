@@ -13,7 +13,7 @@ from osimlite.lint import Report, validate
 from osimlite.lint.many import check_files
 from tests.bare import BareEnvironment
 from tests.cases import of_each
-from tests.lint.verdict_cases import CASES, FAILS, Case, small_model
+from tests.lint.verdict_cases import CASES, FAILS, Case, old_names, small_model
 
 SPRING = "<resting_length>1</resting_length><stiffness>1</stiffness><dissipation>0</dissipation>"
 
@@ -32,6 +32,23 @@ def test_a_small_model_has_the_finding(case: Case):
         assert report.errors, str(report)
     else:
         assert not report.errors, str(report)
+
+
+@pytest.mark.parametrize(
+    "unknown",
+    [
+        '<FroceSet><CoordinateActuator name="t"><coordinate>a q</coordinate></CoordinateActuator>'
+        "</FroceSet>",
+        "<part><coordinate>a q</coordinate></part>",
+    ],
+    ids=["a set", "a part"],
+)
+def test_what_opensim_leaves_out_refers_to_no_old_name(unknown: str):
+    # OpenSim 4.6 runs both models (measured).
+    (text,) = [case.text for case in old_names() if case.name.endswith("used by nobody")]
+    report = check(text.replace("</ForceSet>", f"{unknown}</ForceSet>"))
+    (finding,) = [finding for finding in report.findings if finding.code == "OSIM312"]
+    assert str(finding.severity) == "warning"
 
 
 def test_a_rule_that_reads_the_model_needs_no_numeric_library(tmp_path: Path):

@@ -895,9 +895,8 @@ def old_names() -> list[Case]:
         text = OLD_TEXT
         for place in ("COORDINATE", "FORCES", "GROUPS", "CONTROLLERS", "GEOMETRY", "PROBES"):
             text = text.replace(place, places.get(place, "q" if place == "COORDINATE" else ""))
-        return Case(
-            f"blank in an old name: {name}", text, "OSIM312" if verdict == FAILS else "", verdict
-        )
+        code = "OSIM312" if verdict == FAILS else ""
+        return Case(f"blank in an old name: {name}", text, code, verdict)
 
     def drive(name: str, coordinate: str = "q", more: str = "") -> str:
         inside = f"{more}<coordinate>{coordinate}</coordinate>"

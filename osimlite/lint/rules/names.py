@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from osimlite.base.text import format_count, join_words
+from osimlite.io.document.notes import NoteKind
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import Span
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
@@ -18,6 +19,15 @@ from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, is_a
 
 _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
+
+LEFT_OUT: tuple[NoteKind, ...] = (
+    "unknown-tag",
+    "unknown-class",
+    "wrong-class",
+    "second-object",
+    "ignored",
+)
+"""Notes about elements that OpenSim leaves out with all that is in them."""
 
 
 @rule("OSIM311", "duplicate-name", severity=ERROR)
@@ -111,7 +121,7 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
             name = subject.source.text[start : start + position.length]
             if any(character.isspace() for character in name) and not name.startswith("<"):
                 better = "".join(name.split())
-                users = list_old_references(subject.source, name)
+                users = list_old_references(subject, subject.source, name)
                 is_used = subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
                 consequence = f"OpenSim makes it '{better}'" + (
@@ -132,10 +142,11 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
                 )
 
 
-def list_old_references(source: Source, name: str) -> list[str]:
+def list_old_references(subject: Subject, source: Source, name: str) -> list[str]:
     """Return the tags of elements of an old document that OpenSim refuses if nothing has the name they give.
 
     Args:
+        subject: what was read of the document.
         source: the document.
         name: a name with white space, which OpenSim takes out of the name alone.
     """
@@ -143,6 +154,10 @@ def list_old_references(source: Source, name: str) -> list[str]:
     from osimlite.io.document.upgrade.version_3_structure import NAME_LIST_TAGS, TEXT_TAGS
 
     collapsed_name = " ".join(name.split())
+    # What OpenSim leaves out refers to nothing.
+    left_out = [
+        source.spans[note.number] for kind in LEFT_OUT for note, _ in subject.notes_of(kind)
+    ]
     result: list[str] = []
     owners: list[Span] = []
     for span in source.spans:
@@ -158,7 +173,12 @@ def list_old_references(source: Source, name: str) -> list[str]:
             span.tag in ("actuator_list", "muscle_list")
             and not (owners and owners[-1].tag == "PrescribedController")
         )
-        if is_reference and not harmless and span.tag not in TEXT_TAGS:
+        if (
+            is_reference
+            and not harmless
+            and span.tag not in TEXT_TAGS
+            and not any(other.start <= span.start < other.end for other in left_out)
+        ):
             result.append(span.tag)
         owners.append(span)
     return result
