@@ -86,15 +86,15 @@ class BatchOptions(IntegrationOptions):
         if not self.to >= 0.0:
             raise SettingError(f"the runs must end at 0 s or later, not at {self.to} s")
         # The pairs begin at 0 s, since no report is before the start.
-        if not all(one <= other for one, other in pairwise([0.0, *self.report_times])):
+        if not all(earlier <= later for earlier, later in pairwise([0.0, *self.report_times])):
             raise SettingError("the report times do not increase from 0 on; sort them")
-        for number, least, what in (
+        for number, least, option in (
             (1 if self.threads is None else self.threads, 1, "threads"),
             (self.most_events, 0, "most_events"),
             (self.most_tries, 0, "most_tries"),
         ):
             if number < least:
-                raise SettingError(f"{what} is at least {least}, not {number}")
+                raise SettingError(f"{option} is at least {least}, not {number}")
 
 
 class BatchEngine(Engine, Protocol):
@@ -271,14 +271,14 @@ class Runs:
     peaks: Floats
     event_states: list[Floats] = field(default_factory=list)
 
-    def select(self, places: Sequence[int] | Ints) -> Runs:
+    def select(self, indices: Sequence[int] | Ints) -> Runs:
         """Return some of the runs, by their indices."""
-        chosen: dict[str, Any] = {}
+        selected: dict[str, Any] = {}
         for name, rows in vars(self).items():
-            chosen[name] = (
-                rows[places]
+            selected[name] = (
+                rows[indices]
                 if isinstance(rows, np.ndarray)
                 # Lists that are empty were not requested.
-                else [rows[place] for place in places if rows]
+                else [rows[index] for index in indices if rows]
             )
-        return Runs(**chosen)
+        return Runs(**selected)

@@ -67,19 +67,19 @@ def make_bvh(
         frame = mobilizer.parent_frame if mobilizer.reversed else mobilizer.child_frame
         centers.append(frame[:3, 3])
     rotations = np.empty((len(times), len(bodies), 3, 3))
-    places = np.empty((len(times), len(bodies), 3))
+    positions = np.empty((len(times), len(bodies), 3))
     for row, q in enumerate(values):
         state = mechanism.at(q)
         for index, center in enumerate(centers):
             rotations[row, index] = upright @ state.rotations[index]
-            places[row, index] = upright @ state.point(index, center)
-    rest = mechanism.at(mechanism.default_state()[0])
+            positions[row, index] = upright @ state.point(index, center)
+    rest_state = mechanism.at(mechanism.default_state()[0])
     # The skeleton of the file is the default pose.
-    rest_places = np.array(
-        [upright @ rest.point(index, center) for index, center in enumerate(centers)]
+    rest_positions = np.array(
+        [upright @ rest_state.point(index, center) for index, center in enumerate(centers)]
     )
     roots = [index for index, body in enumerate(bodies) if body.parent == GROUND]
-    taken: set[str] = set()
+    used_names: set[str] = set()
     joints: list[BvhJoint] = []
     columns: list[Array] = []
     names = [""] * len(bodies)
@@ -88,44 +88,54 @@ def make_bvh(
     # Several roots hang on a joint of their own, because most programs read one root only.
     base = int(len(roots) != 1)
     if base:
-        taken.add("ground")
+        used_names.add("ground")
         joints.append(BvhJoint("ground", -1, np.zeros(3), (*POSITIONS, *ROTATIONS)))
         columns.append(np.zeros((len(times), 6)))
-    inner = {body.parent for body in bodies}
+    parent_bodies = {body.parent for body in bodies}
     # Numbers of a frame have the order of the joints in the file, which is depth-first.
     for index in _list_depth_first(mechanism):
         body = bodies[index]
-        name = make_unique_name("_".join(body.name.rpartition("/")[2].split()) or "body", taken)
-        taken.add(name)
+        name = make_unique_name(
+            "_".join(body.name.rpartition("/")[2].split()) or "body", used_names
+        )
+        used_names.add(name)
         names[index] = name
         is_root = not base and index == roots[0]
-        above = body.parent
-        if above == GROUND:
-            local_turns, local_places = rotations[:, index], places[:, index]
-            offset = np.zeros(3) if is_root else rest_places[index]
+        parent_body = body.parent
+        if parent_body == GROUND:
+            local_rotations, local_positions = rotations[:, index], positions[:, index]
+            offset = np.zeros(3) if is_root else rest_positions[index]
         else:
-            back = rotations[:, above].transpose(0, 2, 1)
-            local_turns = back @ rotations[:, index]
+            parent_inverses = rotations[:, parent_body].transpose(0, 2, 1)
+            local_rotations = parent_inverses @ rotations[:, index]
             # Poses relative to the body above, in its axes.
-            local_places = np.einsum("nij,nj->ni", back, places[:, index] - places[:, above])
-            offset = rest.rotations[above].T @ upright.T @ (rest_places[index] - rest_places[above])
+            local_positions = np.einsum(
+                "nij,nj->ni", parent_inverses, positions[:, index] - positions[:, parent_body]
+            )
+            offset = (
+                rest_state.rotations[parent_body].T
+                @ upright.T
+                @ (rest_positions[index] - rest_positions[parent_body])
+            )
         # A joint whose centre stays in the body above needs no positions.
-        moves = float(np.ptp(np.vstack([local_places, offset]), axis=0).max()) > MIN_TRANSLATION_M
-        if is_root or moves:
-            columns.append(scale * local_places)
+        is_translating = (
+            float(np.ptp(np.vstack([local_positions, offset]), axis=0).max()) > MIN_TRANSLATION_M
+        )
+        if is_root or is_translating:
+            columns.append(scale * local_positions)
             if not is_root:
                 translating.append(name)
-        columns.append(find_angles(local_turns))
-        channels = (*POSITIONS, *ROTATIONS) if is_root or moves else ROTATIONS
+        columns.append(find_angles(local_rotations))
+        channels = (*POSITIONS, *ROTATIONS) if is_root or is_translating else ROTATIONS
         end = None
         # The last bone points to the mass centre, and twice as far: about to the end of the
         # segment.
-        if index not in inner:
+        if index not in parent_bodies:
             end = 2.0 * (body.mass_properties.center - centers[index])
             end = scale * (
                 end if np.linalg.norm(end) > MIN_BONE_M else np.array([0.0, -MIN_BONE_M, 0.0])
             )
-        parent = -1 if is_root else 0 if above == GROUND else joint_of_body[above]
+        parent = -1 if is_root else 0 if parent_body == GROUND else joint_of_body[parent_body]
         joint_of_body[index] = len(joints)
         joints.append(BvhJoint(name, parent, scale * offset, channels, end))
     # A motion of one row has no step; 60 frames a second is usual.

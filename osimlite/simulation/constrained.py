@@ -25,17 +25,17 @@ def find_free_coordinates(mechanism: Mechanism) -> list[int]:
     Returns:
         Indices in the order of the mechanism's coordinates.
     """
-    turning = [
-        set(motion_places)
+    rotations = [
+        set(indices)
         for body in mechanism.bodies
-        for motion_places in body.mobilizer.turning
-        if not all(mechanism.coordinates[place].locked for place in motion_places)
+        for indices in body.mobilizer.turning
+        if not all(mechanism.coordinates[index].locked for index in indices)
     ]
-    held = set().union(*turning)
+    rotating = set().union(*rotations)
     return [
-        place
-        for place, info in enumerate(mechanism.coordinates)
-        if not info.locked or place in held
+        index
+        for index, info in enumerate(mechanism.coordinates)
+        if not info.locked or index in rotating
     ]
 
 
@@ -52,19 +52,21 @@ def select_constraints(
     Returns:
         The constraints, and the number of locked coordinates that are not in the state.
     """
-    kept: list[ConstraintEquations] = []
-    locks = 0
+    constraints: list[ConstraintEquations] = []
+    lock_count = 0
     for item in mechanism.constraints:
         if not isinstance(item, Lock):
-            kept.append(item)
+            constraints.append(item)
         elif item.coordinate in order:
             # A locked coordinate that stays in the state is held at its default value by a
             # constraint.
             value = mechanism.coordinates[item.coordinate].default_value
-            kept.append(PrescribedCoordinate(item.coordinate, ConstantValue(value), item.name))
+            constraints.append(
+                PrescribedCoordinate(item.coordinate, ConstantValue(value), item.name)
+            )
         else:
-            locks += 1
-    return kept, locks
+            lock_count += 1
+    return constraints, lock_count
 
 
 def find_consistent_state(

@@ -107,10 +107,10 @@ class KernelController:
             Texts by key: "gains" as JSON, "reflexes" as a checksum.
         """
         # A checksum tells whether a resumed run has the same reflexes, without writing them out.
-        others = crc32(self.plan.tobytes() + self.numbers.tobytes())
+        checksum = crc32(self.plan.tobytes() + self.numbers.tobytes())
         return {
             "gains": json.dumps({**self.gains, "fixed_control_step_size": self.step}),
-            "reflexes": str(others),
+            "reflexes": str(checksum),
         }
 
     @property
@@ -158,44 +158,46 @@ class KernelController:
             )
         return result
 
-    def require_same_controller(self, before: StoTable | None, end: float) -> None:
+    def require_same_controller(self, earlier_record: StoTable | None, end: float) -> None:
         """Check that the record of an earlier run belongs to this controller and ends where that run ended.
 
         Args:
-            before: record of the earlier run; None if it had no controller.
+            earlier_record: record of the earlier run; None if it had no controller.
             end: end of the earlier run, s.
 
         Raises:
             SettingError: the record is missing, or belongs to another controller or another time.
         """
-        if before is None:
+        if earlier_record is None:
             raise SettingError(
                 "the earlier run has no controller.sto, so it had no controller; resume it without one"
             )
-        if before.columns != self.columns:
+        if earlier_record.columns != self.columns:
             raise SettingError(
                 "the controller of the earlier run had other sensors or actuators; resume it with the same controller"
             )
-        theirs, ours = (
-            json.loads(header.get("gains", "{}")) for header in (before.header, self.header)
+        earlier_gains, current_gains = (
+            json.loads(header.get("gains", "{}")) for header in (earlier_record.header, self.header)
         )
-        for name in {**theirs, **ours}:
-            if theirs.get(name) != ours.get(name):
-                one, other = (
-                    f"{each[name]:g}" if name in each else "none" for each in (theirs, ours)
+        for name in {**earlier_gains, **current_gains}:
+            if earlier_gains.get(name) != current_gains.get(name):
+                earlier_value, current_value = (
+                    f"{gains[name]:g}" if name in gains else "none"
+                    for gains in (earlier_gains, current_gains)
                 )
                 raise SettingError(
-                    f"the earlier run had '{name}' {one}, this one has {other}; resume it with the same value"
+                    f"the earlier run had '{name}' {earlier_value}, this one has {current_value}; resume it with the same value"
                 )
-        if before.header.get("reflexes") != self.header["reflexes"]:
+        if earlier_record.header.get("reflexes") != self.header["reflexes"]:
             raise SettingError(
                 "the earlier run had other reflexes, states of legs or noise; resume it with the same controller"
             )
         # The controller acts at multiples of its step, so that its last row is less than one step
         # before the last state.
-        if not 0.0 <= end - before.times[-1] < self.step * (1.0 + TIME_TOLERANCE):
+        if not 0.0 <= end - earlier_record.times[-1] < self.step * (1.0 + TIME_TOLERANCE):
             raise SettingError(
-                f"the record of the controller ends at {before.times[-1]:g} s, the states at {end:g} s; use files of one run"
+                f"the record of the controller ends at {earlier_record.times[-1]:g} s, "
+                f"the states at {end:g} s; use files of one run"
             )
 
     def make_runs(
@@ -203,8 +205,8 @@ class KernelController:
         engine: Any,
         controls: Controls,
         to: float = 0.0,
-        before: StoTable | None = None,
-        others: Sequence[KernelController] = (),
+        earlier_record: StoTable | None = None,
+        other_controllers: Sequence[KernelController] = (),
     ) -> ControllerRuns:
         """Return the workspace of a run of this model, and of further models.
 
@@ -212,10 +214,10 @@ class KernelController:
             engine: engine of one of the models, driven by `controls`.
             controls: controls with the constants of :meth:`add_constants`.
             to: end of a single run, s; 0 for runs that are not recorded.
-            before: record of the earlier run that a single run continues.
-            others: controllers of the models of further runs.
+            earlier_record: record of the earlier run that a single run continues.
+            other_controllers: controllers of the models of further runs.
         """
-        return ControllerRuns((self, *others), engine, controls, to, before)
+        return ControllerRuns((self, *other_controllers), engine, controls, to, earlier_record)
 
 
 class ControllerRuns:
@@ -236,20 +238,24 @@ class ControllerRuns:
 
     def __init__(
         self,
-        helds: Sequence[KernelController],
+        controllers: Sequence[KernelController],
         engine: Any,
         controls: Controls,
         to: float,
-        before: StoTable | None,
+        earlier_record: StoTable | None,
     ) -> None:
-        held, count = helds[0], len(helds)
-        self.controller, self._before, self.next_step = held, before, INITIAL_STEP_S
-        plan, senses = held.plan.copy(), held.senses
+        first_controller, count = controllers[0], len(controllers)
+        self.controller, self._before, self.next_step = (
+            first_controller,
+            earlier_record,
+            INITIAL_STEP_S,
+        )
+        plan, senses = first_controller.plan.copy(), first_controller.senses
         # All runs use the memory of the longest delay.
-        plan[REFLEXES.KEPT] = max(each.plan[REFLEXES.KEPT] for each in helds)
-        plan[REFLEXES.ROOM] = max(each.plan[REFLEXES.ROOM] for each in helds)
-        driven = find_constant_offsets(engine, controls)[
-            [controls.names.index(path) for path in held.paths]
+        plan[REFLEXES.KEPT] = max(controller.plan[REFLEXES.KEPT] for controller in controllers)
+        plan[REFLEXES.ROOM] = max(controller.plan[REFLEXES.ROOM] for controller in controllers)
+        control_offsets = find_constant_offsets(engine, controls)[
+            [controls.names.index(path) for path in first_controller.paths]
         ]
         self._room = np.zeros((count, plan[REFLEXES.ROOM]))
         rows = np.zeros((count, senses[SENSES.SIZE]))
@@ -257,43 +263,45 @@ class ControllerRuns:
         self._room[:, :LEGS] = (
             LEG_STATE.UNKNOWN if plan[REFLEXES.HAS_STATES] else LEG_STATE.EARLY_STANCE
         )
-        self._excitations = np.zeros((count, len(held.paths)))
+        self._excitations = np.zeros((count, len(first_controller.paths)))
         self._progress: Ints = np.zeros((count, PROGRESS.SIZE), dtype=np.int64)
-        if before is not None:
-            self._resume(plan, before)
+        if earlier_record is not None:
+            self._restore_memory(plan, earlier_record)
         if to > 0.0:
-            plan[REFLEXES.ROWS] = held.count_steps(to) + 2 - plan[REFLEXES.FIRST]
-        self._record = np.empty((plan[REFLEXES.ROWS], len(held.columns)))
+            plan[REFLEXES.ROWS] = first_controller.count_steps(to) + 2 - plan[REFLEXES.FIRST]
+        self._record = np.empty((plan[REFLEXES.ROWS], len(first_controller.columns)))
         self._plan = plan
-        known = np.stack([each.known for each in helds])
-        numbers = np.concatenate([each.numbers for each in helds])
+        known = np.stack([controller.known for controller in controllers])
+        numbers = np.concatenate([controller.numbers for controller in controllers])
         self.parts = (
-            *(senses, known, driven, plan, numbers),
+            *(senses, known, control_offsets, plan, numbers),
             *(self._room, rows, self._excitations, self._record, self._progress),
         )
 
-    def _resume(self, plan: Ints, before: StoTable) -> None:
+    def _restore_memory(self, plan: Ints, earlier_record: StoTable) -> None:
         """Restore the memory of the controller from the record of an earlier run.
 
         Args:
             plan: integers of the controller, which get the first step of this run.
-            before: record of the earlier run.
+            earlier_record: record of the earlier run.
         """
-        frames = self.controller.count_steps(before.times[-1]) + 1
-        kept = int(plan[REFLEXES.KEPT])
-        sensors = len(self.controller.sensors)
-        history = self._room[0, LEGS : LEGS + kept * sensors].reshape(kept, sensors)
-        for back, row in enumerate(before.rows[: -1 - kept : -1]):
-            # The history of the sensors is a ring buffer of `kept` frames, indexed by the number of
-            # the frame.
-            history[(frames - 1 - back) % kept] = row[:sensors]
-        last = before.rows[-1, sensors:]
-        self._room[0, :LEGS], self._excitations[0], self.next_step = (
-            last[:LEGS],
-            last[LEGS:-1],
-            float(last[-1]),
+        frame_count = self.controller.count_steps(earlier_record.times[-1]) + 1
+        history_size = int(plan[REFLEXES.KEPT])
+        sensor_count = len(self.controller.sensors)
+        history = self._room[0, LEGS : LEGS + history_size * sensor_count].reshape(
+            history_size, sensor_count
         )
-        self._progress[0, [PROGRESS.STEPS, PROGRESS.FRAMES]] = plan[REFLEXES.FIRST] = frames
+        for age, row in enumerate(earlier_record.rows[: -1 - history_size : -1]):
+            # The history of the sensors is a ring buffer of `history_size` frames, indexed by the number of
+            # the frame.
+            history[(frame_count - 1 - age) % history_size] = row[:sensor_count]
+        last_row = earlier_record.rows[-1, sensor_count:]
+        self._room[0, :LEGS], self._excitations[0], self.next_step = (
+            last_row[:LEGS],
+            last_row[LEGS:-1],
+            float(last_row[-1]),
+        )
+        self._progress[0, [PROGRESS.STEPS, PROGRESS.FRAMES]] = plan[REFLEXES.FIRST] = frame_count
 
     def table(self, end: float = inf) -> StoTable:
         """Return the record of a single run.
@@ -307,17 +315,17 @@ class ControllerRuns:
         Returns:
             One row for each control step, with the columns of the controller.
         """
-        new = int(self._progress[0, PROGRESS.STEPS] - self._plan[REFLEXES.FIRST])
+        new_count = int(self._progress[0, PROGRESS.STEPS] - self._plan[REFLEXES.FIRST])
         times = self.controller.step * np.arange(
-            self._progress[0, PROGRESS.STEPS] - new,
+            self._progress[0, PROGRESS.STEPS] - new_count,
             self._progress[0, PROGRESS.STEPS],
             dtype=np.float64,
         )
-        rows = self._record[:new].copy()
+        rows = self._record[:new_count].copy()
         if self._before is not None:
-            kept = int(self._plan[REFLEXES.KEPT])
-            times = np.concatenate([self._before.times[-kept:], times])
-            rows = np.concatenate([self._before.rows[-kept:], rows])
+            history_size = int(self._plan[REFLEXES.KEPT])
+            times = np.concatenate([self._before.times[-history_size:], times])
+            rows = np.concatenate([self._before.rows[-history_size:], rows])
         count = int(
             np.searchsorted(times, end + TIME_TOLERANCE * self.controller.step, side="right")
         )

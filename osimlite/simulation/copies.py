@@ -51,13 +51,15 @@ class Copies:
         self.simulation = simulation = Simulation(model, "compiled")
         engine: Any = simulation.engine
         self.engine = engine
-        own = simulation.forces.controls
-        self.controls = own.names
+        model_controls = simulation.forces.controls
+        self.controls = model_controls.names
         # Constants are numbers of the model, which the caller replaces at each step.
-        driven = own.add_functions({name: ConstantValue(0.0) for name in own.names})
-        self.engine.set_controls(driven)
+        constant_controls = model_controls.add_functions(
+            {name: ConstantValue(0.0) for name in model_controls.names}
+        )
+        self.engine.set_controls(constant_controls)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
-        self.places = find_constant_offsets(engine, driven)
+        self.places = find_constant_offsets(engine, constant_controls)
         batch_options = BatchOptions(to=step, **options.integration_choices())
         batch_options.check()
         self.batch = BatchWorkspace(
@@ -101,36 +103,38 @@ class Copies:
         Returns:
             Whether each copy (w,) reached the end of the step; False where integration failed.
         """
-        going = np.zeros(len(self.states), dtype=np.int64)
+        running = np.zeros(len(self.states), dtype=np.int64)
         self._run_on_all_cores(
             "hold_several",
             self._parts,
             self.places,
             np.array(controls, dtype=np.float64, order="C"),
             len(self.places),
-            going,
+            running,
         )
-        return going > 0
+        return running > 0
 
-    def walk_some(self, which: Sequence[int], *parts: Any) -> int:
+    def walk_some(self, which: Sequence[int], *arguments: Any) -> int:
         """Advance some copies by :func:`osimlite.mechanics.kernels.walks.walk_several`.
 
         Args:
             which: indices of the copies.
-            parts: further arguments of the kernel.
+            arguments: further arguments of the kernel.
 
         Returns:
             The largest outcome, one of `OUTCOME`; 0 if all went well.
         """
-        return self._run_on_all_cores("walk_several", [(k, k + 1) for k in which], *parts)
+        return self._run_on_all_cores("walk_several", [(k, k + 1) for k in which], *arguments)
 
-    def _run_on_all_cores(self, law: str, parts: Sequence[tuple[int, int]], *given: Any) -> int:
+    def _run_on_all_cores(
+        self, law: str, ranges: Sequence[tuple[int, int]], *arguments: Any
+    ) -> int:
         """Run a kernel for parts of the copies on all cores.
 
         Args:
             law: name of the kernel.
-            parts: first and last copy (exclusive) of each call.
-            given: arguments of the kernel before these two.
+            ranges: first and last copy (exclusive) of each call.
+            arguments: arguments of the kernel before these two.
 
         Returns:
             Its largest result.
@@ -138,24 +142,26 @@ class Copies:
         self.engine.program.code.make_ready((law,))
         # One iterator for all threads: each takes the next part when it is ready, so that slow
         # copies do not hold up the others. The lock of the interpreter makes `next` safe.
-        left, said = iter(parts), [0]
+        remaining_ranges, statuses = iter(ranges), [0]
 
-        def share(room: Floats, numbers: Floats) -> None:
-            for first, last in left:
-                said.append(self.batch.run_walk_law(law, room, numbers, *given, first, last))
+        def run_ranges(workspace: Floats, numbers: Floats) -> None:
+            for first, last in remaining_ranges:
+                statuses.append(
+                    self.batch.run_walk_law(law, workspace, numbers, *arguments, first, last)
+                )
 
-        others = (
+        futures = (
             []
             if self._pool is None
-            else [self._pool.submit(share, *room) for room in self._rooms[1:]]
+            else [self._pool.submit(run_ranges, *workspace) for workspace in self._rooms[1:]]
         )
         try:
-            share(*self._rooms[0])
+            run_ranges(*self._rooms[0])
         finally:
             # Wait also after Ctrl-C, so that no other thread still uses the workspaces.
-            for other in others:
-                other.result()
-        return max(said)
+            for future in futures:
+                future.result()
+        return max(statuses)
 
     def close(self) -> None:
         """Shut down the threads and close the engine."""

@@ -128,15 +128,15 @@ class SemiImplicitEuler(Stepper):
     def _take_step(self, h: float) -> list[float]:
         """Return the state after a step of length h (s), before constraints are enforced."""
         q = self.state[: self._nq]
-        rest = [
+        speeds_and_auxiliary = [
             x + h * a
             for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)
         ]
         # The new speeds move the coordinates. That makes the method semi-implicit: it keeps the
         # energy of oscillators bounded, which explicit Euler steps do not.
-        u = rest[: self._nq]
+        u = speeds_and_auxiliary[: self._nq]
         rates = u if self._rates is None else self._rates(q, u)
-        return [x + h * v for x, v in zip(q, rates, strict=True)] + rest
+        return [x + h * v for x, v in zip(q, rates, strict=True)] + speeds_and_auxiliary
 
     def make_interpolant(self) -> Callable[[float], list[float]]:
         """Return the linear interpolation between the ends of the last step."""

@@ -85,15 +85,15 @@ class StateEvaluator:
         self.order = packed.order
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(
-            item.pair_name(place) for item in contacts for place in range(len(item.pairs))
+            item.pair_name(index) for item in contacts for index in range(len(item.pairs))
         )
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.program = Program(packed, select_code() if code is None else code, self.entries)
         self._items, self._owners = packed.items, packed.owners
-        places = {owner: place for place, owner in packed.owners.items()}
+        item_offsets = {owner: index for index, owner in packed.owners.items()}
         probes = (k for k, item in enumerate(forces.elements) if isinstance(item, DeclaredProbe))
-        self._probe_places = [places.get(k, 0) for k in probes]
+        self._probe_places = [item_offsets.get(k, 0) for k in probes]
         self._w = np.zeros(self.structure[MODEL.WORK_SIZE])
         self._links = self._view_rows(MODEL.WORK_LINK, MODEL.LINKS, LINK_WORK.SIZE)
         self._pairs = self._view_rows(MODEL.WORK_CONTACT, MODEL.CONTACTS, CONTACT_WORK.SIZE)
@@ -127,13 +127,13 @@ class StateEvaluator:
             numbers: its numbers.
         """
         # The ordinary copy would construct a new engine.
-        other = object.__new__(type(self))
-        other.__dict__ |= self.__dict__
-        other.program = copy(self.program)
+        evaluator = object.__new__(type(self))
+        evaluator.__dict__ |= self.__dict__
+        evaluator.program = copy(self.program)
         # The cached property of `System` depends on the numbers.
-        other.__dict__.pop("masses_in_ground", None)
-        other._set_model(mechanism, forces, numbers)
-        return other
+        evaluator.__dict__.pop("masses_in_ground", None)
+        evaluator._set_model(mechanism, forces, numbers)
+        return evaluator
 
     def _bind_kernels(self) -> None:
         """Bind the kernels to the arrays of the system, so that a call passes only integers."""
@@ -148,21 +148,23 @@ class StateEvaluator:
         Args:
             controls: controls with the same names as those of the model.
         """
-        place = self.structure[MODEL.CONTROLS]
-        if controls is self._controls or not place:
+        record_offset = self.structure[MODEL.CONTROLS]
+        if controls is self._controls or not record_offset:
             return
-        own, numbers, kernel = controls.make_record()
-        first = self.structure[place + ITEM.NUMBERS]
-        if self._driven_by == (own, len(numbers), kernel):
+        ints, numbers, kernel = controls.make_record()
+        first_number = self.structure[record_offset + ITEM.NUMBERS]
+        if self._driven_by == (ints, len(numbers), kernel):
             # The numbers are replaced in place, so that callers of the kernels need no new arrays.
-            self.numbers[first:] = numbers
+            self.numbers[first_number:] = numbers
             self._controls = controls
             return
-        self._driven_by = own, len(numbers), kernel
+        self._driven_by = ints, len(numbers), kernel
         self.structure = np.concatenate(
-            (self.structure[: place + ITEM.OWN], np.array(own, dtype=np.int64))
+            (self.structure[: record_offset + ITEM.OWN], np.array(ints, dtype=np.int64))
         )
-        self.numbers = np.concatenate((self.numbers[:first], np.array(numbers, dtype=np.float64)))
+        self.numbers = np.concatenate(
+            (self.numbers[:first_number], np.array(numbers, dtype=np.float64))
+        )
         self.program.set_controls(self.structure, kernel)
         self._bind_kernels()
         self._controls = controls
@@ -200,8 +202,8 @@ class StateEvaluator:
         self._set_state(t, y)
         return self._run_kernel(self._evaluate, stage)
 
-    def _run_kernel(self, function: Callable[..., int], *parts: Any) -> int:
-        status = self.program.run(function, *parts)
+    def _run_kernel(self, function: Callable[..., int], *arguments: Any) -> int:
+        status = self.program.run(function, *arguments)
         if status == OUTCOME.FAILED:
             raise self.program.failures.pop()
         return status
@@ -320,7 +322,7 @@ class StateEvaluator:
         if failed is None:
             return result, {}
         reasons, count = {}, int(self.structure[MODEL.EQUILIBRIA])
-        code, room = self.program.code, (self._w, self._y, self._f)
+        code, work_vectors = self.program.code, (self._w, self._y, self._f)
         code.make_ready(("equilibrate",))
         while failed is not None:
             item = int(self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM])
@@ -332,7 +334,8 @@ class StateEvaluator:
             ints[MODEL.EQUILIBRIUM_AT] = self._equilibrium_at(failed + 1)
             self._set_state(t, y)
             status = self._run_kernel(
-                partial(code.get_entry("equilibrate"), ints, self.numbers, *room), STAGE.VELOCITY
+                partial(code.get_entry("equilibrate"), ints, self.numbers, *work_vectors),
+                STAGE.VELOCITY,
             )
             failed = failed + 1 + int(self._f[0]) if status == OUTCOME.UNSOLVED else None
         for element in self.forces.elements:
@@ -364,16 +367,16 @@ class StateEvaluator:
         """
         if not self.structure[MODEL.EQUILIBRIA]:
             return list(y), None
-        code, ints, room = self.program.code, self.program.ints, (self._w, self._y, self._f)
+        code, ints, work_vectors = self.program.code, self.program.ints, (self._w, self._y, self._f)
         if self._equilibrate is None:
             # Most models never need these kernels, so they are linked at their first use.
             self.program.link_equilibria()
-            self._equilibrate = code.bind_entry("equilibrate", ints, self.numbers, *room)
+            self._equilibrate = code.bind_entry("equilibrate", ints, self.numbers, *work_vectors)
         self._set_state(t, y)
         run = (
             self._equilibrate
             if numbers is None
-            else partial(code.get_entry("equilibrate"), ints, numbers, *room)
+            else partial(code.get_entry("equilibrate"), ints, numbers, *work_vectors)
         )
         try:
             status = self._run_kernel(run, STAGE.VELOCITY)
@@ -400,13 +403,13 @@ class StateEvaluator:
 
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
-        *parts, (place, room) = self._items[owner]
+        *earlier_records, (offset, size) = self._items[owner]
         # A path that cannot be wrapped has the length NaN, and then the muscle has no solution
         # either.
         on_path = isinstance(element, DeclaredForce) and element.force_type.geometry is PATH
-        if on_path and isnan(self._w[parts[-1][0] + PATH_WORK.LENGTH]):
+        if on_path and isnan(self._w[earlier_records[-1][0] + PATH_WORK.LENGTH]):
             return f"'{element.path}', whose path has no length in this pose"
-        return element.describe_failure(self._w[place : place + room].tolist())
+        return element.describe_failure(self._w[offset : offset + size].tolist())
 
     def make_evaluation_error(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         """Return the error for the outcome of an evaluation.
@@ -443,15 +446,15 @@ class StateEvaluator:
             "the motion cannot be computed any further; use a smaller accuracy value"
         )
 
-    def read_record(self, path: str, place: int) -> float:
+    def read_record(self, path: str, offset: int) -> float:
         """Return a number of an element's record, or of the controls', after an evaluation.
 
         Args:
             path: path of the element, or `CONTROLS`.
-            place: offset in the record.
+            offset: offset in the record.
         """
         start = self.structure[MODEL.WORK_CONTROL] if path == CONTROLS else self._records_at[path]
-        return float(self._w[start + place])
+        return float(self._w[start + offset])
 
     def find_offsets(self, path: str, names: Iterable[str]) -> list[int]:
         """Return offsets in the work vector of named quantities of a force.
@@ -466,8 +469,8 @@ class StateEvaluator:
         Raises:
             KeyError: the force records no such quantity.
         """
-        known = self.get_force_type(path).record_names
-        return [self._records_at[path] + known[name] for name in names]
+        offsets = self.get_force_type(path).record_names
+        return [self._records_at[path] + offsets[name] for name in names]
 
     def has_quantity(self, path: str, name: str) -> bool:
         """Return whether a force records a quantity of this name."""
@@ -491,7 +494,7 @@ class StateEvaluator:
     def evaluate_moments(
         self,
         moments: Floats,
-        places: Sequence[int],
+        offsets: Sequence[int],
         stage: int = STAGE.FORCE,
         udot: Floats | None = None,
     ) -> Floats:
@@ -499,7 +502,7 @@ class StateEvaluator:
 
         Args:
             moments: times (s) and states (k, 1 + y).
-            places: offsets in the work vector (m,); offsets from `work_size` on select entries of
+            offsets: offsets in the work vector (m,); offsets from `work_size` on select entries of
                 the derivative.
             stage: stage up to which the states are evaluated.
             udot: accelerations (k, n) in the order of the state; with them inverse dynamics is
@@ -517,19 +520,19 @@ class StateEvaluator:
         law = "evaluate" if udot is None else "inverse"
         code = self.program.code
         code.make_ready(("look", law))
-        moving = np.empty((len(moments), 0)) if udot is None else udot
-        given = np.ascontiguousarray(np.hstack([moments, moving]))
-        result = np.empty((len(moments), len(places)))
+        accelerations = np.empty((len(moments), 0)) if udot is None else udot
+        inputs = np.ascontiguousarray(np.hstack([moments, accelerations]))
+        result = np.empty((len(moments), len(offsets)))
         order = np.array(
-            [0, moving.shape[1], code.get_address(law), len(places), *places],
+            [0, accelerations.shape[1], code.get_address(law), len(offsets), *offsets],
             dtype=np.int64,
         )
-        parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage
+        arguments = self.program.ints, self.numbers, self._w, self._y, self._f, stage
         entry = code.get_entry("look")
         title = "evaluating the motion" if udot is None else "computing generalized forces"
-        for rows in divide_rows(title, len(given)):
+        for rows in divide_rows(title, len(inputs)):
             order[0] = rows.stop - rows.start
-            status = self._run_kernel(entry, *parts, given[rows], order, result[rows])
+            status = self._run_kernel(entry, *arguments, inputs[rows], order, result[rows])
             if status != OUTCOME.OK:
                 raise self.make_evaluation_error(
                     status, float(self._w[WORK.TIME]), self._y.tolist()
@@ -556,11 +559,13 @@ class StateEvaluator:
         """
         code, size = self.program.code, len(self.order)
         code.make_ready(("push_each", "inverse"))
-        items = {self.forces.elements[owner].path: place for place, owner in self._owners.items()}
+        item_offsets = {
+            self.forces.elements[owner].path: offset for offset, owner in self._owners.items()
+        }
         controls = dict(zip(self._controls.names, self.control_offsets, strict=True))
         order = [0, len(names)]
         for name in names:
-            item, path, strength = items[name], -1, -1
+            item, path, strength = item_offsets[name], -1, -1
             # A muscle pulls along its path with its strength; the other actuators apply their
             # optimal force.
             if self.has_quantity(name, STRENGTH):
@@ -569,9 +574,9 @@ class StateEvaluator:
                 )
                 (strength,) = self.find_offsets(name, (STRENGTH,))
             order += item, controls[name], path, strength
-        given = np.hstack([moments, udot])
+        inputs = np.hstack([moments, udot])
         result = np.empty((len(moments), size + len(names) * (size + 1)))
-        parts = (
+        arguments = (
             self.program.ints,
             self.numbers,
             self._w,
@@ -582,18 +587,18 @@ class StateEvaluator:
         entry, plan = code.get_entry("push_each"), np.array(order, dtype=np.int64)
         for rows in divide_rows("computing the force of each muscle", len(moments)):
             plan[0] = rows.stop - rows.start
-            status = self._run_kernel(entry, *parts, given[rows], plan, result[rows])
+            status = self._run_kernel(entry, *arguments, inputs[rows], plan, result[rows])
             if status != OUTCOME.OK:
                 raise self.make_evaluation_error(
                     status, float(self._w[WORK.TIME]), self._y.tolist()
                 )
-        each = result[:, size:].reshape(len(moments), len(names), size + 1)
-        return result[:, :size], each[:, :, :size], each[:, :, size]
+        unit_results = result[:, size:].reshape(len(moments), len(names), size + 1)
+        return result[:, :size], unit_results[:, :, :size], unit_results[:, :, size]
 
     @cached_property
     def _records_at(self) -> dict[str, int]:
         pairs = zip(self.forces.elements, self._items, strict=True)
-        return {element.path: items[-1][0] for element, items in pairs if items}
+        return {element.path: records[-1][0] for element, records in pairs if records}
 
     @property
     def control_offsets(self) -> range:

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
 
-def convert_value(mechanism: Mechanism, name: str, given: float | str) -> float:
+def convert_value(mechanism: Mechanism, name: str, value: float | str) -> float:
     """Convert a value or speed of a coordinate to SI units.
 
     Args:
         mechanism: the mechanism.
         name: name or path of the coordinate.
-        given: a number in rad or m, or a text such as ``"30deg"`` with or without a unit.
+        value: a number in rad or m, or a text such as ``"30deg"`` with or without a unit.
 
     Returns:
         The number in rad or m (per second for a speed).
@@ -34,28 +34,34 @@ def convert_value(mechanism: Mechanism, name: str, given: float | str) -> float:
         ModelError: there is no such coordinate.
         SettingError: the text is not a quantity, or its unit does not fit the coordinate.
     """
-    kind = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
-    if not isinstance(given, str):
-        return float(given)
-    read = parse_quantity(given)
-    if read is None:
+    motion_type = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
+    if not isinstance(value, str):
+        return float(value)
+    quantity = parse_quantity(value)
+    if quantity is None:
         raise SettingError(
-            f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{given}'"
+            f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{value}'"
         )
     # A coupled coordinate of a CustomJoint may be an angle or a length; both units are accepted.
-    if read.unit is not None and kind != "coupled" and read.is_angle != (kind == "rotational"):
-        wanted = "deg or rad" if kind == "rotational" else "m, cm or mm"
-        raise SettingError(f"coordinate '{name}' is {kind}: give '{given}' in {wanted}")
-    return read.value
+    if (
+        quantity.unit is not None
+        and motion_type != "coupled"
+        and quantity.is_angle != (motion_type == "rotational")
+    ):
+        expected_units = "deg or rad" if motion_type == "rotational" else "m, cm or mm"
+        raise SettingError(
+            f"coordinate '{name}' is {motion_type}: give '{value}' in {expected_units}"
+        )
+    return quantity.value
 
 
-def describe_suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
+def describe_suspect_value(info: CoordinateInfo, name: str, value: float | str) -> str:
     """Return a warning if a value in radians was probably meant in degrees.
 
     Args:
         info: the coordinate.
         name: its name in the message.
-        given: rad or m, or a text with a unit.
+        value: rad or m, or a text with a unit.
 
     Returns:
         A sentence, or "" if the value is plausible.
@@ -64,7 +70,7 @@ def describe_suspect_value(info: CoordinateInfo, name: str, given: float | str) 
         return ""
     return describe_unit_doubt(
         name,
-        parse_quantity(given) if isinstance(given, str) else Quantity(float(given), None),
+        parse_quantity(value) if isinstance(value, str) else Quantity(float(value), None),
         info.range,
     )
 
@@ -92,42 +98,42 @@ def resolve_initial_values(
     infos = mechanism.coordinates
     q = [info.default_value for info in infos]
     u = [info.default_speed for info in infos]
-    named = dict(initial)
+    remaining = dict(initial)
     # Paths of states come from files. They may name locked coordinates, and constraints may change
     # them, so they are only a guess.
-    for place, info in enumerate(infos):
-        for row, what in ((q, "value"), (u, "speed")):
-            given = named.pop(f"{info.path}/{what}", None)
-            if given is not None:
-                row[place] = _check_finite(given, what, info.path)
-    places: list[list[int]] = []
-    for numbers, row, what in ((named, q, "value"), (speeds, u, "speed")):
-        places.append([])
+    for index, info in enumerate(infos):
+        for row, quantity in ((q, "value"), (u, "speed")):
+            initial_value = remaining.pop(f"{info.path}/{quantity}", None)
+            if initial_value is not None:
+                row[index] = _check_finite(initial_value, quantity, info.path)
+    set_indices: list[list[int]] = []
+    for numbers, row, quantity in ((remaining, q, "value"), (speeds, u, "speed")):
+        set_indices.append([])
         for name, value in numbers.items():
-            place = mechanism.coordinate_index(name)
-            if place in places[-1]:
+            index = mechanism.coordinate_index(name)
+            if index in set_indices[-1]:
                 raise SettingError(
                     f"coordinate '{name}' is set twice, by its name and by its path; leave one out"
                 )
-            if infos[place].locked:
+            if infos[index].locked:
                 raise SimulationError(
-                    f"coordinate '{name}' is locked at {infos[place].default_value:g}, so its {what} cannot "
+                    f"coordinate '{name}' is locked at {infos[index].default_value:g}, so its {quantity} cannot "
                     "be set; unlock it in the model"
                 )
-            if infos[place].prescribed is not None:
+            if infos[index].prescribed is not None:
                 raise SimulationError(
-                    f"coordinate '{name}' is prescribed, so that its {what} cannot be set; "
+                    f"coordinate '{name}' is prescribed, so that its {quantity} cannot be set; "
                     "set its prescribed to false in the model"
                 )
-            row[place] = _check_finite(value, what, name)
-            places[-1].append(place)
-    return q, u, places
+            row[index] = _check_finite(value, quantity, name)
+            set_indices[-1].append(index)
+    return q, u, set_indices
 
 
-def _check_finite(value: float, what: str, name: str) -> float:
+def _check_finite(value: float, quantity: str, name: str) -> float:
     """Return a number as a float; raise SettingError if it is not finite."""
     if not isfinite(value):
-        raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
+        raise SettingError(f"the {quantity} of coordinate '{name}' is {value}; give a number")
     return float(value)
 
 
@@ -144,19 +150,26 @@ def match_state_columns(labels: Sequence[str], paths: Iterable[str]) -> dict[str
     Returns:
         Indices of columns by the paths of the states that have one.
     """
-    places: dict[str, int] = {}
+    first_columns: dict[str, int] = {}
     for index, label in enumerate(labels):
-        places.setdefault(label, index)
+        first_columns.setdefault(label, index)
     result = {}
     for path in paths:
-        parts = path.strip("/").split("/")
-        owner, what = parts[-2], parts[-1]
+        path_steps = path.strip("/").split("/")
+        owner, quantity = path_steps[-2], path_steps[-1]
         # Names of states before OpenSim 4: knee_angle, knee_angle_u, soleus.activation.
-        old = {"value": owner, "speed": f"{owner}_u"}.get(what, f"{owner}.{what}")
-        ends = ("/".join(parts[k:]) for k in range(len(parts)))
+        old_label = {"value": owner, "speed": f"{owner}_u"}.get(quantity, f"{owner}.{quantity}")
+        path_ends = ("/".join(path_steps[k:]) for k in range(len(path_steps)))
         # The longest name wins: a path before its ends, and all of them before names of old
         # versions.
-        column = next((places[label] for label in (path, *ends, old) if label in places), None)
+        column = next(
+            (
+                first_columns[label]
+                for label in (path, *path_ends, old_label)
+                if label in first_columns
+            ),
+            None,
+        )
         if column is not None:
             result[path] = column
     return result
@@ -201,28 +214,28 @@ def extract_state(
     """
     columns = match_state_columns(table.columns, names)
     if not columns or not len(table.times):
-        what = (
+        missing = (
             f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'"
             if not columns
             else "row"
         )
-        raise DocumentError(f"no {what}; give a file of its states", file=table.file)
+        raise DocumentError(f"no {missing}; give a file of its states", file=table.file)
     # The nearest row, not an interpolated one, whose states would fulfil no equilibrium.
     row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
-    turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
+    rotational = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
     return {
-        path: float(np.radians(row[place]))
-        if table.in_degrees and path.rpartition("/")[0] in turning
-        else row[place]
-        for path, place in columns.items()
+        path: float(np.radians(row[column]))
+        if table.in_degrees and path.rpartition("/")[0] in rotational
+        else row[column]
+        for path, column in columns.items()
     }
 
 
-def read_earlier_run(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
+def read_earlier_run(run: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
     """Return the states of an earlier run and the record of its controller.
 
     Args:
-        given: the trajectory of the run, or the folder with its results.
+        run: the trajectory of the run, or the folder with its results.
 
     Returns:
         The table of states, and the table of the controller (None without one).
@@ -230,7 +243,9 @@ def read_earlier_run(given: str | Path | Trajectory) -> tuple[StoTable, StoTable
     Raises:
         OsimliteError: the folder has no states.
     """
-    if not isinstance(given, str | Path):
-        return given.states, given.controller
-    table = Path(given) / "controller.sto"
-    return read_sto(Path(given) / "states.sto"), read_sto(table) if table.exists() else None
+    if not isinstance(run, str | Path):
+        return run.states, run.controller
+    controller_path = Path(run) / "controller.sto"
+    return read_sto(Path(run) / "states.sto"), read_sto(
+        controller_path
+    ) if controller_path.exists() else None

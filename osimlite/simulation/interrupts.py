@@ -24,11 +24,15 @@ def defer_sigint() -> Iterator[None]:
         return
     # Several presses of Ctrl-C raise one exception.
     interruptions: list[object] = []
-    before = signal.signal(signal.SIGINT, lambda *told: interruptions.append(told))
+    previous_handler = signal.signal(
+        signal.SIGINT, lambda *signal_arguments: interruptions.append(signal_arguments)
+    )
     try:
         yield
     finally:
         # A handler that was not installed by Python is reported as None and cannot be restored.
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        signal.signal(
+            signal.SIGINT, signal.SIG_DFL if previous_handler is None else previous_handler
+        )
     if interruptions:
         raise KeyboardInterrupt

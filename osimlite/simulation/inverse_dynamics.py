@@ -182,14 +182,14 @@ def add_forces(
     # Replaced forces leave before new ones of the same names come.
     if replace:
         model.force_set.objects.clear()
-    for each in forces:
-        if isinstance(each, Force):
+    for force_or_path in forces:
+        if isinstance(force_or_path, Force):
             # A copy, as an object has one owner and the caller keeps theirs.
-            model.force_set.objects.append(each.copy_deep())
+            model.force_set.objects.append(force_or_path.copy_deep())
             continue
-        more = read_document(Source.from_file(each), expected_class=ForceSet).top
-        assert isinstance(more, ForceSet)
-        for force in list(more.objects):
+        force_set = read_document(Source.from_file(force_or_path), expected_class=ForceSet).top
+        assert isinstance(force_set, ForceSet)
+        for force in list(force_set.objects):
             model.force_set.objects.append(force)
 
 

@@ -165,17 +165,21 @@ class LinkMotion:
         link, frame = self._get_link(body)
         point = frame[:3, :3] @ location + frame[:3, 3]
         if link is None:
-            still = np.zeros((len(self.links), 3))
-            return still + point, still, still
-        place, velocity = np.split(locate_points(link, point), 2, axis=-1)
+            zeros = np.zeros((len(self.links), 3))
+            return zeros + point, zeros, zeros
+        position, velocity = np.split(locate_points(link, point), 2, axis=-1)
         w, alpha = self.get_angular_motion(body)
         # The kernels represent gravity by an upward acceleration of the base, about a fixed origin.
-        free = (
+        origin_acceleration = (
             link[:, LINK_WORK.ACCELERATION + 3 : LINK_WORK.ACCELERATION + 6]
             + self.system.mechanism.gravity
         )
-        arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
-        return place, velocity, free + np.cross(alpha, arm) + np.cross(w, velocity)
+        arm = position - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+        return (
+            position,
+            velocity,
+            origin_acceleration + np.cross(alpha, arm) + np.cross(w, velocity),
+        )
 
     def _get_link(self, body: int) -> tuple[Floats | None, Floats]:
         """Return the link of a body and the body's place in it.

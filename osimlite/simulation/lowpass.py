@@ -120,12 +120,12 @@ def extend_ends(values: Array, count: int) -> Array:
         The extended values (t + 2 count, ...).
     """
     while count > 0:
-        more = min(count, len(values) - 1)
+        added_count = min(count, len(values) - 1)
         # Reflected about the end point, so that the extended curve has no kink.
-        before = values[more:0:-1]
-        after = values[-2 : -2 - more : -1]
-        values = np.concatenate([2.0 * values[0] - before, values, 2.0 * values[-1] - after])
-        count -= more
+        leading = values[added_count:0:-1]
+        trailing = values[-2 : -2 - added_count : -1]
+        values = np.concatenate([2.0 * values[0] - leading, values, 2.0 * values[-1] - trailing])
+        count -= added_count
     return values
 
 
@@ -149,16 +149,16 @@ def _run_filter(values: Array, cutoff: float) -> Array:
         3 * w**3 - 2 * w * w - 2 * w + 3,
         (w - 1.0) * (w * w - w + 1.0),
     ]
-    one, two, three = (total / scale for total in sums)
-    taken = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
+    a1, a2, a3 = (total / scale for total in sums)
+    weighted_sums = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
     # OpenSim leaves the first three rows as they are; the padding hides them.
-    result = np.concatenate([values[:3], w**3 / scale * taken])
+    result = np.concatenate([values[:3], w**3 / scale * weighted_sums])
     # Each row is computed by itself: coefficients of slow filters nearly cancel, and blocks of rows
     # would lose seven digits.
     for row, (third, second, first) in zip(
         result[3:], zip(result, result[1:], result[2:], strict=False), strict=False
     ):
-        row -= one * first
-        row -= two * second
-        row -= three * third
+        row -= a1 * first
+        row -= a2 * second
+        row -= a3 * third
     return result

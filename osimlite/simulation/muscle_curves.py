@@ -65,10 +65,10 @@ class MuscleCurves(Tabular):
     @property
     def heading(self) -> str:
         """What the curves are, in one line."""
-        over = f" over {join_words(self.coordinates)}" if self.values else ""
+        swept_coordinates = f" over {join_words(self.coordinates)}" if self.values else ""
         count = int(np.prod([len(values) for values in self.values.values()], dtype=int))
         muscles = format_count(len(self.muscles), "muscle")
-        return f"MuscleCurves: {muscles} in {format_count(count, 'pose')}{over}"
+        return f"MuscleCurves: {muscles} in {format_count(count, 'pose')}{swept_coordinates}"
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -90,10 +90,10 @@ class MuscleCurves(Tabular):
         rows = list(product(*self.values.values()))
         return np.array(rows, dtype=float).reshape(len(rows), len(self.values))
 
-    def select_muscles(self, places: Sequence[int]) -> MuscleCurves:
+    def select_muscles(self, indices: Sequence[int]) -> MuscleCurves:
         """Return the curves of some of the muscles, by their indices."""
-        columns = {name: rows[:, list(places)] for name, rows in self.columns.items()}
-        return MuscleCurves(tuple(self.muscles[k] for k in places), self.values, columns)
+        columns = {name: rows[:, list(indices)] for name, rows in self.columns.items()}
+        return MuscleCurves(tuple(self.muscles[k] for k in indices), self.values, columns)
 
     def of(self, indices: Sequence[int]) -> MuscleCurves:
         """Return the same as :meth:`select_muscles`, under its deprecated name."""
@@ -119,12 +119,13 @@ class MuscleCurves(Tabular):
             MissingDependency: xarray is not installed.
         """
         xarray = require("xarray", extra="frame", purpose="a data set of xarray")
-        over = {
-            name: list(places) for name, places in {**self.values, "muscle": self.muscles}.items()
+        axes = {
+            name: list(axis_values)
+            for name, axis_values in {**self.values, "muscle": self.muscles}.items()
         }
-        shape = [len(places) for places in over.values()]
+        shape = [len(axis_values) for axis_values in axes.values()]
         return xarray.Dataset(
-            {name: (list(over), rows.reshape(shape)) for name, rows in self.columns.items()}, over
+            {name: (list(axes), rows.reshape(shape)) for name, rows in self.columns.items()}, axes
         )
 
     def get_bounds(self, name: str) -> tuple[Array, Array]:
@@ -188,18 +189,18 @@ def muscle_curves(
     if not 0.0 <= activation <= 1.0:
         raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
     mechanism = build_mechanism(model)
-    places = [mechanism.coordinate_index(name) for name in values]
+    indices = [mechanism.coordinate_index(name) for name in values]
     # A name and a path may mean the same coordinate.
-    if len(set(places)) < len(places):
+    if len(set(indices)) < len(indices):
         raise SettingError(f"{join_words(values)} are one coordinate; leave one out")
     forces = force_elements(
         model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder
     )
     tree = model.tree()
-    optimal = {
+    optimal_lengths = {
         tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)
     }
-    named = _select_muscles(list(optimal), muscles)
+    named = _select_muscles(list(optimal_lengths), muscles)
     result = {
         element.path: element for element in forces.elements if isinstance(element, DeclaredForce)
     }
@@ -212,14 +213,14 @@ def muscle_curves(
         forces.controls.names, ((ConstantValue(activation),),) * len(forces.controls.names)
     )
     # Poses are assembled first, so single muscles need no constraints.
-    free = mechanism.without_constraints()
-    alone = [
+    free_mechanism = mechanism.without_constraints()
+    single_muscles = [
         _Muscle(
             result[path],
-            System(free, Forces((result[path],), (), controls)),
+            System(free_mechanism, Forces((result[path],), (), controls)),
             # The controls of all muscles are the activation.
             activation,
-            optimal[path],
+            optimal_lengths[path],
         )
         for path in named
     ]
@@ -232,15 +233,15 @@ def muscle_curves(
     start = mechanism.default_state()[0]
     for number, pose in enumerate(poses):
         q = start.copy()
-        q[places] = pose
+        q[indices] = pose
         # Each pose starts from the default one. The result does not depend on the order of the
         # poses.
-        q = mechanism.assemble(q, kept=places)
+        q = mechanism.assemble(q, kept=indices)
         arms = paths.moment_arms(q)
-        for index, (path, muscle) in enumerate(zip(named, alone, strict=True)):
+        for index, (path, muscle) in enumerate(zip(named, single_muscles, strict=True)):
             for name, value in muscle.evaluate(q).items():
                 columns[name][number, index] = value
-            for name, coordinate in zip(values, places, strict=True):
+            for name, coordinate in zip(values, indices, strict=True):
                 arm = arms[path].get(mechanism.coordinates[coordinate].path, 0.0)
                 columns[f"moment_arm_{name}"][number, index] = arm
         if progress is not None:
@@ -251,12 +252,16 @@ def muscle_curves(
 def _select_muscles(paths: list[str], names: Sequence[str]) -> list[str]:
     """Return the named paths in the order of the model; all without names."""
     # Reversed, so that of several muscles of one name the first is found.
-    known = {key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)}
+    path_of_name = {
+        key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)
+    }
     for name in names:
-        if name not in known:
-            raise SettingError(f"the model has no muscle '{name}'{suggest_name(name, known)}")
-    wanted = {known[name] for name in names}
-    return [path for path in paths if path in wanted or not names]
+        if name not in path_of_name:
+            raise SettingError(
+                f"the model has no muscle '{name}'{suggest_name(name, path_of_name)}"
+            )
+    selected_paths = {path_of_name[name] for name in names}
+    return [path for path in paths if path in selected_paths or not names]
 
 
 class _Muscle(NamedTuple):
@@ -286,29 +291,29 @@ class _Muscle(NamedTuple):
         element, system = self.element, self.system
         y = system.state.pack(q.tolist(), [0.0] * len(q))
         # Activations are states of most muscles, and follow the control of the others.
-        for place, path in enumerate(system.state.paths, 2 * len(system.order)):
+        for index, path in enumerate(system.state.paths, 2 * len(system.order)):
             if path.endswith("/activation"):
-                y[place] = self.activation
+                y[index] = self.activation
         try:
             y = system.equilibrate_muscles(0.0, y)
             is_settled = system.realize(0.0, y, STAGE.FORCE) == OUTCOME.OK
         except SimulationError:
             is_settled = False
-        known = {
-            name: system.read_record(element.path, place)
-            for name, place in element.force_type.record_offsets.items()
+        record = {
+            name: system.read_record(element.path, index)
+            for name, index in element.force_type.record_offsets.items()
         }
         # The path has a length also where the muscle has no equilibrium; other columns stay NaN.
-        result = {"length": known["length"]}
+        result = {"length": record["length"]}
         if is_settled:
-            cos, fibers = known["cos_pennation"], known["fiber_length"]
+            cos, fibers = record["cos_pennation"], record["fiber_length"]
             result |= {
                 "fiber_length": fibers,
                 "normalized_fiber_length": fibers / self.optimal,
                 # The fiber is inclined to the tendon by the pennation angle.
-                "tendon_length": known["length"] - fibers * cos,
-                "tendon_force": known["tension"],
-                "active_fiber_force": known["active_fiber_force"] * cos,
-                "passive_fiber_force": known["passive_fiber_force"] * cos,
+                "tendon_length": record["length"] - fibers * cos,
+                "tendon_force": record["tension"],
+                "active_fiber_force": record["active_fiber_force"] * cos,
+                "passive_fiber_force": record["passive_fiber_force"] * cos,
             }
         return result

@@ -285,11 +285,11 @@ class Options(IntegrationOptions):
         """
         if not choices:
             return self
-        known = [*vars(self)]
+        option_names = [*vars(self)]
         for name in choices:
-            if name not in known:
+            if name not in option_names:
                 raise SettingError(
-                    f"there is no option '{name}' of a simulation{suggest_or_list(name, known)}"
+                    f"there is no option '{name}' of a simulation{suggest_or_list(name, option_names)}"
                 )
         integration = {
             name: choices[name] for name in INTEGRATION_OPTIONS if choices.get(name) is not None
@@ -317,13 +317,13 @@ class Options(IntegrationOptions):
         Raises:
             SettingError: a keyword is not an option, or it belongs to the prepared model.
         """
-        made = self.change_options(choices)
+        options = self.change_options(choices)
         for name in choices:
             if name not in RUN_OPTIONS:
                 raise SettingError(
                     f"'{name}' belongs to the prepared model; pass it to Simulation(model, engine, {name}=...)"
                 )
-        return made
+        return options
 
 
 Options.__doc__ = f"{Options.__doc__}\n    Attributes:\n{describe_options(Options)}\n    "
@@ -342,12 +342,12 @@ def _is_number(value: object) -> bool:
     return isinstance(value, Real)
 
 
-def check_fixed_step(h: float, to: float) -> None:
+def check_fixed_step(h: float, end: float) -> None:
     """Check the length of fixed steps.
 
     Args:
         h: step, s.
-        to: end of the motion, s.
+        end: end of the motion, s.
 
     Raises:
         SettingError: the step is not positive and finite, is longer than `MAX_FIXED_STEP_S`, or
@@ -360,17 +360,17 @@ def check_fixed_step(h: float, to: float) -> None:
             f"a fixed step of {h:g} s is too long for the motion of bodies; use at most {MAX_FIXED_STEP_S:g} s, with "
             "contacts about 0.001 s"
         )
-    if h * MAX_FIXED_STEPS < to:
+    if h * MAX_FIXED_STEPS < end:
         raise SettingError(
-            f"{to:g} s in fixed steps of {h:g} s are more than a billion steps; use longer ones"
+            f"{end:g} s in fixed steps of {h:g} s are more than a billion steps; use longer ones"
         )
 
 
-def compute_report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
+def compute_report_times(end: float, interval: float, start: float = 0.0) -> list[float]:
     """Return the times of the rows of the results.
 
     Args:
-        to: end of the motion, s.
+        end: end of the motion, s.
         interval: time between rows, s.
         start: start of the motion, s.
 
@@ -381,24 +381,24 @@ def compute_report_times(to: float, interval: float, start: float = 0.0) -> list
         SettingError: a time is not a number, the motion does not end after its start, or there are
             too many rows.
     """
-    for number in (to, interval):
+    for number in (end, interval):
         if not _is_number(number):
             raise SettingError(f"a time is a number of seconds, not {number!r}")
-    if not (isfinite(to) and to > start):
+    if not (isfinite(end) and end > start):
         expected = "a positive time" if start == 0.0 else f"after its start at {start:g} s"
-        raise SettingError(f"the end of a simulation is {expected}, not {to:g} s")
+        raise SettingError(f"the end of a simulation is {expected}, not {end:g} s")
     if not (isfinite(interval) and interval > 0.0):
         raise SettingError(f"the report interval is a positive time, not {interval:g} s")
     # Ten million rows fill the memory.
-    if to / interval > 1e7:
+    if end / interval > 1e7:
         raise SettingError(
             f"a report every {interval:g} s makes more than ten million rows; use a longer interval"
         )
     # Multiples instead of sums, so that rounding errors do not accumulate.
-    times = [number * interval for number in range(floor(to / interval) + 1)]
+    times = [number * interval for number in range(floor(end / interval) + 1)]
     # A last time that differs from `to` by rounding only is `to`.
-    if to - times[-1] <= 1e-9 * interval:
+    if end - times[-1] <= 1e-9 * interval:
         times.pop()
     if start > 0.0:
         times = [start, *(time for time in times if time - start > 1e-9 * interval)]
-    return [*times, to]
+    return [*times, end]

@@ -116,9 +116,9 @@ class Packer(LinkPacker):
         structure = np.array(ints, dtype=np.int64)
         numbers = np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
-        asked = self.kernels, self.equilibria, self.responses, self.runs, self.owners
+        offset_tables = self.kernels, self.equilibria, self.responses, self.runs, self.owners
         return PackedModel(
-            structure, numbers, laws, *asked, self.order, self.places.placements, result
+            structure, numbers, laws, *offset_tables, self.order, self.places.placements, result
         )
 
     def write_items(self) -> list[list[tuple[int, int]]]:
@@ -141,18 +141,18 @@ class Packer(LinkPacker):
         responding: dict[int, Response] = {}
         runs: list[tuple[str, int]] = []
         result: list[list[tuple[int, int]]] = []
-        places = {CONTROLS: self.ints[MODEL.WORK_CONTROL]}
+        record_offsets = {CONTROLS: self.ints[MODEL.WORK_CONTROL]}
         for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
             result.append([])
             first = len(pairs)
             for item in group:
-                place = (
+                record_offset = (
                     contact + CONTACT_WORK.SIZE * len(pairs)
                     if item.is_contact
                     else self.reserve_work(item.record_size)
                 )
                 size = CONTACT_WORK.SIZE if item.is_contact else item.record_size
-                result[-1].append((place, size))
+                result[-1].append((record_offset, size))
                 if item.is_contact:
                     pairs.append(len(self.ints))
                 # Parts of a path are evaluated by the path itself. Consecutive items of one batched
@@ -171,35 +171,37 @@ class Packer(LinkPacker):
                 if item.response is not None:
                     responding[len(self.ints)] = item.response
                 # Offsets of states and of records of other elements are known only here.
-                own = list(item.ints)
+                item_ints = list(item.ints)
                 for number, at_state in enumerate(item.states):
-                    own[at_state] = self.state.find_first_state(element) + number
+                    item_ints[at_state] = self.state.find_first_state(element) + number
                 for number, path in item.record_references:
-                    own[number] += places[path]
-                places[element.path] = place
-                self.ints += [*self.make_item_head(place, first), *own]
+                    item_ints[number] += record_offsets[path]
+                record_offsets[element.path] = record_offset
+                self.ints += [*self.make_item_head(record_offset, first), *item_ints]
                 self.numbers += item.numbers
         self.ints[MODEL.ITEMS], self.ints[MODEL.ITEM_AT] = len(records), len(self.ints)
         self.ints += records
         self.ints[MODEL.CONTACT_AT] = len(self.ints)
         self.ints += pairs
         self.ints[MODEL.EQUILIBRIA], self.ints[MODEL.EQUILIBRIUM_AT] = len(settling), len(self.ints)
-        for place, kernel in settling.items():
+        for item_offset, kernel in settling.items():
             self.equilibria[len(self.ints)] = kernel
-            self.ints += EQUILIBRIUM.record(KERNEL=0, ITEM=place)
+            self.ints += EQUILIBRIUM.record(KERNEL=0, ITEM=item_offset)
         self.ints[MODEL.RESPONSES], self.ints[MODEL.RESPONSE_AT] = len(responding), len(self.ints)
-        for place, response in responding.items():
+        for item_offset, response in responding.items():
             self.responses[len(self.ints)] = response.kernel
             first_state = ITEM.OWN + response.first_state
             self.ints += RESPONSE.record(
                 KERNEL=0,
-                ITEM=place,
+                ITEM=item_offset,
                 FIRST_STATE=first_state,
                 STATES=response.states,
                 SENSE=response.sense,
             )
         # All runs share one workspace, since they are evaluated one after the other.
-        room = self.reserve_work(LANES * CURVE_ROW.SIZE) if any(kernel for kernel, _ in runs) else 0
+        curve_work = (
+            self.reserve_work(LANES * CURVE_ROW.SIZE) if any(kernel for kernel, _ in runs) else 0
+        )
         self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
         for (kernel, first), end in zip(
             runs, [*(run[1] for run in runs[1:]), len(records)], strict=False
@@ -207,18 +209,18 @@ class Packer(LinkPacker):
             # Runs that are too short get no kernel, and their items are evaluated singly.
             if end - first >= MIN_BATCHED_ITEMS and kernel:
                 self.runs[len(self.ints)] = kernel
-            self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=room)
+            self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=curve_work)
         return result
 
-    def make_item_head(self, place: int, first_contact: int) -> list[int]:
+    def make_item_head(self, record_offset: int, first_contact: int) -> list[int]:
         """Return the head of an item's record, without the address of its law.
 
         Args:
-            place: offset of its record in the work vector.
+            record_offset: offset of its record in the work vector.
             first_contact: index of the first contact of its force.
         """
         return ITEM.record(
-            LAW=0, NUMBERS=len(self.numbers), RECORD=place, FIRST_CONTACT=first_contact
+            LAW=0, NUMBERS=len(self.numbers), RECORD=record_offset, FIRST_CONTACT=first_contact
         )
 
     def write_controls(self) -> None:
@@ -226,6 +228,6 @@ class Packer(LinkPacker):
         if not self.controls.names:
             return
         self.ints[MODEL.CONTROLS] = len(self.ints)
-        own, numbers, self.kernels[len(self.ints)] = self.controls.make_record()
-        self.ints += [*self.make_item_head(self.ints[MODEL.WORK_CONTROL], 0), *own]
+        control_ints, numbers, self.kernels[len(self.ints)] = self.controls.make_record()
+        self.ints += [*self.make_item_head(self.ints[MODEL.WORK_CONTROL], 0), *control_ints]
         self.numbers += numbers

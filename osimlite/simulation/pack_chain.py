@@ -59,21 +59,23 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
     records: list[int] = []
     shares: list[tuple[int, int]] = []
     for number, joint in enumerate(chain.joints):
-        kind, source, part, freedoms = _encode_joint(packer, joint)
-        records += JOINT.record(KIND=kind, SOURCE=source, PART=part, FIRST_SHARE=len(shares))
+        joint_kind, source, part, freedoms = _encode_joint(packer, joint)
+        records += JOINT.record(KIND=joint_kind, SOURCE=source, PART=part, FIRST_SHARE=len(shares))
         shares += [(number, freedom) for freedom in freedoms]
-    parts = [item for joint, freedom in shares for item in SHARE.record(JOINT=joint, DOF=freedom)]
+    share_records = [
+        item for joint, freedom in shares for item in SHARE.record(JOINT=joint, DOF=freedom)
+    ]
     lists = {
         ("JOINTS", "JOINT_AT"): (JOINT.SIZE, records),
-        ("SHARES", "SHARE_AT"): (SHARE.SIZE, parts),
+        ("SHARES", "SHARE_AT"): (SHARE.SIZE, share_records),
         ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _list_products(packer, shares, count)),
         ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, list_excesses(packer, chain.excess)),
     }
     # The four lists follow the head. Each pair of names is a field for its length and one for its
     # offset.
-    places: dict[str, int] = {}
-    for (length, place), (each, numbers) in lists.items():
-        places |= {length: len(numbers) // each, place: len(ints)}
+    list_fields: dict[str, int] = {}
+    for (count_field, offset_field), (record_size, numbers) in lists.items():
+        list_fields |= {count_field: len(numbers) // record_size, offset_field: len(ints)}
         ints += numbers
     entries = ints[ints[MODEL.DOF_AT] + DOF.ROW]
     ints[start : start + CHAIN.SIZE] = CHAIN.record(
@@ -83,7 +85,7 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         WORK_SHARES=packer.reserve_work(len(shares)),
         ENTRY_AT=entries,
         END_ENTRY=entries + packer.entries,
-        **places,
+        **list_fields,
     )
 
 
@@ -99,8 +101,8 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
         part
             (a component, or the index of a number), and the degrees of freedom that move it.
     """
-    function, places = joint.function, list(joint.coordinates)
-    freedoms = [packer.places.freedom(place) for place in places]
+    function, coordinates = joint.function, list(joint.coordinates)
+    freedoms = [packer.places.freedom(coordinate) for coordinate in coordinates]
     for number, operation in enumerate(packer.operations):
         if operation.joint != joint.source:
             continue
@@ -113,10 +115,10 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
             return JOINT_KIND.ERROR, number, function.component, []
         if is_ball and isinstance(function, EllipsoidPoint):
             return JOINT_KIND.ELLIPSOID, number, function.component, freedoms
-        if is_ball and len(places) == 1 and places[0] in operation.arguments:
-            angles = [packer.places.freedom(place) for place in operation.arguments]
-            return JOINT_KIND.ANGLE, number, operation.arguments.index(places[0]), angles
-        if operation.function is function and operation.arguments == places:
+        if is_ball and len(coordinates) == 1 and coordinates[0] in operation.arguments:
+            angles = [packer.places.freedom(coordinate) for coordinate in operation.arguments]
+            return JOINT_KIND.ANGLE, number, operation.arguments.index(coordinates[0]), angles
+        if operation.function is function and operation.arguments == coordinates:
             return JOINT_KIND.AMOUNT_OF, number, 0, freedoms
     # What remains are joints that are the coordinate itself or a multiple of it, as the couplings
     # of `build_robot` make them.
@@ -141,21 +143,23 @@ def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int
         Records with both shares, the entry of the other program's matrix, and the offset of the
         sum.
     """
-    of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    shares_of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for number, (joint, freedom) in enumerate(shares):
-        of_freedom[freedom].append((number, joint))
+        shares_of_freedom[freedom].append((number, joint))
     result: list[int] = []
     freedoms = packer.ints[packer.ints[MODEL.DOF_AT] :]
     for freedom in range(packer.ints[MODEL.DOFS]):
-        place = freedoms[DOF.SIZE * freedom + DOF.ROW]
-        other = freedom
+        entry = freedoms[DOF.SIZE * freedom + DOF.ROW]
+        ancestor = freedom
         # Up to the root, whose freedoms have none above: -1.
-        while other >= 0:
-            for one, i in of_freedom[freedom]:
-                for two, j in of_freedom[other]:
-                    result += PRODUCT.record(ONE=one, TWO=two, ENTRY=count * i + j, PLACE=place)
-            place = place + 1
-            other = freedoms[DOF.SIZE * other + DOF.ABOVE]
+        while ancestor >= 0:
+            for row_share, i in shares_of_freedom[freedom]:
+                for column_share, j in shares_of_freedom[ancestor]:
+                    result += PRODUCT.record(
+                        ONE=row_share, TWO=column_share, ENTRY=count * i + j, PLACE=entry
+                    )
+            entry = entry + 1
+            ancestor = freedoms[DOF.SIZE * ancestor + DOF.ABOVE]
     return result
 
 

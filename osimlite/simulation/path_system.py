@@ -58,8 +58,8 @@ class MeasuredPath(Silent):
         Returns:
             The records; the last one, the path, is evaluated although no force uses it.
         """
-        *parts, last = self.along.make_records(places)
-        return [*parts, replace(last, is_part=False)]
+        *inner_records, path_record = self.along.make_records(places)
+        return [*inner_records, replace(path_record, is_part=False)]
 
 
 class _OnSurface(NamedTuple):
@@ -79,19 +79,19 @@ class PathSystem(System):
 
     entries = ("evaluate", "watch")
 
-    def measure_paths(self, q: Array, u: Array, what: int) -> Array:
+    def measure_paths(self, q: Array, u: Array, quantity_offset: int) -> Array:
         """Return the length or speed of each path.
 
         Args:
             q: coordinate values (n,).
             u: generalized speeds (n,).
-            what: `PATH_WORK.LENGTH` or `SPEED`.
+            quantity_offset: `PATH_WORK.LENGTH` or `SPEED`.
 
         Returns:
             Lengths (m) or speeds (m/s) (p,).
         """
         self._evaluate_state(q, u)
-        return self._w[[items[-1][0] + what for items in self._items]]
+        return self._w[[records[-1][0] + quantity_offset for records in self._items]]
 
     def compute_pulls(self, poses: Array) -> Array:
         """Return the generalized forces of a tension of 1 N in each path.
@@ -109,9 +109,11 @@ class PathSystem(System):
         states[:, : len(self.order)] = poses[:, self.order]
         forces = np.zeros((len(poses), len(self._items), len(self.order)))
         pull = self.program.code.get_entry("pull_each")
-        parts = (self.numbers, self._w, self._y, self._f)
+        work_vectors = (self.numbers, self._w, self._y, self._f)
         with self._convert_errors():
-            status = self._run_kernel(pull, self.program.ints, *parts, len(poses), states, forces)
+            status = self._run_kernel(
+                pull, self.program.ints, *work_vectors, len(poses), states, forces
+            )
         if status != OUTCOME.OK:
             raise self.make_evaluation_error(status, 0.0, self._y.tolist())
         result = np.zeros((*forces.shape[:2], poses.shape[1]))
@@ -133,9 +135,9 @@ class PathSystem(System):
         """
         self._evaluate_state(q, np.zeros(len(q)))
         result = {}
-        for (name, route), items in zip(routes.items(), self._items, strict=True):
+        for (name, route), records in zip(routes.items(), self._items, strict=True):
             if isinstance(route, ThroughPoints):
-                record = self._w[items[-1][0] :]
+                record = self._w[records[-1][0] :]
                 order = record[
                     PATH_WORK.ORDER : PATH_WORK.ORDER + int(record[PATH_WORK.COUNT])
                 ].astype(int)
@@ -157,15 +159,17 @@ class PathSystem(System):
         Returns:
             Lengths (m) by owner and surface.
         """
-        parts = [*self._iterate_surfaces(routes)]
+        passages = [*self._iterate_surfaces(routes)]
         # The length that the law of a surface computed stays in the work vector until the law is
         # called again.
-        self._w[[part.length[1] for part in parts if part.length[1] >= 0]] = 0.0
+        self._w[[passage.length[1] for passage in passages if passage.length[1] >= 0]] = 0.0
         self._evaluate_state(q, np.zeros(len(q)))
         result: dict[str, dict[str, float]] = {}
-        for part in parts:
-            (length,) = self._length_on(part, lambda places: self._w[None, list(places)])
-            result.setdefault(part.path, {})[part.surface] = float(length)
+        for passage in passages:
+            (length,) = self._compute_length_on(
+                passage, lambda offsets: self._w[None, list(offsets)]
+            )
+            result.setdefault(passage.path, {})[passage.surface] = float(length)
         return result
 
     def measure_all_on_surfaces(
@@ -183,29 +187,37 @@ class PathSystem(System):
                 :meth:`Paths.lengths_on_surfaces`; 0 stands for a pose in which paths cannot be
                 computed.
         """
-        parts = [*self._iterate_surfaces(routes)]
-        wanted = sorted(
-            {place for part in parts for place in (*part.order, *part.length) if place >= 0}
+        passages = [*self._iterate_surfaces(routes)]
+        offsets = sorted(
+            {
+                offset
+                for passage in passages
+                for offset in (*passage.order, *passage.length)
+                if offset >= 0
+            }
         )
-        column = {place: k for k, place in enumerate(wanted)}
+        column = {offset: k for k, offset in enumerate(offsets)}
         rows = self.read_work_vector(
-            poses, wanted, cleared=[part.length[1] for part in parts if part.length[1] >= 0]
+            poses,
+            offsets,
+            cleared=[passage.length[1] for passage in passages if passage.length[1] >= 0],
         )
-        for part in parts:
-            lengths = self._length_on(
-                part, lambda places: rows[:, [column[place] for place in places]]
+        for passage in passages:
+            lengths = self._compute_length_on(
+                passage,
+                lambda passage_offsets: rows[:, [column[offset] for offset in passage_offsets]],
             )
             yield (
-                part.path,
-                part.surface,
-                np.where(np.isnan(rows[:, column[part.order[0]]]), 0.0, lengths),
+                passage.path,
+                passage.surface,
+                np.where(np.isnan(rows[:, column[passage.order[0]]]), 0.0, lengths),
             )
 
     def _iterate_surfaces(self, routes: Mapping[str, Along]) -> Iterator[_OnSurface]:
-        for (name, route), items in zip(routes.items(), self._items, strict=True):
+        for (name, route), records in zip(routes.items(), self._items, strict=True):
             if isinstance(route, ThroughPoints):
-                *_, (path, _) = items
-                laws = iter([place for place, _ in items[1:-1]])
+                *_, (path, _) = records
+                laws = iter([offset for offset, _ in records[1:-1]])
                 points = len(route.points)
                 size = points + 2 * len(route.surfaces)
                 order = (
@@ -220,13 +232,15 @@ class PathSystem(System):
                     yield _OnSurface(name, surface.tangent.name, second, order, (length, law))
 
     @staticmethod
-    def _length_on(part: _OnSurface, columns: Callable[[Sequence[int]], Array]) -> Array:
-        count, order = np.split(columns(part.order), [1], axis=1)
+    def _compute_length_on(passage: _OnSurface, columns: Callable[[Sequence[int]], Array]) -> Array:
+        count, order = np.split(columns(passage.order), [1], axis=1)
         # A path touches a surface if the second tangent point is among its present nodes.
-        is_on = ((order == part.node) & (np.arange(order.shape[1]) < count)).any(axis=1)
-        length, said = part.length
+        is_on = ((order == passage.node) & (np.arange(order.shape[1]) < count)).any(axis=1)
+        length, law_length = passage.length
         # For a segment that passes straight, the length is 0 or NaN.
-        passed: Array = 0.0 * columns([said])[:, 0] if said >= 0 else np.zeros(len(order))
+        passed: Array = (
+            0.0 * columns([law_length])[:, 0] if law_length >= 0 else np.zeros(len(order))
+        )
         return np.where(is_on, columns([length])[:, 0], passed)
 
     def measure_poses(self, poses: Array) -> Array:
@@ -239,7 +253,7 @@ class PathSystem(System):
             Lengths (k, p), m; NaN in a pose in which they cannot be computed.
         """
         return self.read_work_vector(
-            poses, [items[-1][0] + PATH_WORK.LENGTH for items in self._items]
+            poses, [records[-1][0] + PATH_WORK.LENGTH for records in self._items]
         )
 
     def measure_one_path(self, paths: Sequence[int], poses: Array) -> Array:
@@ -262,7 +276,7 @@ class PathSystem(System):
     def read_work_vector(
         self,
         poses: Array,
-        places: Sequence[int],
+        offsets: Sequence[int],
         paths: Sequence[int] | None = None,
         cleared: Sequence[int] = (),
     ) -> Array:
@@ -270,7 +284,7 @@ class PathSystem(System):
 
         Args:
             poses: values of all coordinates (k, n).
-            places: offsets in the work vector (m,).
+            offsets: offsets in the work vector (m,).
             paths: index of the only path that is computed, for each pose; all paths if None.
             cleared: offsets that are set to 0 before each pose.
 
@@ -278,32 +292,36 @@ class PathSystem(System):
             Numbers (k, m); NaN in a pose in which the paths cannot be computed.
         """
         states = np.zeros((len(poses), len(self._y)))
-        result = np.empty((len(poses), len(places)))
+        result = np.empty((len(poses), len(offsets)))
         states[:, : len(self.order)] = poses[:, self.order]
-        asked = np.full(len(poses), ALL_PATHS) if paths is None else paths
-        head = np.array([len(places), len(cleared), *places, *cleared], dtype=np.int64)
-        self._run_watch(states, head, np.array(asked, dtype=np.int64), result)
+        path_indices = np.full(len(poses), ALL_PATHS) if paths is None else paths
+        request = np.array([len(offsets), len(cleared), *offsets, *cleared], dtype=np.int64)
+        self._run_watch(states, request, np.array(path_indices, dtype=np.int64), result)
         return result
 
     def _run_watch(
-        self, states: Array, head: NDArray[np.int64], asked: NDArray[np.int64], found: Array
+        self,
+        states: Array,
+        request: NDArray[np.int64],
+        path_indices: NDArray[np.int64],
+        result: Array,
     ) -> None:
-        parts = self.program.ints, self.numbers, self._w, self._y, self._f, len(states)
+        arguments = self.program.ints, self.numbers, self._w, self._y, self._f, len(states)
         try:
             self._run_kernel(
                 self.program.code.get_entry("watch"),
-                *parts,
+                *arguments,
                 states,
-                np.concatenate((head, asked)),
-                found,
+                np.concatenate((request, path_indices)),
+                result,
             )
         except (ArithmeticError, ValueError):
             # Kernels in Python raise an exception where machine code computes NaN.
             if len(states) < 2:
-                found[:] = np.nan
+                result[:] = np.nan
                 return
             for k in range(len(states)):
-                self._run_watch(states[[k]], head, asked[[k]], found[k : k + 1])
+                self._run_watch(states[[k]], request, path_indices[[k]], result[k : k + 1])
 
     def _evaluate_state(self, q: Array, u: Array) -> None:
         y = self.state.pack(q.tolist(), u.tolist())

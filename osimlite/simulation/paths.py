@@ -83,10 +83,10 @@ class Paths:
     _repr_html_ = make_notebook_repr("paths")
 
     def __repr__(self) -> str:
-        some = ", ".join(name.rpartition("/")[2] for name in self.names[:MAX_LISTED])
-        more = len(self.names) - MAX_LISTED
-        rest = f" and {more} more" if more > 0 else ""
-        return f"Paths of '{self.mechanism.name}': {some or 'none'}{rest}"
+        listed = ", ".join(name.rpartition("/")[2] for name in self.names[:MAX_LISTED])
+        unlisted_count = len(self.names) - MAX_LISTED
+        ending = f" and {unlisted_count} more" if unlisted_count > 0 else ""
+        return f"Paths of '{self.mechanism.name}': {listed or 'none'}{ending}"
 
     def __init__(
         self,
@@ -134,9 +134,9 @@ class Paths:
             name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces
         ]
         # No constructor: the mechanism is that of this object.
-        other = object.__new__(Paths)
-        other._build_system(builder, [builder.tree.find(name) for name in names], code)
-        return other
+        result = object.__new__(Paths)
+        result._build_system(builder, [builder.tree.find(name) for name in names], code)
+        return result
 
     def lengths(self, q: Values) -> dict[str, float]:
         """Return the length of each path.
@@ -262,8 +262,8 @@ class Paths:
         arms = self.system.compute_pulls(poses)
         # Without constraints other than locks, the coupling is the identity.
         if not all(isinstance(item, Lock) for item in self.mechanism.constraints):
-            each = map(self.compute_coupling, poses) if couplings is None else couplings
-            for row, coupling in zip(arms, each, strict=True):
+            pose_couplings = map(self.compute_coupling, poses) if couplings is None else couplings
+            for row, coupling in zip(arms, pose_couplings, strict=True):
                 # OpenSim's moment arm includes what a coupled coordinate contributes, except for
                 # paths that are functions.
                 row[self._coupled] = row[self._coupled] @ coupling
@@ -289,10 +289,12 @@ class Paths:
         state = self.mechanism.at(q)
         coupling = self.compute_free_coupling(state)
         # OpenSim unlocks a coordinate before it computes its moment arm.
-        for place, lock in self._locks.items():
+        for index, lock in self._locks.items():
             # Without its lock a coordinate moves, with all others that constraints couple.
-            others = [item for item in constraints if item is not lock]
-            coupling[:, [place]] = _compute_coupled_speeds(others, state, [place])[:, [place]]
+            other_constraints = [item for item in constraints if item is not lock]
+            coupling[:, [index]] = _compute_coupled_speeds(other_constraints, state, [index])[
+                :, [index]
+            ]
         return coupling
 
     def compute_free_coupling(self, state: MechanismKinematics) -> Array:
@@ -319,7 +321,7 @@ class Paths:
 
 
 def _compute_coupled_speeds(
-    constraints: Sequence[ConstraintEquations], state: MechanismKinematics, places: Sequence[int]
+    constraints: Sequence[ConstraintEquations], state: MechanismKinematics, indices: Sequence[int]
 ) -> Array:
     """Return the admissible speeds that go with a speed of 1 of some coordinates.
 
@@ -329,23 +331,25 @@ def _compute_coupled_speeds(
     Args:
         constraints: the constraints.
         state: a pose.
-        places: indices of the coordinates.
+        indices: indices of the coordinates.
 
     Returns:
-        Matrix (n, n) with the speeds in the columns of `places`; the others have a single 1. NaN
+        Matrix (n, n) with the speeds in the columns of `indices`; the others have a single 1. NaN
         where
             the coordinate cannot move.
     """
     coupling = np.eye(len(state.q))
-    if constraints and places:
+    if constraints and indices:
         # The least-norm correction is subtracted from the unit speed.
-        rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
-        speeds = coupling[:, places] - solve_least_norm(
-            rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows)
+        rows, rhs = stack_equations([item.velocity_equations(state) for item in constraints])
+        speeds = coupling[:, indices] - solve_least_norm(
+            rows, rows[:, indices] - rhs[:, None], REDUNDANT * len(rows)
         )
-        own = speeds[places, range(len(places))]
+        driving_speeds = speeds[indices, range(len(indices))]
         # A speed that constraints do not allow has no moment arm (NaN).
-        coupling[:, places] = speeds / np.where(np.abs(own) > ARM_ROUNDING, own, np.nan)
+        coupling[:, indices] = speeds / np.where(
+            np.abs(driving_speeds) > ARM_ROUNDING, driving_speeds, np.nan
+        )
     return coupling
 
 

@@ -109,11 +109,11 @@ class Polylines:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = 0 if name in unused else self._number_law(name)
         self._calls: list[int] = []
         for route in routes:
-            place = len(ints)
+            offset = len(ints)
             for item in route.make_records(program.tree.places):
-                place = len(ints)
+                offset = len(ints)
                 ints += [
-                    self._number_law(item.kernel, place),
+                    self._number_law(item.kernel, offset),
                     len(numbers),
                     self.work,
                     0,
@@ -121,7 +121,7 @@ class Polylines:
                 ]
                 numbers += item.numbers
                 self.work += item.record_size
-            self.items.append(place)
+            self.items.append(offset)
             self.traces.append(self._number_law(route.trace))
             for curve in route.curves:
                 ints.append(self._number_law(curve, len(ints)))
@@ -135,17 +135,17 @@ class Polylines:
         links, bodies = np.unique(program.links[:-1], return_index=True)
         self._bodies = bodies[links >= 0]
 
-    def _number_law(self, name: str, place: int | None = None) -> int:
+    def _number_law(self, name: str, offset: int | None = None) -> int:
         """Return the index of a kernel in `laws`, and append it if it is new.
 
         Args:
             name: name of the kernel, "" for none.
-            place: offset in the structure that needs the address of the kernel.
+            offset: offset in the structure that needs the address of the kernel.
         """
         if name not in self.laws:
             self.laws.append(name)
-        if name and place is not None:
-            self._calls.append(place)
+        if name and offset is not None:
+            self._calls.append(offset)
         return self.laws.index(name)
 
     @cached_property
@@ -155,8 +155,8 @@ class Polylines:
         code.make_ready(
             [self.laws[k] for k in dict.fromkeys((*ints[self._calls].tolist(), *self.traces))]
         )
-        for place in self._calls:
-            ints[place] = code.get_address(self.laws[ints[place]])
+        for offset in self._calls:
+            ints[offset] = code.get_address(self.laws[ints[offset]])
         return code, ints
 
     def trace(self, q: Array, rotations: Array, origins: Array) -> list[Array]:
@@ -179,17 +179,17 @@ class Polylines:
         links = self._w[s[MODEL.WORK_LINK] :][: LINK_WORK.SIZE * len(bodies)].reshape(
             -1, LINK_WORK.SIZE
         )
-        placed = self.program.frames[bodies]
-        turned = rotations[bodies] @ placed[:, :3, :3].swapaxes(1, 2)
-        links[:, LINK_WORK.ROTATION : LINK_WORK.ROTATION + 9] = turned.reshape(-1, 9)
+        frames = self.program.frames[bodies]
+        link_rotations = rotations[bodies] @ frames[:, :3, :3].swapaxes(1, 2)
+        links[:, LINK_WORK.ROTATION : LINK_WORK.ROTATION + 9] = link_rotations.reshape(-1, 9)
         links[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] = (
-            origins[bodies] - (turned @ placed[:, :3, 3:])[:, :, 0]
+            origins[bodies] - (link_rotations @ frames[:, :3, 3:])[:, :, 0]
         )
         self._y[: len(q)] = q[order]
-        given = ints, self.numbers, self._w, self._y, self._f
+        arguments = ints, self.numbers, self._w, self._y, self._f
         result = []
         for item, trace in zip(self.items, self.traces, strict=True):
-            code.get_entry(self.laws[self.structure[item + ITEM.LAW]])(*given, item)
-            count = code.get_entry(self.laws[trace])(*given, item)
+            code.get_entry(self.laws[self.structure[item + ITEM.LAW]])(*arguments, item)
+            count = code.get_entry(self.laws[trace])(*arguments, item)
             result.append(self._f[: 3 * count].reshape(-1, 3).copy())
         return result

@@ -59,7 +59,7 @@ def assemble_motion(
         ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
     equations = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
     frames = np.ascontiguousarray(np.column_stack([times, values[:, order]]))
-    found = np.empty((len(times), size + 1))
+    assembled = np.empty((len(times), size + 1))
     parts = (
         ints,
         np.array(program.reals, dtype=np.float64),
@@ -72,10 +72,10 @@ def assemble_motion(
     )
     entry = code.get_entry(ASSEMBLY_KERNEL)
     for rows in divide_rows("fulfilling the constraints", len(times)):
-        entry(*parts, frames[rows], found[rows], rows.stop - rows.start)
+        entry(*parts, frames[rows], assembled[rows], rows.stop - rows.start)
     result: Array = np.empty_like(values)
-    result[:, order] = found[:, :size]
-    for row in np.flatnonzero(found[:, size] != assembly.POSE_STATUS.ASSEMBLED).tolist():
+    result[:, order] = assembled[:, :size]
+    for row in np.flatnonzero(assembled[:, size] != assembly.POSE_STATUS.ASSEMBLED).tolist():
         # The search in Python raises an error with an explanation.
         result[row] = mechanism.assemble(values[row], float(times[row]))
     return result
@@ -94,7 +94,7 @@ def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
             dependent coordinate and equation of each coupler.
     """
     program = mechanism.program
-    infos = [mechanism.coordinates[place] for place in order]
+    infos = [mechanism.coordinates[index] for index in order]
     turning = any(not program.bound.isdisjoint(item.coordinates) for item in mechanism.turning)
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     # Without constraints on bodies the positions of the links need not be computed, which is much
@@ -121,6 +121,6 @@ def _list_numbers(mechanism: Mechanism, order: Sequence[int]) -> list[float]:
         coordinate.
     """
     result = [tolerance_of(mechanism)]
-    for place in order:
-        result += mechanism.coordinates[place].range
+    for index in order:
+        result += mechanism.coordinates[index].range
     return result

@@ -58,11 +58,11 @@ class PropertyPath:
             for step in self.steps[:-2]:
                 # All steps but the last two lead to the object that holds the number.
                 holder = _get_step(holder, step)
-            *_, last = self.steps
-            if isinstance(last, str):
+            *_, field = self.steps
+            if isinstance(field, str):
                 holder = holder if len(self.steps) == 1 else _get_step(holder, self.steps[-2])
-                return PropertySetter(_expect_object(holder), last, None)
-            return PropertySetter(_expect_object(holder), str(self.steps[-2]), last)
+                return PropertySetter(_expect_object(holder), field, None)
+            return PropertySetter(_expect_object(holder), str(self.steps[-2]), field)
         except (AttributeError, LookupError, TypeError):
             words = "/".join(str(step) for step in self.steps)
             raise SettingError(
@@ -122,20 +122,22 @@ def match_components(pattern: str, components: Iterable[NamedItemType]) -> list[
             of a name.
         components: the candidates.
     """
-    known = list(components)
+    candidates = list(components)
     result: dict[int, NamedItemType] = {}
-    for part in pattern.split(","):
+    for alternative in pattern.split(","):
         # A part with a slash at its beginning is compared with paths.
-        own = [
+        matches = [
             item
-            for item in known
-            if _matches(part, item.path if part.startswith("/") else item.name)
+            for item in candidates
+            if _matches_pattern(
+                alternative, item.path if alternative.startswith("/") else item.name
+            )
         ]
         # A part that selects nothing is probably misspelt.
-        if not own:
+        if not matches:
             return []
-        result |= {id(item): item for item in own}
-    return [item for item in known if id(item) in result]
+        result |= {id(item): item for item in matches}
+    return [item for item in candidates if id(item) in result]
 
 
 def expand_braces(name: str, model: Model) -> list[str]:
@@ -152,22 +154,22 @@ def expand_braces(name: str, model: Model) -> list[str]:
     Returns:
         Names in the order of the model; the name itself without braces.
     """
-    head, brace, rest = name.partition("{")
+    prefix, brace, remainder = name.partition("{")
     # Without braces the name stands for itself.
     if not brace:
         return [name]
-    inner, _, tail = rest.partition("}")
+    inner, _, tail = remainder.partition("}")
     end = re.split("[/@]", tail)[0]
     form = re.compile(
-        f"{_to_regular_expression(head)}({_to_regular_expression(inner)}){_to_regular_expression(end)}"
+        f"{_to_regular_expression(prefix)}({_to_regular_expression(inner)}){_to_regular_expression(end)}"
     )
     components = model.components(
         Actuator if re.match("/control(@|$)", tail[len(end) :]) else Component
     )
-    known = (item.path if head.startswith("/") else item.name for item in components)
+    candidates = (item.path if prefix.startswith("/") else item.name for item in components)
     return [
-        f"{head}{text}{tail}"
-        for text in dict.fromkeys(result[1] for result in map(form.fullmatch, known) if result)
+        f"{prefix}{text}{tail}"
+        for text in dict.fromkeys(result[1] for result in map(form.fullmatch, candidates) if result)
     ]
 
 
@@ -180,7 +182,7 @@ def _to_regular_expression(pattern: str) -> str:
     )
 
 
-def _matches(pattern: str, name: str) -> bool:
+def _matches_pattern(pattern: str, name: str) -> bool:
     return name.count("/") == pattern.count("/") and fnmatchcase(name, pattern)
 
 
@@ -205,8 +207,10 @@ def find_properties(model: Model, path: str) -> tuple[PropertyPath, ...]:
         route = "/".join(words[count:])
         matching = match_components(pattern, model.components())
         if matching:
-            every = [(item, dict(_iterate_numbers(item)).get(route)) for item in matching]
-            return tuple(PropertyPath(item.path, *numbers) for item, numbers in every if numbers)
+            numbers_by_item = [(item, dict(_iterate_numbers(item)).get(route)) for item in matching]
+            return tuple(
+                PropertyPath(item.path, *numbers) for item, numbers in numbers_by_item if numbers
+            )
     return ()
 
 
@@ -228,34 +232,38 @@ def _iterate_numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ..
         Name of the number, its steps, and its unit with the schema's notation.
     """
     for spec in type(holder).field_specs().values():
-        kind = spec.kind
-        if isinstance(kind, Value) and kind.scalar == "double":
+        field_type = spec.kind
+        if isinstance(field_type, Value) and field_type.scalar == "double":
             value = getattr(holder, spec.name)
             if isinstance(value, tuple):
                 for entry in range(len(value)):
-                    yield f"{spec.tag}/{entry}", ((spec.name, entry), kind.unit or "")
+                    yield f"{spec.tag}/{entry}", ((spec.name, entry), field_type.unit or "")
             elif value is not None:
-                yield spec.tag, ((spec.name,), kind.unit or "")
+                yield spec.tag, ((spec.name,), field_type.unit or "")
     for spec, item in holder.list_owned_objects():
         # Components have paths of their own.
         if isinstance(item, Component) and item.is_component:
             continue
-        held = getattr(holder, spec.name)
-        rest = list(_iterate_numbers(item))
-        if not isinstance(held, list):
-            for route, (steps, unit) in rest:
+        field_value = getattr(holder, spec.name)
+        inner_numbers = list(_iterate_numbers(item))
+        if not isinstance(field_value, list):
+            for route, (steps, unit) in inner_numbers:
                 yield f"{spec.tag}/{route}", ((spec.name, *steps), unit)
             continue
-        place = next(number for number, other in enumerate(held) if other is item)
+        index = next(number for number, sibling in enumerate(field_value) if sibling is item)
         # A set consists of its list only, so the name of the list is omitted.
         front = "" if spec.tag == "objects" else f"{spec.tag}/"
         # An entry is named by its index, by its name, or not at all if it is the only one.
-        names = [str(place), *([item.name] if item.name else []), *([""] if len(held) == 1 else [])]
-        for route, (steps, unit) in rest:
+        names = [
+            str(index),
+            *([item.name] if item.name else []),
+            *([""] if len(field_value) == 1 else []),
+        ]
+        for route, (steps, unit) in inner_numbers:
             for name in names:
                 yield (
                     front + (f"{name}/" if name else "") + route,
-                    ((spec.name, place, *steps), unit),
+                    ((spec.name, index, *steps), unit),
                 )
 
 

@@ -78,13 +78,15 @@ def find_excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
     groups = {group.name: group.members for group in model.force_set.groups}
     result: list[Force] = []
     for name in names:
-        kind = FORCE_KEYWORDS.get(name.lower())
-        members = [force for force in forces.values() if is_a(force, kind)] if kind else []
-        if not kind:
+        force_class = FORCE_KEYWORDS.get(name.lower())
+        members = (
+            [force for force in forces.values() if is_a(force, force_class)] if force_class else []
+        )
+        if not force_class:
             if name not in groups and name not in forces:
-                near = suggest_name(name, [*forces, *groups])
+                suggestion = suggest_name(name, [*forces, *groups])
                 raise SettingError(
-                    f"'{model.name}' has no force and no group of forces '{name}'{near}"
+                    f"'{model.name}' has no force and no group of forces '{name}'{suggestion}"
                 )
             named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
             members = [forces[member] for member in named if member in forces]
@@ -193,31 +195,35 @@ class RecordedMotion(Movement):
         # Coordinates without a column keep their default value.
         values = np.tile(mechanism.values({}), (len(table.times), 1))
         # Of columns with one label, the first counts.
-        places = {label: place for place, label in reversed([*enumerate(table.columns)])}
+        first_columns = {label: index for index, label in reversed([*enumerate(table.columns)])}
         states = match_state_columns(
             table.columns,
             [
-                f"{info.path}/{what}"
+                f"{info.path}/{quantity}"
                 for info in mechanism.coordinates
-                for what in ("value", "speed")
+                for quantity in ("value", "speed")
             ],
         )
         result: dict[int, int] = {}
-        for place, info in enumerate(mechanism.coordinates):
+        for index, info in enumerate(mechanism.coordinates):
             columns = (
-                places.get(info.name),
-                places.get(info.path),
+                first_columns.get(info.name),
+                first_columns.get(info.path),
                 states.get(f"{info.path}/value"),
             )
             column = next(
                 # A column belongs to one coordinate only, even if two coordinates share a name.
-                (one for one in columns if one is not None and one not in result.values()),
+                (
+                    candidate
+                    for candidate in columns
+                    if candidate is not None and candidate not in result.values()
+                ),
                 None,
             )
             if column is not None:
-                result[place] = column
+                result[index] = column
                 turned = table.in_degrees and info.motion_type == "rotational"
-                values[:, place] = (
+                values[:, index] = (
                     np.radians(table.rows[:, column]) if turned else table.rows[:, column]
                 )
         # Speeds in a file of states are recomputed from the values, and states of forces do not
@@ -225,8 +231,8 @@ class RecordedMotion(Movement):
         used = {*result.values(), *states.values()}
         ignored = [
             label
-            for place, label in enumerate(table.columns)
-            if place not in used and not label.startswith("/forceset/")
+            for index, label in enumerate(table.columns)
+            if index not in used and not label.startswith("/forceset/")
         ]
         if not mechanism.coordinates:
             raise ModelError(
@@ -240,32 +246,32 @@ class RecordedMotion(Movement):
             )
         # Only then are times compared: a repeated time is an error if the poses differ.
         close = (np.abs(np.diff(values, axis=0)) < SAME_VALUE_TOLERANCE).all(axis=1)
-        if len(again := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
+        if len(repeated_rows := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
             # OpenSim's tools write the last time twice, with values that differ by rounding.
             table = replace(
                 table,
-                times=np.delete(table.times, again),
-                rows=np.delete(table.rows, again, axis=0),
+                times=np.delete(table.times, repeated_rows),
+                rows=np.delete(table.rows, repeated_rows, axis=0),
             )
-            values = np.delete(values, again, axis=0)
+            values = np.delete(values, repeated_rows, axis=0)
         expect_increasing_times(table.times, table.file)
         # The negation also finds NaN.
         gaps = np.argwhere(~(np.abs(values) < MAX_COORDINATE))
         if len(gaps):
-            row, place = gaps[0]
-            name = mechanism.coordinates[place].name
-            told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
-            told += (
+            row, index = gaps[0]
+            name = mechanism.coordinates[index].name
+            message = f"'{name}' is {values[row, index]} at {table.times[row]:g} s; "
+            message += (
                 "fill the gaps"
-                if not np.isfinite(values[row, place])
+                if not np.isfinite(values[row, index])
                 else "no body can be that far away"
             )
-            raise DocumentError(told, file=table.file)
+            raise DocumentError(message, file=table.file)
         missing = tuple(
-            info.name for place, info in enumerate(mechanism.coordinates) if place not in result
+            info.name for index, info in enumerate(mechanism.coordinates) if index not in result
         )
         plain = {*table.columns}
-        by_path = tuple(mechanism.coordinates[place].name for place in sorted(result))
+        by_path = tuple(mechanism.coordinates[index].name for index in sorted(result))
         by_path = tuple(name for name in by_path if name not in plain)
         return cls(mechanism, table.times, values, missing, tuple(ignored), named_by_path=by_path)
 
@@ -307,8 +313,10 @@ class RecordedMotion(Movement):
             return replace(self, times=times, values=values, around=None)
         # The extensions of the filter at both ends are not recorded data.
         slack = 1e-6 * (times[1] - times[0])
-        own = (times >= self.times[0] - slack) & (times <= self.times[-1] + slack)
-        return replace(self, times=times[own], values=values[own], around=(times, values))
+        is_inside = (times >= self.times[0] - slack) & (times <= self.times[-1] + slack)
+        return replace(
+            self, times=times[is_inside], values=values[is_inside], around=(times, values)
+        )
 
     def between(self, first: float, last: float) -> RecordedMotion:
         """Return a part of the motion, at least one row.
@@ -339,12 +347,12 @@ class RecordedMotion(Movement):
             around=around,
         )
 
-    def _require_time_count(self, what: str) -> None:
+    def _require_time_count(self, purpose: str) -> None:
         """Raise SettingError if there are fewer times than splines of fifth degree need."""
         count = len(self.around[0] if self.around else self.times)
         if count < 2 * _HALF_SPLINE_ORDER:
             raise SettingError(
-                f"the motion has {format_count(count, 'time')}; {what} at least {2 * _HALF_SPLINE_ORDER}"
+                f"the motion has {format_count(count, 'time')}; {purpose} at least {2 * _HALF_SPLINE_ORDER}"
             )
 
     def assembled(self) -> RecordedMotion:
@@ -367,9 +375,9 @@ class RecordedMotion(Movement):
         """
         mechanism = self.mechanism
         columns = [
-            f"{body.name}_{what}"
+            f"{body.name}_{quantity}"
             for body in mechanism.bodies
-            for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+            for quantity in ("X", "Y", "Z", "Ox", "Oy", "Oz")
         ]
         rows = np.empty((len(self.times), len(columns) + 3))
         poses = watch_items("computing positions of bodies", self.values)
@@ -389,17 +397,17 @@ class RecordedMotion(Movement):
         The columns are X, Y and Z of each marker in ground, m.
         """
         mechanism = self.mechanism
-        places = {
-            path: place
-            for path, place in mechanism.stations.items()
+        stations = {
+            path: station
+            for path, station in mechanism.stations.items()
             if path.startswith("/markerset/")
         }
-        columns = [f"{path.rsplit('/', 1)[1]}_{axis}" for path in places for axis in "XYZ"]
+        columns = [f"{path.rsplit('/', 1)[1]}_{axis}" for path in stations for axis in "XYZ"]
         rows = np.empty((len(self.times), len(columns)))
         poses = watch_items("computing positions of markers", self.values)
         for row, q in zip(rows, poses, strict=True):
             state = mechanism.at(q)
-            row[:] = [number for place in places.values() for number in state.point(*place)]
+            row[:] = [number for station in stations.values() for number in state.point(*station)]
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)
 
     def inverse_dynamics(self, forces: Forces | None = None) -> StoTable:
@@ -437,8 +445,8 @@ class RecordedMotion(Movement):
             np.column_stack([self.times, states]), accelerations[:, order]
         )
         # OpenSim's tool lists coordinates in the order of the multibody tree, not of the model.
-        order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
-        infos = [mechanism.coordinates[place] for place in order]
+        order = [index for body in mechanism.bodies for index in body.mobilizer.coordinates]
+        infos = [mechanism.coordinates[index] for index in order]
         labels = [
             f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}"
             for info in infos

@@ -126,17 +126,21 @@ def _borrow_simulation(
         Simulation of the model as it is now.
     """
     check_is_model(model)
-    tree, chosen = model.tree(), Options.parse(choices)
+    tree, options = model.tree(), Options.parse(choices)
     engine = None if engine is None else engine_name(engine)
-    key = (engine_name(engine), *(getattr(chosen, name) for name in SUMMARY_OPTIONS), chosen.route)
-    is_plain = chosen.external_loads is None and not chosen.show
+    key = (
+        engine_name(engine),
+        *(getattr(options, name) for name in SUMMARY_OPTIONS),
+        options.route,
+    )
+    is_plain = options.external_loads is None and not options.show
     simulation = tree.cached.pop(key, None) if is_plain else None
     # A simulation in use is not in the cache, so a second thread prepares its own.
     if simulation is None:
         simulation = Simulation(
             model, engine, **{name: choices[name] for name in choices if name not in RUN_OPTIONS}
         )
-    elif chosen.initial or chosen.initial_speeds:
+    elif options.initial or options.initial_speeds:
         # Another start may allow a motion without inertia where the first one did not.
         simulation.reset_inertia_check()
     try:
@@ -149,9 +153,9 @@ def _borrow_simulation(
         simulation.close()
         return
     tree.cached[key] = simulation
-    _RECENT_TREES[:] = [known for known in _RECENT_TREES if known() not in (None, tree)] + [
-        weakref.ref(tree)
-    ]
+    _RECENT_TREES[:] = [
+        reference for reference in _RECENT_TREES if reference() not in (None, tree)
+    ] + [weakref.ref(tree)]
     # The list has weak references: the cache must not keep a model alive that its user has dropped.
     if len(_RECENT_TREES) > CACHED_SIMULATIONS:
         longest_ago = _RECENT_TREES.pop(0)()
@@ -202,11 +206,11 @@ class Simulation:
 
     @any_numbers
     def __init__(self, model: Model, engine: str | None = None, **choices: Any) -> None:
-        self.options = chosen = Options.parse(choices)
+        self.options = options = Options.parse(choices)
         # Only Bullet has a window.
-        make = engine_factory("bullet" if chosen.show and engine is None else engine)
+        create_engine = engine_factory("bullet" if options.show and engine is None else engine)
         self.mechanism: Mechanism = build_mechanism(
-            model, opensim_derivatives=chosen.opensim_derivatives, rolling=chosen.rolling
+            model, opensim_derivatives=options.opensim_derivatives, rolling=options.rolling
         )
         # Later changes of the model affect neither runs nor their display.
         self._snapshot = Snapshot(model.tree())
@@ -216,34 +220,36 @@ class Simulation:
         self.forces = force_elements(
             model,
             self.mechanism,
-            skip_unsupported=chosen.skip_unsupported,
-            simbody_early_return=chosen.simbody_early_return,
-            own_activation_times=chosen.own_activation_times,
-            wrapping=chosen.wrapping,
-            external_loads=chosen.external_loads,
-            folder=chosen.folder,
+            skip_unsupported=options.skip_unsupported,
+            simbody_early_return=options.simbody_early_return,
+            own_activation_times=options.own_activation_times,
+            wrapping=options.wrapping,
+            external_loads=options.external_loads,
+            folder=options.folder,
         )
         visuals = None
-        if chosen.show:
+        if options.show:
             from osimlite.io.meshes.folders import MeshFolders
             from osimlite.simulation.robot.mesh_files import MeshFiles
             from osimlite.simulation.robot.visuals import collect_visuals
 
-            places = MeshFolders(Path.cwd() if chosen.folder is None else Path(chosen.folder))
-            visuals = collect_visuals(model, self.mechanism, mesh_files=MeshFiles(places))
-        self.engine: Engine = make(
+            mesh_folders = MeshFolders(
+                Path.cwd() if options.folder is None else Path(options.folder)
+            )
+            visuals = collect_visuals(model, self.mechanism, mesh_files=MeshFiles(mesh_folders))
+        self.engine: Engine = create_engine(
             self.mechanism,
             self.forces,
-            EngineSettings(route=chosen.route, show=chosen.show, visuals=visuals),
+            EngineSettings(route=options.route, show=options.show, visuals=visuals),
         )
         self.state = self.engine.state
         self.constraints = [
             item.name for item in select_constraints(self.mechanism, self.engine.order)[0]
         ]
         paths = [
-            f"{info.path}/{what}"
+            f"{info.path}/{quantity}"
             for info in self.mechanism.coordinates
-            for what in ("value", "speed")
+            for quantity in ("value", "speed")
         ]
         named = [variable.path for variable in self.state.variables if variable.is_named]
         self.paths = sort_by_component(model, paths + named)
@@ -266,47 +272,47 @@ class Simulation:
             The motion. Errors are those of :func:`simulate`.
         """
         with self._lock:
-            return self._run(to, self.options.override_for_run(choices))
+            return self._simulate_once(to, self.options.override_for_run(choices))
 
-    def _run(self, to: float, chosen: Options) -> Trajectory:
+    def _simulate_once(self, to: float, options: Options) -> Trajectory:
         started = time.perf_counter()
-        fixed_step, initial = chosen.fixed_step, chosen.initial
-        start, before = 0.0, None
-        if chosen.resume is not None:
-            if initial or chosen.initial_speeds or chosen.equilibrate:
+        fixed_step, initial = options.fixed_step, options.initial
+        start, earlier_record = 0.0, None
+        if options.resume is not None:
+            if initial or options.initial_speeds or options.equilibrate:
                 raise SettingError(
                     "a resumed simulation starts where the earlier one ended; leave out initial values, speeds and equilibrate"
                 )
-            earlier, before = read_earlier_run(chosen.resume)
+            earlier, earlier_record = read_earlier_run(options.resume)
             start = float(earlier.times[-1]) if len(earlier.times) else 0.0
             initial = self.get_last_state(earlier)
-        held = None
-        if chosen.controller is not None:
+        controller = None
+        if options.controller is not None:
             if fixed_step is not None:
                 raise SettingError(
                     "a controller needs the steps of an integrator; leave out the fixed step"
                 )
-            if isinstance(chosen.controller, str | Path | Mapping):
-                such = f"osimlite.Feedback({chosen.controller!r})"
-                raise SettingError(f"a controller is an osimlite.Feedback, such as {such}")
-            held = chosen.controller.compile_for(self.model, self.engine)
-            to = held.snap_to_step(to)
-            if chosen.resume is not None:
-                held.require_same_controller(before, start)
-        elif before is not None:
+            if isinstance(options.controller, str | Path | Mapping):
+                example = f"osimlite.Feedback({options.controller!r})"
+                raise SettingError(f"a controller is an osimlite.Feedback, such as {example}")
+            controller = options.controller.compile_for(self.model, self.engine)
+            to = controller.snap_to_step(to)
+            if options.resume is not None:
+                controller.require_same_controller(earlier_record, start)
+        elif earlier_record is not None:
             raise SettingError("the earlier run had a controller; pass the same one to resume it")
         # A controller has moved `to` onto a control step before the rows are chosen.
-        times = report_times(to, chosen.report_interval, start)
+        times = report_times(to, options.report_interval, start)
         if fixed_step is not None:
             check_fixed_step(fixed_step, to)
-        chosen.check_integration()
+        options.check_integration()
         # A warning instead of an error: OpenSim accepts any accuracy below 1.
-        if fixed_step is None and chosen.accuracy > LOOSEST_SOUND_ACCURACY:
+        if fixed_step is None and options.accuracy > LOOSEST_SOUND_ACCURACY:
             warn_caller(
-                f"an accuracy of {chosen.accuracy:g} is so loose that a motion may end far from the model's own; "
+                f"an accuracy of {options.accuracy:g} is so loose that a motion may end far from the model's own; "
                 f"take {LOOSEST_SOUND_ACCURACY:g} or less"
             )
-        if chosen.show and fixed_step is None:
+        if options.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
             initial = self.read_state(initial)
@@ -319,37 +325,43 @@ class Simulation:
                 name: float(value)
                 if name in self.paths
                 else convert_value(self.mechanism, name, value)
-                for name, value in (given or {}).items()
+                for name, value in (numbers or {}).items()
             }
-            for given in (initial, chosen.initial_speeds)
+            for numbers in (initial, options.initial_speeds)
         )
-        controls, given = self.forces.controls, {}
-        if chosen.controls is not None or any(controls.functions):
+        controls, extra_settings = self.forces.controls, {}
+        if options.controls is not None or any(controls.functions):
             from osimlite.simulation.run_controls import add_controls, describe_controls
 
-            controls = add_controls(controls, chosen.controls, to)
-            given = (
-                {} if chosen.controls is None else {"controls": describe_controls(chosen.controls)}
+            controls = add_controls(controls, options.controls, to)
+            extra_settings = (
+                {}
+                if options.controls is None
+                else {"controls": describe_controls(options.controls)}
             )
-        if chosen.controller is not None:
-            given["controller"] = str(chosen.controller)
-        if chosen.resume is not None:
-            given["resume"] = str(chosen.resume)
+        if options.controller is not None:
+            extra_settings["controller"] = str(options.controller)
+        if options.resume is not None:
+            extra_settings["resume"] = str(options.resume)
         # The engine sees one constant per control of the controller, which the kernels overwrite at
         # each control step. The trajectory gets the recorded values instead.
-        opened = controls if held is None else held.add_constants(controls)
-        self.engine.set_controls(opened)
-        y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
+        run_controls = controls if controller is None else controller.add_constants(controls)
+        self.engine.set_controls(run_controls)
+        y = self.initial_state(initial, initial_speeds, equilibrate=options.equilibrate)
         self._require_inertia(y)
-        runs = None if held is None else held.make_runs(self.engine, opened, to, before)
+        runs = (
+            None
+            if controller is None
+            else controller.make_runs(self.engine, run_controls, to, earlier_record)
+        )
         settings = EngineSettings(
             fixed_step=fixed_step,
             route=self.engine.route,
-            show=chosen.show,
+            show=options.show,
             held=runs,
-            **chosen.integration_choices(),
+            **options.integration_choices(),
         )
-        recorder, stepper, states = self._integrate(y, settings, times, chosen.progress)
+        recorder, stepper, states = self._integrate_motion(y, settings, times, options.progress)
         if runs is not None:
             controls = runs.add_record(controls)
         times = times[: len(states)]
@@ -361,23 +373,23 @@ class Simulation:
         if not isfinite(sum(states[-1])):
             raise SimulationError("the motion is no longer finite; use a smaller accuracy value")
         wall = time.perf_counter() - started
-        wanted = {
+        summary_settings = {
             "to": to,
-            **(chosen.summarize_choices() if fixed_step is None else {"fixed_step": fixed_step}),
-            "report_interval": chosen.report_interval,
+            **(options.summarize_choices() if fixed_step is None else {"fixed_step": fixed_step}),
+            "report_interval": options.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,
-            **({"equilibrate": True} if chosen.equilibrate else {}),
-            **given,
-            **{name: getattr(chosen, name) for name in SUMMARY_OPTIONS},
+            **({"equilibrate": True} if options.equilibrate else {}),
+            **extra_settings,
+            **{name: getattr(options, name) for name in SUMMARY_OPTIONS},
             **(
                 {}
-                if chosen.external_loads is None
-                else {"external_loads": str(chosen.external_loads)}
+                if options.external_loads is None
+                else {"external_loads": str(options.external_loads)}
             ),
         }
         trajectory = self._make_trajectory(
-            times, states, stepper, recorder, wanted, wall, controls, table
+            times, states, stepper, recorder, summary_settings, wall, controls, table
         )
         # An error without a single step has no motion to show.
         if isinstance(stepper.ended, SimulationError):
@@ -449,7 +461,7 @@ class Simulation:
 
     # --------------------------------------------------------------------------------------------- helpers
     @any_numbers
-    def _integrate(
+    def _integrate_motion(
         self,
         y: list[float],
         settings: EngineSettings,
@@ -521,37 +533,39 @@ class Simulation:
             SimulationError: a coordinate is locked or prescribed, no pose or speeds fulfil the
                 constraints, or a muscle has no equilibrium.
         """
-        own = {path: initial[path] for path in self.state.paths if path in initial}
-        q, u, places = resolve_initial_values(
-            self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds
+        auxiliary_values = {path: initial[path] for path in self.state.paths if path in initial}
+        q, u, set_indices = resolve_initial_values(
+            self.mechanism,
+            {name: initial[name] for name in initial if name not in auxiliary_values},
+            speeds,
         )
-        given = u
+        requested_speeds = u
         if self.constraints:
             # Assembly can take as long as the motion, so the result is cached for the same start.
-            start = (q, u, places)
+            start = (q, u, set_indices)
             if self._start is None or self._start[0] != start:
-                values, rates = find_consistent_state(self.mechanism, q, u, *places)
+                values, rates = find_consistent_state(self.mechanism, q, u, *set_indices)
                 self._start = start, (values.tolist(), rates.tolist())
             q, u = self._start[1]
         y = self.state.pack(q, u)
-        moving = 2 * len(self.state.order)
-        numbers = {path: number for number, path in enumerate(self.state.paths, moving)}
+        moving_count = 2 * len(self.state.order)
+        numbers = {path: number for number, path in enumerate(self.state.paths, moving_count)}
         for path, number in numbers.items():
-            y[number] = float(own.get(path, y[number]))
+            y[number] = float(auxiliary_values.get(path, y[number]))
             if not isfinite(y[number]):
                 raise SettingError(f"the state '{path}' starts at {y[number]}; give a number")
         if equilibrate:
             # OpenSim equilibrates in the assembled pose, before it projects the speeds onto the
             # constraints.
             infos = self.mechanism.coordinates
-            given = [
-                u[k] if info.locked or info.prescribed is not None else given[k]
+            requested_speeds = [
+                u[k] if info.locked or info.prescribed is not None else requested_speeds[k]
                 for k, info in enumerate(infos)
             ]
-            y[moving:] = self.engine.equilibrate_muscles(
-                0.0, [*self.state.pack(q, given)[:moving], *y[moving:]]
-            )[moving:]
-            for path, value in own.items():
+            y[moving_count:] = self.engine.equilibrate_muscles(
+                0.0, [*self.state.pack(q, requested_speeds)[:moving_count], *y[moving_count:]]
+            )[moving_count:]
+            for path, value in auxiliary_values.items():
                 y[numbers[path]] = float(value)
         return y
 
@@ -593,11 +607,11 @@ class Simulation:
         controller: StoTable | None,
     ) -> Trajectory:
         # Reports are computed when they are first read, which may be after the next run.
-        def evaluate_with_controls(what: Callable[[Engine], Any]) -> Any:
+        def evaluate_with_controls(function: Callable[[Engine], Any]) -> Any:
             """Evaluate a function of the engine with the controls of this run; later runs may have set others."""
             with self._lock:
                 self.engine.set_controls(controls)
-                return what(self.engine)
+                return function(self.engine)
 
         def summary(engine: Engine) -> dict[str, Any]:
             return {
@@ -654,11 +668,11 @@ def _require_finite_start(mechanism: Mechanism) -> None:
     Raises:
         SimulationError: one of them is not.
     """
-    for what in ("value", "speed"):
+    for quantity in ("value", "speed"):
         for info in mechanism.coordinates:
-            number = getattr(info, f"default_{what}")
+            number = getattr(info, f"default_{quantity}")
             if not isfinite(number):
                 raise SimulationError(
-                    f"the default {what} of coordinate '{info.path}' is {number}; give a number"
+                    f"the default {quantity} of coordinate '{info.path}' is {number}; give a number"
                 )
     require_numbers(mechanism, mechanism.mass_matrix({}))

@@ -53,11 +53,11 @@ class PythonFunction(SmoothFunction):
 
 def add_controls(
     controls: Controls,
-    given: Mapping[str, Any] | StoTable | str | Path | None,
+    user_controls: Mapping[str, Any] | StoTable | str | Path | None,
     to: float,
     *,
     start: float = 0.0,
-    what: str = "controls",
+    description: str = "controls",
 ) -> Controls:
     """Add the controls of a run to those of a model, as another PrescribedController would.
 
@@ -66,11 +66,11 @@ def add_controls(
 
     Args:
         controls: controls of the model.
-        given: a number, a function of time (s) or ``(times, values)`` by the name or path of an
+        user_controls: a number, a function of time (s) or ``(times, values)`` by the name or path of an
             actuator; or a table with such columns; or the file of a table or of a ControlSet.
         to: end of the motion, s.
         start: start of the motion, s.
-        what: what is added, for messages.
+        description: what is added, for messages.
 
     Returns:
         The combined controls; as in OpenSim, those of several controllers of an actuator are
@@ -82,16 +82,16 @@ def add_controls(
         SimulationError: a TableSource of the model ends before the motion.
     """
     require_table_span(controls, start, to)
-    if given is None:
+    if user_controls is None:
         return controls
     # Actuators may be named by their name or their path.
-    known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
+    path_of_name = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
     functions: dict[str, SmoothFunction] = {}
     begin, end = -inf, inf
-    for key, value in _map_by_name(given).items():
-        if key not in known:
+    for key, value in _map_by_name(user_controls).items():
+        if key not in path_of_name:
             raise SettingError(
-                f"the model has no actuator '{key}' to control{suggest_name(key, known)}"
+                f"the model has no actuator '{key}' to control{suggest_name(key, path_of_name)}"
             )
         # A name is ambiguous in models with several sets.
         paths = [name for name in controls.names if name.endswith(f"/{key}")]
@@ -99,42 +99,42 @@ def add_controls(
             raise SettingError(
                 f"{len(paths)} actuators are called '{key}': {join_words(paths)}; give the path of one"
             )
-        if known[key] in functions:
+        if path_of_name[key] in functions:
             raise SettingError(
-                f"'{known[key]}' is controlled twice, by its name and by its path; leave one out"
+                f"'{path_of_name[key]}' is controlled twice, by its name and by its path; leave one out"
             )
         # (times, values) is an interpolated table.
         if isinstance(value, tuple):
-            functions[known[key]], first, last = _interpolate(key, *value)
+            functions[path_of_name[key]], first, last = _interpolate_linearly(key, *value)
             begin, end = max(begin, first), min(end, last)
         else:
-            functions[known[key]] = _make_function(key, value)
+            functions[path_of_name[key]] = _make_function(key, value)
     if begin > start + PRINTED_TIME_TOLERANCE_S or end < to - PRINTED_TIME_TOLERANCE_S:
         warn_caller(
-            f"the {what} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
+            f"the {description} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
             f"{to:g} s; their first and last values hold before and after"
         )
     return controls.add_functions(functions)
 
 
-def describe_controls(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
+def describe_controls(user_controls: Mapping[str, Any] | StoTable | str | Path) -> Any:
     """Return controls in the form of a summary.
 
     Args:
-        given: controls as in :func:`add_controls`.
+        user_controls: controls as in :func:`add_controls`.
 
     Returns:
         The name of a file, "a table", or numbers and descriptions by actuator.
     """
-    if not isinstance(given, Mapping):
-        return "a table" if isinstance(given, StoTable) else str(given)
-    kinds = {
+    if not isinstance(user_controls, Mapping):
+        return "a table" if isinstance(user_controls, StoTable) else str(user_controls)
+    descriptions = {
         name: "a table" if isinstance(value, tuple) else "a function"
-        for name, value in given.items()
+        for name, value in user_controls.items()
     }
     return {
-        name: value if isinstance(value, int | float | str) else kinds[name]
-        for name, value in given.items()
+        name: value if isinstance(value, int | float | str) else descriptions[name]
+        for name, value in user_controls.items()
     }
 
 
@@ -149,19 +149,19 @@ def parse_controls(words: Iterable[str]) -> dict[str, Any]:
     """
     result: dict[str, Any] = {}
     for word in words:
-        name, equals, value = (part.strip() for part in word.partition("="))
+        name, equals, value = (piece.strip() for piece in word.partition("="))
         if (equals or not Path(word).suffix) and not Path(word).is_file():
             try:
-                more: Mapping[str, Any] = {name: float(value)}
+                new_controls: Mapping[str, Any] = {name: float(value)}
             except ValueError:
                 raise SettingError(
                     f"--controls takes a file, or NAME=VALUE with a number; got '{word}'"
                 ) from None
         else:
-            more = _map_by_name(word)
-        for key in more.keys() & result.keys():
+            new_controls = _map_by_name(word)
+        for key in new_controls.keys() & result.keys():
             raise SettingError(f"'{key}' is controlled twice; leave one out")
-        result |= more
+        result |= new_controls
     return result
 
 
@@ -180,17 +180,19 @@ def require_table_span(controls: Controls, start: float, to: float) -> None:
             )
 
 
-def _map_by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, Any]:
+def _map_by_name(user_controls: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, Any]:
     """Return controls by actuator from a mapping, a table or a file."""
-    if isinstance(given, Mapping):
-        return given
+    if isinstance(user_controls, Mapping):
+        return user_controls
     # .xml is the older format of control sets.
-    if isinstance(given, str | Path) and Path(given).suffix == ".xml":
-        curves = ControlCurves.read(Path(given))
+    if isinstance(user_controls, str | Path) and Path(user_controls).suffix == ".xml":
+        curves = ControlCurves.read(Path(user_controls))
         return {name: curves.find_curve(name) for name in curves.actuators}
-    if not isinstance(given, str | Path | StoTable):
-        raise SettingError(f"controls are a mapping of names, a table or a file, not {given!r}")
-    table = given if isinstance(given, StoTable) else read_controls(given)
+    if not isinstance(user_controls, str | Path | StoTable):
+        raise SettingError(
+            f"controls are a mapping of names, a table or a file, not {user_controls!r}"
+        )
+    table = user_controls if isinstance(user_controls, StoTable) else read_controls(user_controls)
     for index, label in enumerate(table.columns):
         if label in table.columns[:index]:
             raise SettingError(f"the table of controls has two columns '{label}'; leave one out")
@@ -224,7 +226,9 @@ def _make_function(name: str, value: Any) -> SmoothFunction:
     return ConstantValue(number)
 
 
-def _interpolate(name: str, times: Any, values: Any) -> tuple[SmoothFunction, float, float]:
+def _interpolate_linearly(
+    name: str, times: Any, values: Any
+) -> tuple[SmoothFunction, float, float]:
     """Return the linear interpolation of values at times.
 
     Args:
@@ -265,8 +269,8 @@ def find_constant_offsets(engine: Any, driven: Controls) -> Ints:
     Returns:
         Offset of each constant in `engine.numbers` (c,).
     """
-    own, numbers, _ = driven.make_record()
-    tables = [*own[1 + len(driven.names) :], len(numbers)]
-    last = [own[1 + k] for k in range(len(driven.names))]
+    ints, numbers, _ = driven.make_record()
+    function_ends = [*ints[1 + len(driven.names) :], len(numbers)]
+    last_functions = [ints[1 + k] for k in range(len(driven.names))]
     first = int(engine.structure[engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])
-    return np.array([first + tables[end] - 1 for end in last], dtype=np.int64)
+    return np.array([first + function_ends[end] - 1 for end in last_functions], dtype=np.int64)

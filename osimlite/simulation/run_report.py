@@ -171,11 +171,11 @@ class Recorder:
     def _get_set_bits(self, bits: int) -> tuple[int, ...]:
         """Return the indices of the bits that are set."""
         # Feet touch in few combinations, so the indices of each are cached.
-        known = self._numbers.get(bits)
-        if known is None:
-            known = tuple(number for number in range(bits.bit_length()) if bits >> number & 1)
-            self._numbers[bits] = known
-        return known
+        numbers = self._numbers.get(bits)
+        if numbers is None:
+            numbers = tuple(number for number in range(bits.bit_length()) if bits >> number & 1)
+            self._numbers[bits] = numbers
+        return numbers
 
 
 EXTREME_RULES: dict[str, tuple[float, Callable[[float, float], bool]]] = {

@@ -93,7 +93,7 @@ class StateLayout:
     @property
     def names(self) -> list[str]:
         """Names of the entries in messages."""
-        names = [self.mechanism.coordinates[place].name for place in self.order]
+        names = [self.mechanism.coordinates[index].name for index in self.order]
         return names + [f"the speed of {name}" for name in names] + self.paths
 
     @property
@@ -103,8 +103,8 @@ class StateLayout:
 
     def find_first_state(self, element: Any) -> int:
         """Return the index in y of the first state of an element, whose other states follow; -1 if it has none."""
-        own = element.states
-        return 2 * len(self.order) + self.variables.index(own[0]) if own else -1
+        variables = element.states
+        return 2 * len(self.order) + self.variables.index(variables[0]) if variables else -1
 
     # ------------------------------------------------------------------------------------------ whole states
     def require_length(self, y: Sequence[float]) -> None:
@@ -121,10 +121,12 @@ class StateLayout:
 
     def make_length_error(self, count: int) -> OsimliteError:
         """Return the error for a state with `count` entries."""
-        n, more = len(self.order), len(self.variables)
-        parts = f"{n} values, {n} speeds" + (f", {more} auxiliary states" if more else "")
+        n, auxiliary_count = len(self.order), len(self.variables)
+        contents = f"{n} values, {n} speeds" + (
+            f", {auxiliary_count} auxiliary states" if auxiliary_count else ""
+        )
         return OsimliteError(
-            f"a state of '{self.mechanism.name}' has {self.size} numbers ({parts}), not {count}"
+            f"a state of '{self.mechanism.name}' has {self.size} numbers ({contents}), not {count}"
         )
 
     def to_table(self, states: ArrayLike) -> Array:
@@ -166,7 +168,7 @@ class StateLayout:
         Raises:
             OsimliteError: there are more or fewer auxiliary states.
         """
-        y = [float(row[place]) for row in (q, u) for place in self.order]
+        y = [float(row[index]) for row in (q, u) for index in self.order]
         y += self._compute_starts(y) if z is None else map(float, z)
         self.require_length(y)
         return y
@@ -202,16 +204,16 @@ class StateLayout:
         ]
 
     # ------------------------------------------------------------------------------------------------ parts
-    def spread_to_all(self, values: Sequence[float], still: Sequence[float]) -> list[float]:
+    def spread_to_all(self, values: Sequence[float], defaults: Sequence[float]) -> list[float]:
         """Return numbers of all coordinates in the mechanism's order.
 
         Args:
             values: numbers of the coordinates in the state.
-            still: numbers (n,) of all coordinates, used for those that are not in the state.
+            defaults: numbers (n,) of all coordinates, used for those that are not in the state.
         """
-        row = list(still)
-        for place, value in zip(self.order, values, strict=True):
-            row[place] = value
+        row = list(defaults)
+        for index, value in zip(self.order, values, strict=True):
+            row[index] = value
         return row
 
     def values(self, y: Sequence[float]) -> list[float]:
@@ -270,8 +272,8 @@ class StateLayout:
         Returns:
             States (k, y).
         """
-        places = list(self.order)
-        moving = np.column_stack([values[:, places], speeds[:, places]])
+        order = list(self.order)
+        moving = np.column_stack([values[:, order], speeds[:, order]])
         if auxiliary is None:
             return self.restart_auxiliary(moving)
         return np.column_stack([moving, *(auxiliary[path] for path in self.paths)])

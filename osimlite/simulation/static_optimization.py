@@ -125,7 +125,7 @@ class SharedForces:
             out.
         """
         sizes = np.abs(self.lacking[row])
-        worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
+        worst = [index for index in np.argsort(-sizes) if sizes[index] > 0.1 * sizes.max()]
         return join_words(
             [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], max_count=3
         )
@@ -206,16 +206,16 @@ class StaticOptimization:
             rigid_tendons=True,
         )
         # Coordinates that constraints determine need no balance of their own: their forces act on
-        # the free ones by `ways`.
+        # the free ones by `directions`.
         dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
         self._free = [
-            place
-            for place, info in enumerate(mechanism.coordinates)
-            if not (info.locked or info.prescribed is not None or place in dependent)
+            index
+            for index, info in enumerate(mechanism.coordinates)
+            if not (info.locked or info.prescribed is not None or index in dependent)
             and not tree.find(info.path).is_free_to_satisfy_constraints
         ]
         self.names = tuple(item.name for item in self._actuators)
-        self.coordinates = tuple(mechanism.coordinates[place].name for place in self._free)
+        self.coordinates = tuple(mechanism.coordinates[index].name for index in self._free)
         # Fewer unknowns than equations have no solution but by chance.
         if len(self.names) < len(self.coordinates):
             raise ModelError(
@@ -257,9 +257,11 @@ class StaticOptimization:
             SimulationError: the forces cannot be computed at one of the states.
             UnsupportedError: constrained coordinates can move while all others rest.
         """
-        allowed, ways = self._project_accelerations(times, values, speeds, accelerations)
-        needed, pushes, strengths = self._compute_requirements(times, values, speeds, allowed, ways)
-        result, lacking, solved = self._minimize_effort(pushes, needed)
+        allowed, directions = self._project_accelerations(times, values, speeds, accelerations)
+        required_forces, unit_forces, strengths = self._compute_requirements(
+            times, values, speeds, allowed, directions
+        )
+        result, lacking, solved = self._minimize_effort(unit_forces, required_forces)
         result[~solved] = np.nan
         return SharedForces(
             times,
@@ -272,7 +274,7 @@ class StaticOptimization:
         )
 
     def _compute_requirements(
-        self, times: Array, values: Array, speeds: Array, accelerations: Array, ways: Array
+        self, times: Array, values: Array, speeds: Array, accelerations: Array, directions: Array
     ) -> tuple[Array, Array, Array]:
         """Compute the linear equations of the distribution.
 
@@ -284,7 +286,7 @@ class StaticOptimization:
             values: values of all coordinates (t, n).
             speeds: generalized speeds (t, n).
             accelerations: their derivatives (t, n), which the constraints allow.
-            ways: motion D of all coordinates with each free one (t, n, m).
+            directions: motion D of all coordinates with each free one (t, n, m).
 
         Returns:
             Required generalized forces (t, m), contributions of each actuator at a control of 1 (t,
@@ -292,11 +294,15 @@ class StaticOptimization:
         """
         system, order = self._system, list(self._system.order)
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
-        needed, pushes, strengths = system.compute_unit_forces(
+        required_forces, unit_forces, strengths = system.compute_unit_forces(
             moments, np.ascontiguousarray(accelerations[:, order]), self._paths
         )
-        turned = ways[:, order]
-        return (needed[:, None, :] @ turned)[:, 0], pushes @ turned, strengths
+        moving_directions = directions[:, order]
+        return (
+            (required_forces[:, None, :] @ moving_directions)[:, 0],
+            unit_forces @ moving_directions,
+            strengths,
+        )
 
     def _minimize_effort(
         self, columns: Array, needed: Array
@@ -309,8 +315,8 @@ class StaticOptimization:
         fibers = [isinstance(item, Muscle) for item in self._actuators]
         return np.array(
             [
-                1.0 if own else item.optimal_force
-                for own, item in zip(fibers, self._actuators, strict=True)
+                1.0 if has_fibers else item.optimal_force
+                for has_fibers, item in zip(fibers, self._actuators, strict=True)
             ]
         )
 
@@ -344,10 +350,12 @@ class StaticOptimization:
         Returns:
             Forces (t, a), N or N m.
         """
-        allowed, ways = self._project_accelerations(times, values, speeds, accelerations)
-        needed, pushes, _ = self._compute_requirements(times, values, speeds, allowed, ways)
+        allowed, directions = self._project_accelerations(times, values, speeds, accelerations)
+        required_forces, unit_forces, _ = self._compute_requirements(
+            times, values, speeds, allowed, directions
+        )
         # The pseudoinverse gives the solution with the least sum of squares, without bounds.
-        shared = np.linalg.pinv(pushes.transpose(0, 2, 1)) @ needed[:, :, None]
+        shared = np.linalg.pinv(unit_forces.transpose(0, 2, 1)) @ required_forces[:, :, None]
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
@@ -369,27 +377,33 @@ class StaticOptimization:
                 and rows G of the constraint equations (t, c, f); multipliers λ push with -Gᵀ λ.
         """
         order = list(self._system.order)
-        ways = np.broadcast_to(
+        directions = np.broadcast_to(
             np.eye(values.shape[1])[:, order], (len(times), values.shape[1], len(order))
         )
-        needed, pushes, _ = self._compute_requirements(times, values, speeds, accelerations, ways)
+        required_forces, unit_forces, _ = self._compute_requirements(
+            times, values, speeds, accelerations, directions
+        )
         equations, _ = self._compute_equations(times, values, speeds)
         return (
-            needed,
-            (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1),
+            required_forces,
+            (unit_forces / self.optimal_forces[:, None]).transpose(0, 2, 1),
             equations[:, :, order],
         )
 
     @cached_property
     def equation_count(self) -> int:
         """Number of equations of the constraints."""
-        head = int(self._system.structure[MODEL.CONSTRAINED])
-        return int(self._system.structure[head + CONSTRAINED.EQUATIONS]) if head else 0
+        record_offset = int(self._system.structure[MODEL.CONSTRAINED])
+        return (
+            int(self._system.structure[record_offset + CONSTRAINED.EQUATIONS])
+            if record_offset
+            else 0
+        )
 
     @property
     def moving(self) -> list[str]:
         """Names of the coordinates that can move, in the order of `compute_balance`."""
-        return [self.mechanism.coordinates[place].name for place in self._system.order]
+        return [self.mechanism.coordinates[index].name for index in self._system.order]
 
     def compute_path_lengths(
         self, times: Array, values: Array, speeds: Array
@@ -407,10 +421,14 @@ class StaticOptimization:
         system = self._system
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
         result = np.ones((len(times), len(self._paths))), np.zeros((len(times), len(self._paths)))
-        own = [k for k, item in enumerate(self._actuators) if isinstance(item, Muscle)]
+        muscle_columns = [k for k, item in enumerate(self._actuators) if isinstance(item, Muscle)]
         for rows, name in zip(result, ("length", "rate"), strict=True):
-            places = [place for k in own for place in system.find_offsets(self._paths[k], (name,))]
-            rows[:, own] = system.evaluate_moments(moments, places)
+            offsets = [
+                offset
+                for k in muscle_columns
+                for offset in system.find_offsets(self._paths[k], (name,))
+            ]
+            rows[:, muscle_columns] = system.evaluate_moments(moments, offsets)
         return result
 
     def compute_responses(
@@ -428,27 +446,31 @@ class StaticOptimization:
                 generalized force of 1 of each coordinate (n, n).
         """
         system, order = self._system, list(self._system.order)
-        udot, ways = self._project_accelerations(times, values, speeds, np.zeros_like(values))
+        udot, directions = self._project_accelerations(times, values, speeds, np.zeros_like(values))
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
-        needed, pushes, _ = system.compute_unit_forces(
+        required_forces, unit_forces, _ = system.compute_unit_forces(
             moments, np.ascontiguousarray(udot[:, order]), self._paths
         )
         size = len(order)
         # The forces for a unit acceleration of one coordinate, less those for none, are a column of
         # the mass matrix.
-        tried = np.vstack([np.zeros(size), np.eye(size)])
-        taken = system.compute_required_forces(np.repeat(moments, size + 1, axis=0), tried)
-        # With kinematic loops, `ways` has more columns than there are degrees of freedom. An
+        trial_accelerations = np.vstack([np.zeros(size), np.eye(size)])
+        trial_forces = system.compute_required_forces(
+            np.repeat(moments, size + 1, axis=0), trial_accelerations
+        )
+        # With kinematic loops, `directions` has more columns than there are degrees of freedom. An
         # orthonormal basis of their span has the same motions and an invertible mass matrix.
-        turned = find_column_basis(ways[0])
-        mass = turned[order].T @ (taken[1:] - taken[0]).T @ turned[order]
-        right = np.column_stack([-needed[0], (pushes[0] / self.optimal_forces[:, None]).T])
-        found = turned @ np.linalg.solve(mass, np.hstack([turned[order].T @ right, turned.T]))
+        basis = find_column_basis(directions[0])
+        mass = basis[order].T @ (trial_forces[1:] - trial_forces[0]).T @ basis[order]
+        rhs = np.column_stack(
+            [-required_forces[0], (unit_forces[0] / self.optimal_forces[:, None]).T]
+        )
+        responses = basis @ np.linalg.solve(mass, np.hstack([basis[order].T @ rhs, basis.T]))
         count = 1 + len(self.names)
-        return udot[0] + found[:, 0], found[:, 1:count], found[:, count:]
+        return udot[0] + responses[:, 0], responses[:, 1:count], responses[:, count:]
 
     def _project_accelerations(
-        self, times: Array, values: Array, speeds: Array, wanted: Array
+        self, times: Array, values: Array, speeds: Array, target_accelerations: Array
     ) -> tuple[Array, Array]:
         """Return the accelerations that the constraints allow, and the directions of motion.
 
@@ -460,37 +482,39 @@ class StaticOptimization:
             times: times (t,), s.
             values: values of all coordinates (t, n).
             speeds: generalized speeds (t, n).
-            wanted: requested accelerations (t, n); those of the free coordinates are used.
+            target_accelerations: requested accelerations (t, n); those of the free coordinates are used.
 
         Returns:
             Accelerations (t, n), and the motion of all coordinates with each free one (t, n, m).
         """
         size, free = len(self.mechanism.coordinates), self._free
-        ways = np.zeros((len(times), size, len(free)))
-        ways[:, free, range(len(free))] = 1.0
-        udot = wanted.copy()
+        directions = np.zeros((len(times), size, len(free)))
+        directions[:, free, range(len(free))] = 1.0
+        udot = target_accelerations.copy()
         if not self.mechanism.constraints:
-            return udot, ways
-        bound, drifts = self._compute_equations(times, values, speeds)
+            return udot, directions
+        constraint_rows, drifts = self._compute_equations(times, values, speeds)
         # Locked coordinates belong neither to the state nor to the equations of the kernels.
-        still = [place for place in range(size) if place not in self._system.order]
-        unmoved = np.broadcast_to(np.eye(size)[still], (len(times), len(still), size))
-        equations = np.concatenate([bound, unmoved], axis=1)
-        targets = np.hstack([drifts, np.zeros((len(times), len(still)))])
-        held = [place for place in range(size) if place not in free]
+        immobile = [index for index in range(size) if index not in self._system.order]
+        immobile_rows = np.broadcast_to(np.eye(size)[immobile], (len(times), len(immobile), size))
+        equations = np.concatenate([constraint_rows, immobile_rows], axis=1)
+        targets = np.hstack([drifts, np.zeros((len(times), len(immobile)))])
+        dependent = [index for index in range(size) if index not in free]
         # Redundant equations (closed loops) have no inverse.
-        inverse = np.linalg.pinv(equations[:, :, held])
+        inverse = np.linalg.pinv(equations[:, :, dependent])
         # From G_held u_held + G_free u_free = 0: how the held coordinates follow each free one.
-        ways[:, held] = -inverse @ equations[:, :, free]
-        left_over = targets[..., None] - equations[:, :, free] @ wanted[:, free, None]
-        udot[:, held] = (inverse @ left_over)[..., 0]
-        left = np.abs(equations @ ways).max(axis=(1, 2), initial=0.0) > RATE_TOLERANCE
-        is_fixed = np.linalg.matrix_rank(equations[:, :, held]) == len(held)
+        directions[:, dependent] = -inverse @ equations[:, :, free]
+        residuals = targets[..., None] - equations[:, :, free] @ target_accelerations[:, free, None]
+        udot[:, dependent] = (inverse @ residuals)[..., 0]
+        is_violated = np.abs(equations @ directions).max(axis=(1, 2), initial=0.0) > RATE_TOLERANCE
+        is_fixed = np.linalg.matrix_rank(equations[:, :, dependent]) == len(dependent)
         # Frames in which the split does not work are rare (kinematic loops, singular poses) and are
         # solved singly.
-        for row in np.flatnonzero(left | ~is_fixed):
-            udot[row], ways[row] = self._project_one(equations[row], targets[row], wanted[row])
-        return udot, ways
+        for row in np.flatnonzero(is_violated | ~is_fixed):
+            udot[row], directions[row] = self._project_one(
+                equations[row], targets[row], target_accelerations[row]
+            )
+        return udot, directions
 
     def _compute_equations(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
         """Return the constraint equations at the level of accelerations.
@@ -507,22 +531,24 @@ class StaticOptimization:
         system = System(self.mechanism, Forces(()))
         size = values.shape[1]
         order = list(system.order)
-        head = int(system.structure[MODEL.CONSTRAINED])
+        record_offset = int(system.structure[MODEL.CONSTRAINED])
         count = self.equation_count
         equations = np.zeros((len(times), count, size))
         if not count:
             return equations, np.zeros((len(times), 0))
         rows, drifts = (
-            int(system.structure[head + place])
-            for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
+            int(system.structure[record_offset + field])
+            for field in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
         )
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
-        places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
-        looked = system.evaluate_moments(moments, places, STAGE.ACCELERATION)
-        equations[:, :, order] = looked[:, :-count].reshape(len(times), count, -1)
-        return equations, looked[:, -count:]
+        offsets = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
+        results = system.evaluate_moments(moments, offsets, STAGE.ACCELERATION)
+        equations[:, :, order] = results[:, :-count].reshape(len(times), count, -1)
+        return equations, results[:, -count:]
 
-    def _project_one(self, equations: Array, targets: Array, wanted: Array) -> tuple[Array, Array]:
+    def _project_one(
+        self, equations: Array, targets: Array, target_accelerations: Array
+    ) -> tuple[Array, Array]:
         """Project the accelerations at one time onto the constraints by a singular value decomposition.
 
         It is for times at which the constrained coordinates do not follow from the free ones alone.
@@ -530,7 +556,7 @@ class StaticOptimization:
         Args:
             equations: rows G (c, n).
             targets: required values of G udot (c,).
-            wanted: requested accelerations (n,).
+            target_accelerations: requested accelerations (n,).
 
         Returns:
             Accelerations (n,), and the motion of all coordinates with each free one (n, m).
@@ -538,11 +564,15 @@ class StaticOptimization:
         Raises:
             UnsupportedError: some coordinates can move while all free ones rest.
         """
-        _, sizes, turned = np.linalg.svd(equations)
+        _, singular_values, right_vectors = np.linalg.svd(equations)
         # Singular values are sorted, the largest first.
-        rank = int(np.sum(sizes > RATE_TOLERANCE * sizes[0])) if len(sizes) else 0
+        rank = (
+            int(np.sum(singular_values > RATE_TOLERANCE * singular_values[0]))
+            if len(singular_values)
+            else 0
+        )
         # The null space of G: all motions that the constraints allow.
-        directions = turned[rank:].T
+        directions = right_vectors[rank:].T
         free = directions[self._free]
         if np.linalg.matrix_rank(free) < directions.shape[1]:
             names = [
@@ -555,8 +585,10 @@ class StaticOptimization:
             )
         # A particular solution of G udot = target, to which motions of the null space are added.
         start = np.linalg.pinv(equations) @ targets
-        back = np.linalg.pinv(free)
-        return start + directions @ (back @ (wanted - start)[self._free]), directions @ back
+        free_inverse = np.linalg.pinv(free)
+        return start + directions @ (
+            free_inverse @ (target_accelerations - start)[self._free]
+        ), directions @ free_inverse
 
     def report_forces(self, shared: SharedForces, values: Array, speeds: Array) -> StoTable:
         """Return the force records with the distributed actuator forces.
@@ -576,9 +608,13 @@ class StaticOptimization:
         # Other forces than actuators, such as contacts, are computed from the states.
         if not {*owners} <= {*self._paths}:
             rows[:] = system.force_table(shared.times, system.state.pack_rows(values, speeds))
-        places = {path: k for k, path in enumerate(self._paths)}
-        own = [column for column, path in enumerate(owners) if path in places]
-        rows[:, own] = shared.forces[:, [places[owners[column]] for column in own]]
+        actuator_of_path = {path: k for k, path in enumerate(self._paths)}
+        actuator_columns = [
+            column for column, path in enumerate(owners) if path in actuator_of_path
+        ]
+        rows[:, actuator_columns] = shared.forces[
+            :, [actuator_of_path[owners[column]] for column in actuator_columns]
+        ]
         return StoTable(FORCES_TITLE, shared.times, tuple(label_as_opensim(labels)), rows)
 
 
@@ -615,12 +651,12 @@ def minimize_effort(
     code.make_ready(("least_effort",))
     sizes = np.array([0, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
     numbers = np.array([exponent, *bounds.ravel()])
-    given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
+    inputs = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
     result = np.zeros((frames, count + size + 1))
     entry, work = code.get_entry("least_effort"), np.zeros(effort_size(size, count))
     for rows in divide_rows("sharing forces between muscles", frames):
         sizes[0] = rows.stop - rows.start
-        entry(sizes, numbers, given[rows], result[rows], work)
+        entry(sizes, numbers, inputs[rows], result[rows], work)
     return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
 
 
@@ -639,7 +675,7 @@ def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAc
         ModelError: there are no actuators.
     """
     # By identity, as forces may share a name.
-    places = {id(force): number for number, force in enumerate(model.force_set.objects)}
+    force_indices = {id(force): number for number, force in enumerate(model.force_set.objects)}
     result: list[ScalarActuator] = []
     for item in list(model.components(Actuator)):
         if not item.appliesForce:
@@ -654,13 +690,16 @@ def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAc
                 if isinstance(item, Muscle)
                 else getattr(item, "optimal_force", 0.0)
             )
-            other = make_ideal_actuator(item, force)
-            if other is None or id(item) not in places:
+            ideal_actuator = make_ideal_actuator(item, force)
+            if ideal_actuator is None or id(item) not in force_indices:
                 message = f"'{item.name}' ({type(item).__name__}) has a force that is not proportional to its control"
                 raise UnsupportedError(f"{message}; set its appliesForce to false")
             # The control keeps its bounds, so that a muscle still only pulls.
-            other.min_control, other.max_control = item.min_control, item.max_control
-            model.force_set.objects[places[id(item)]] = item = other
+            ideal_actuator.min_control, ideal_actuator.max_control = (
+                item.min_control,
+                item.max_control,
+            )
+            model.force_set.objects[force_indices[id(item)]] = item = ideal_actuator
         result.append(item)
     if not result:
         raise ModelError(f"'{model.name}' has no actuators")

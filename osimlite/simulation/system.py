@@ -47,16 +47,16 @@ class System(StateEvaluator):
         """
         self.compute_applied_forces(t, y)
         result = []
-        for probe, place in zip(self.probes, self._probe_places, strict=True):
+        for probe, item_offset in zip(self.probes, self._probe_places, strict=True):
             # Some probes, such as of momentum, are computed in Python from the links; the others
             # have a kernel.
             if probe.probe_type.measure is not None:
                 result.append(list(probe.probe_type.measure(probe, self, t, y)))
                 continue
             self.program.code.get_entry(probe.probe_type.name)(
-                self.program.ints, self.numbers, self._w, self._y, self._f, place
+                self.program.ints, self.numbers, self._w, self._y, self._f, item_offset
             )
-            first = self.structure[place + ITEM.RECORD]
+            first = self.structure[item_offset + ITEM.RECORD]
             result.append(self._w[first : first + len(probe.reading.labels)].tolist())
         return result
 
@@ -110,37 +110,39 @@ class System(StateEvaluator):
         if not self.columns:
             return result
         copied, sources, computed = self._sort_columns()
-        slices, places = [], list[int](sources)
+        slices, offsets = [], list[int](sources)
         for number, columns in computed:
-            own = []
-            for place, room in self._items[number]:
-                own.append(slice(len(places), len(places) + room))
-                places += range(place, place + room)
-            slices.append((self.forces.elements[number], own, columns))
+            record_slices = []
+            for offset, record_size in self._items[number]:
+                record_slices.append(slice(len(offsets), len(offsets) + record_size))
+                offsets += range(offset, offset + record_size)
+            slices.append((self.forces.elements[number], record_slices, columns))
         # Reports of torques need the origins of the bodies, hence rotation and position of each
         # link.
         links = int(self.structure[MODEL.WORK_LINK])
         size = LINK_WORK.SIZE
-        count = len(places)
+        count = len(offsets)
         for number in range(len(self._links) if computed else 0):
             first = links + size * number
-            places += [
+            offsets += [
                 *range(first, first + 9),
                 *range(first + LINK_WORK.POSITION, first + LINK_WORK.POSITION + 3),
             ]
         # Chunks bound the memory for the work vectors of long motions.
         for start in range(0, len(moments), MOMENTS_PER_CALL):
-            found = self.evaluate_moments(moments[start : start + MOMENTS_PER_CALL], places)
+            values = self.evaluate_moments(moments[start : start + MOMENTS_PER_CALL], offsets)
             rows = result[start : start + MOMENTS_PER_CALL]
-            rows[:, copied] = found[:, : len(copied)]
+            rows[:, copied] = values[:, : len(copied)]
             if not computed:
                 continue
-            origins = self._compute_origins(found[:, count:].reshape(len(found), -1, 12)).tolist()
-            work = found[:, :count].tolist()
-            for element, own, columns in slices:
+            origins = self._compute_origins(values[:, count:].reshape(len(values), -1, 12)).tolist()
+            work = values[:, :count].tolist()
+            for element, record_slices, columns in slices:
                 rows[:, columns] = [
-                    element.report([moment[part] for part in own], known)
-                    for moment, known in zip(work, origins, strict=True)
+                    element.report(
+                        [moment[record_slice] for record_slice in record_slices], body_origins
+                    )
+                    for moment, body_origins in zip(work, origins, strict=True)
                 ]
         return result
 
@@ -155,12 +157,12 @@ class System(StateEvaluator):
         first = 0
         for number, element in enumerate(self.forces.elements):
             columns = slice(first, first := first + len(element.columns))
-            own = element.find_copied_places()
-            if own is None:
+            offsets = element.find_copied_places()
+            if offsets is None:
                 computed.append((number, columns))
-            elif own:
+            elif offsets:
                 copied += range(columns.start, columns.stop)
-                sources += [self._items[number][-1][0] + place for place in own]
+                sources += [self._items[number][-1][0] + offset for offset in offsets]
         return copied, sources, computed
 
     def _compute_origins(self, links: Floats) -> Floats:
@@ -233,10 +235,10 @@ class System(StateEvaluator):
         turning = w[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3]
         v = motion[:, 3:]
         # Inertias are along the axes of the links, so the angular velocities are rotated into them.
-        own = (turning[:, None, :] @ rotations)[:, 0]
+        body_velocities = (turning[:, None, :] @ rotations)[:, 0]
         # Ixx, Iyy, Izz, Ixy, Ixz, Iyz become a symmetric matrix.
         moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
-        spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
+        spin = np.sum(body_velocities * (moments @ body_velocities[:, :, None])[:, :, 0])
         kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
         return kinetic, -float(inertia[:, 0] @ motion[:, :3] @ self.mechanism.gravity)
 
@@ -251,7 +253,10 @@ class System(StateEvaluator):
         """Masses (kg) and mass centres (3,) in ground (m) of the bodies that are fixed to ground."""
         pairs = zip(self.placements, self.mechanism.bodies, strict=True)
         fixed = [(frame, body.mass_properties) for (link, frame), body in pairs if link == GROUND]
-        return [(own.mass, frame[:3, :3] @ own.center + frame[:3, 3]) for frame, own in fixed]
+        return [
+            (mass_properties.mass, frame[:3, :3] @ mass_properties.center + frame[:3, 3])
+            for frame, mass_properties in fixed
+        ]
 
     def evaluate_all_links(self, moments: Moments) -> Floats:
         """Return the link records of the kernels at many states.
@@ -277,17 +282,17 @@ class System(StateEvaluator):
             Link records (k, l, n), without accelerations.
         """
         first, (count, size) = int(self.structure[MODEL.WORK_LINK]), self._links.shape
-        chosen = range(count) if links is None else links
-        places = [first + size * link + number for link in chosen for number in range(size)]
-        return self.evaluate_moments(moments, places, STAGE.VELOCITY).reshape(
-            len(moments), len(chosen), size
+        link_indices = range(count) if links is None else links
+        offsets = [first + size * link + number for link in link_indices for number in range(size)]
+        return self.evaluate_moments(moments, offsets, STAGE.VELOCITY).reshape(
+            len(moments), len(link_indices), size
         )
 
     def read_records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
         """Yield each force element with the records of its items after an evaluation."""
         work = self._w.tolist()
-        for element, items in zip(self.forces.elements, self._items, strict=True):
-            yield element, [work[place : place + room] for place, room in items]
+        for element, records in zip(self.forces.elements, self._items, strict=True):
+            yield element, [work[offset : offset + size] for offset, size in records]
 
     def _get_origin(self, body: int) -> tuple[float, float, float]:
         """Return the origin of a body after an evaluation.
@@ -302,10 +307,10 @@ class System(StateEvaluator):
         x, y, z = frame[:3, 3].tolist()
         if link == GROUND:
             return x, y, z
-        here = self._links[link]
-        place = (
-            here[LINK_WORK.POSITION : LINK_WORK.POSITION + 3]
-            + here[:9].reshape(3, 3) @ frame[:3, 3]
+        link_row = self._links[link]
+        position = (
+            link_row[LINK_WORK.POSITION : LINK_WORK.POSITION + 3]
+            + link_row[:9].reshape(3, 3) @ frame[:3, 3]
         )
-        x, y, z = place.tolist()
+        x, y, z = position.tolist()
         return x, y, z

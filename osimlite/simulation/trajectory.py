@@ -62,10 +62,12 @@ class Trajectory(Tabular):
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
         self.speeds: Array = np.array(speeds, dtype=float).reshape(len(self.times), count)
-        own = [
-            f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")
+        default_paths = [
+            f"{info.path}/{quantity}"
+            for info in mechanism.coordinates
+            for quantity in ("value", "speed")
         ]
-        self.paths = tuple(paths) or (*own, *auxiliary)
+        self.paths = tuple(paths) or (*default_paths, *auxiliary)
         # Auxiliary states get the order in which OpenSim writes them.
         # States that the model does not list come last.
         rank = {path: number for number, path in enumerate(self.paths)}
@@ -164,8 +166,8 @@ class Trajectory(Tabular):
         """Columns (n,) ``kinetic``, ``gravity``, ``stored`` (in contacts and limit springs) and ``total``, in J."""
         assert self._report is not None
         table = np.array(self._report.energies(), dtype=float).reshape(len(self.times), 3)
-        parts = dict(zip(("kinetic", "gravity", "stored"), table.T, strict=True))
-        return {**parts, "total": table.sum(axis=1)}
+        energies = dict(zip(("kinetic", "gravity", "stored"), table.T, strict=True))
+        return {**energies, "total": table.sum(axis=1)}
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -423,9 +425,11 @@ class Movement(Tabular):
             MissingDependency: xarray is not installed.
         """
         xarray = require("xarray", extra="frame", purpose="a data set of xarray")
-        over = {"time": self.times, "coordinate": list(self.coordinates)}
+        coordinates = {"time": self.times, "coordinate": list(self.coordinates)}
         return xarray.Dataset(
-            {"value": (("time", "coordinate"), self.values)}, over, {"model": self.mechanism.name}
+            {"value": (("time", "coordinate"), self.values)},
+            coordinates,
+            {"model": self.mechanism.name},
         )
 
 

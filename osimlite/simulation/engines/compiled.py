@@ -88,7 +88,7 @@ def run_many(
         if len(options.held) != count:
             raise OsimliteError(f"{len(options.held)} controllers are given for {count} runs")
         first, *others = options.held
-        held = first.make_runs(engine, engine.forces.controls, others=others)
+        held = first.make_runs(engine, engine.forces.controls, other_controllers=others)
         # Each run writes its held controls into its own numbers.
         vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
     batch = BatchWorkspace(

@@ -190,7 +190,11 @@ def _override_forces(
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     first, last = (float(time) for time in motion.times[[0, -1]])
     controls = add_controls(
-        simulation.forces.controls, forces, last, start=first, what=f"forces of '{path.name}'"
+        simulation.forces.controls,
+        forces,
+        last,
+        start=first,
+        description=f"forces of '{path.name}'",
     )
     simulation.engine.set_controls(controls)
     pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
