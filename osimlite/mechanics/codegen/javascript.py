@@ -122,19 +122,19 @@ RESERVED = frozenset((
 """Names that a kernel may use, but that mean something else in JavaScript or the runtime."""
 
 
-def write_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) -> str:
+def write_javascript(laws: Sequence[Function], named_functions: Sequence[Function] = ()) -> str:
     """Return kernels, with all functions that they call, as the text of one expression.
 
     The value of the expression is an object with the kernels.
 
     Args:
         laws: kernels that are called by their numbers, from 1 on; the object has them as `laws`.
-        others: kernels that the object has by their names.
+        named_functions: kernels that the object has by their names.
 
     Raises:
         TranslationError: a kernel uses something that has no counterpart in JavaScript.
     """
-    writers, pending = [], dict.fromkeys((*laws, *others))
+    writers, pending = [], dict.fromkeys((*laws, *named_functions))
     while pending:
         writers.append(_write_function(next(iter(pending))))
         pending.update(dict.fromkeys(writers[-1].functions))
@@ -144,7 +144,7 @@ def write_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) 
     records = dict.fromkeys(record for writer in writers for record in writer.records)
     texts = "\n".join((*map(_write_record, records), *(writer.written for writer in writers)))
     numbered = ", ".join(("null", *map(name_of, laws)))
-    named = "".join(f", {function.__name__}: {name_of(function)}" for function in others)
+    named = "".join(f", {function.__name__}: {name_of(function)}" for function in named_functions)
     return f"(() => {{\n{RUNTIME}\n{texts}\nconst laws = [{numbered}];\nreturn {{ laws{named} }};\n}})()"
 
 
@@ -195,14 +195,14 @@ class _JavaScriptWriter(Kernel):
     def write(self) -> str:
         """Return the text of the function."""
         lines = self.block(self.body)
-        names = [*map(_local, self.own), *(f"${k}" for k in range(self._temporaries))]
+        names = [*map(_escape_name, self.own), *(f"${k}" for k in range(self._temporaries))]
         declared = [f"let {', '.join(names)};"] if names else []
         defaults = self.function.__defaults__ or ()
-        parameters = [_local(name) for name in self.given]
+        parameters = [_escape_name(name) for name in self.given]
         for k, value in enumerate(reversed(defaults), 1):
-            parameters[-k] += f" = {_number(value)}"
-        head = f"function {self.name}({', '.join(parameters)}) {{"
-        return "\n".join((head, *declared, *lines, "}"))
+            parameters[-k] += f" = {_format_number(value)}"
+        header = f"function {self.name}({', '.join(parameters)}) {{"
+        return "\n".join((header, *declared, *lines, "}"))
 
     # ------------------------------------------------------------------------------------------- statements
     def block(self, body: Iterable[ast.stmt]) -> list[str]:
@@ -217,8 +217,10 @@ class _JavaScriptWriter(Kernel):
             case ast.AnnAssign(target=target, value=ast.expr() as value):
                 return self.assign([target], value)
             case ast.AugAssign(target=target, op=op, value=value):
-                place = self.expression(target)
-                return [f"{place} = {self.operation(place, op, self.expression(value), node)};"]
+                target_text = self.expression(target)
+                return [
+                    f"{target_text} = {self.operation(target_text, op, self.expression(value), node)};"
+                ]
             case ast.Return(value=value):
                 return [f"return {self.expression(value)};" if value else "return;"]
             case ast.Expr(value=ast.Constant()) | ast.Pass():
@@ -234,7 +236,7 @@ class _JavaScriptWriter(Kernel):
                 # As in Python, assignments to the loop variable in the body do not affect the next
                 # round.
                 counter = self.temporary()
-                store = f"{_local(name)} = {counter};"
+                store = f"{_escape_name(name)} = {counter};"
                 return [f"for ({self.loop(counter, iterated)}) {{", store, *self.block(body), "}"]
             case ast.Break():
                 return ["break;"]
@@ -253,19 +255,22 @@ class _JavaScriptWriter(Kernel):
             return [f"{self.expression(targets[0])} = {self.expression(value)};"]
         if isinstance(value, ast.Tuple) and all(map(_has_separate_items, (value, *targets))):
             # All items are computed before any of them is stored.
-            held = [self.temporary() for _ in value.elts]
+            temporaries = [self.temporary() for _ in value.elts]
             lines = [
-                f"{name} = {self.expression(part)};"
-                for name, part in zip(held, value.elts, strict=True)
+                f"{name} = {self.expression(element)};"
+                for name, element in zip(temporaries, value.elts, strict=True)
             ]
-            return lines + [line for target in targets for line in self.store(target, held)]
+            return lines + [line for target in targets for line in self.store(target, temporaries)]
         # JavaScript evaluates the target before the value, so the value gets a variable first.
-        whole = self.temporary()
-        lines = [f"{whole} = {self.expression(value)};"]
+        temporary = self.temporary()
+        lines = [f"{temporary} = {self.expression(value)};"]
         for target in targets:
-            parts = len(target.elts) if isinstance(target, ast.Tuple) else 0
+            element_count = len(target.elts) if isinstance(target, ast.Tuple) else 0
             lines += self.store(
-                target, [f"{whole}[{k}]" for k in range(parts)] if parts else [whole]
+                target,
+                [f"{temporary}[{k}]" for k in range(element_count)]
+                if element_count
+                else [temporary],
             )
         return lines
 
@@ -278,8 +283,8 @@ class _JavaScriptWriter(Kernel):
         """
         targets = target.elts if isinstance(target, ast.Tuple) else [target]
         return [
-            f"{self.expression(part)} = {value};"
-            for part, value in zip(targets, values, strict=True)
+            f"{self.expression(element)} = {value};"
+            for element, value in zip(targets, values, strict=True)
         ]
 
     def temporary(self) -> str:
@@ -300,29 +305,31 @@ class _JavaScriptWriter(Kernel):
                     iterated, "a loop is over range() or over a tuple that is written out"
                 )
             return f"{name} of {self.expression(iterated)}"
-        bounds = [self.expression(part) for part in iterated.args]
+        bounds = [self.expression(bound) for bound in iterated.args]
         first, stop, step = ["0", *bounds, "1"] if len(bounds) == 1 else [*bounds, "1"][:3]
         # Python evaluates the end once, before the loop.
         end = self.temporary()
         if step.removeprefix("(-").rstrip(")").isdigit():
             sign = ">" if step.startswith("(-") else "<"
             return f"{name} = {first}, {end} = {stop}; {name} {sign} {end}; {name} += {step}"
-        held = self.temporary()
-        test = f"{held} > 0 ? {name} < {end} : {name} > {end}"
-        return f"{name} = {first}, {end} = {stop}, {held} = {step}; {test}; {name} += {held}"
+        step_name = self.temporary()
+        test = f"{step_name} > 0 ? {name} < {end} : {name} > {end}"
+        return (
+            f"{name} = {first}, {end} = {stop}, {step_name} = {step}; {test}; {name} += {step_name}"
+        )
 
     # ------------------------------------------------------------------------------------------ expressions
     def expression(self, node: ast.expr) -> str:
         """Return the text of an expression."""
         match node:
             case ast.Constant(value=bool() | int() | float() as value):
-                return _number(value)
+                return _format_number(value)
             case ast.Attribute(value=owner, attr=name):
                 if not self._is_local(owner) and isinstance(self.value(owner), Record | ModuleType):
                     return self.constant(node)
                 return f"{self.expression(owner)}.${name}"
             case ast.Name(id=name):
-                return _local(name) if name in self._locals else self.constant(node)
+                return _escape_name(name) if name in self._locals else self.constant(node)
             case ast.BinOp(left=left, op=op, right=right):
                 return self.operation(self.expression(left), op, self.expression(right), node)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
@@ -350,7 +357,7 @@ class _JavaScriptWriter(Kernel):
             case ast.Call(func=function, args=arguments, keywords=[]):
                 called = self.value(function) if not self._is_local(function) else None
                 return self.call(
-                    called, function, [self.expression(part) for part in arguments], node
+                    called, function, [self.expression(argument) for argument in arguments], node
                 )
         raise self.refuse(node)
 
@@ -413,32 +420,32 @@ class _JavaScriptWriter(Kernel):
         first, *others = values
         if not others:
             return self.expression(first)
-        held, rest = self.temporary(), self.either(op, others)
-        test = f"({held} = {self.expression(first)}) != 0"
+        temporary, remainder = self.temporary(), self.either(op, others)
+        test = f"({temporary} = {self.expression(first)}) != 0"
         return (
-            f"({test} ? {rest} : {held})"
+            f"({test} ? {remainder} : {temporary})"
             if isinstance(op, ast.And)
-            else f"({test} ? {held} : {rest})"
+            else f"({test} ? {temporary} : {remainder})"
         )
 
     def compare(self, node: ast.Compare) -> str:
         """Return the text of a chain of comparisons, whose operands are evaluated once."""
-        before, tests = self.expression(node.left), []
+        left, tests = self.expression(node.left), []
         for k, (op, operand) in enumerate(zip(node.ops, node.comparators, strict=True)):
             if isinstance(op, ast.In | ast.NotIn) and isinstance(operand, ast.Tuple):
                 if len(node.ops) > 1:
                     raise self.refuse(node)
-                found = f"{self.expression(operand)}.includes(Number({before}))"
-                return found if isinstance(op, ast.In) else f"(!{found})"
+                membership = f"{self.expression(operand)}.includes(Number({left}))"
+                return membership if isinstance(op, ast.In) else f"(!{membership})"
             if type(op) not in COMPARISONS:
                 raise self.refuse(node)
-            after = text = self.expression(operand)
+            right = text = self.expression(operand)
             # A middle operand is part of two comparisons but evaluated once.
             if k < len(node.ops) - 1 and not isinstance(operand, ast.Name | ast.Constant):
-                after = self.temporary()
-                text = f"({after} = {text})"
-            tests.append(f"{before} {COMPARISONS[type(op)]} {text}")
-            before = after
+                right = self.temporary()
+                text = f"({right} = {text})"
+            tests.append(f"{left} {COMPARISONS[type(op)]} {text}")
+            left = right
         return f"({' && '.join(tests)})"
 
     def call(
@@ -477,7 +484,7 @@ class _JavaScriptWriter(Kernel):
         is_complete = any(text.startswith("...") for text in arguments)
         missing = () if is_complete else record._fields[len(arguments) :]
         defaults = [
-            _number(record._field_defaults[name])
+            _format_number(record._field_defaults[name])
             for name in missing
             if name in record._field_defaults
         ]
@@ -494,25 +501,25 @@ class _JavaScriptWriter(Kernel):
             self.functions.append(value)
             return name_of(value)
         if isinstance(value, tuple | int | float):
-            return _number(value)
+            return _format_number(value)
         raise self.refuse(node)
 
 
 def _has_separate_items(node: ast.expr) -> bool:
     return isinstance(node, ast.Tuple) and not any(
-        isinstance(part, ast.Starred) for part in node.elts
+        isinstance(element, ast.Starred) for element in node.elts
     )
 
 
-def _local(name: str) -> str:
+def _escape_name(name: str) -> str:
     """Return a name with a trailing underscore if it means something else in JavaScript."""
     return f"{name}_" if name in RESERVED else name
 
 
-def _number(value: Any) -> str:
+def _format_number(value: Any) -> str:
     """Return the text of a constant, or of a tuple of constants."""
     if isinstance(value, tuple):
-        return f"[{', '.join(map(_number, value))}]"
+        return f"[{', '.join(map(_format_number, value))}]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if math.isnan(value):

@@ -35,7 +35,7 @@ def processor_features() -> frozenset[str]:
     if system == "linux":
         return _read_cpuinfo("/proc/cpuinfo")
     if system == "darwin" and machine_name() == "x86_64":
-        return X86_64_V3 if _sysctl(b"hw.optional.avx2_0") else frozenset()
+        return X86_64_V3 if _query_sysctl(b"hw.optional.avx2_0") else frozenset()
     if system == "win32" and machine_name() == "x86_64":
         has_avx2 = getattr(ctypes, "windll").kernel32.IsProcessorFeaturePresent(WINDOWS_AVX2)  # noqa: B009
         return X86_64_V3 if has_avx2 else frozenset()
@@ -52,14 +52,14 @@ def _read_cpuinfo(path: str) -> frozenset[str]:
     try:
         with open(path, encoding="ascii", errors="replace") as stream:
             # The list repeats for each core, and the first one is enough.
-            head = stream.read(8192)
+            text = stream.read(8192)
     except OSError:
         return frozenset()
-    match = re.search(r"^(?:flags|Features)\s*:(.*)$", head, re.MULTILINE)
+    match = re.search(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)
     return frozenset(match[1].split()) if match else frozenset()
 
 
-def _sysctl(name: bytes) -> bool:
+def _query_sysctl(name: bytes) -> bool:
     """Return whether macOS reports a feature of the processor."""
     value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
     system = ctypes.CDLL(None)

@@ -118,10 +118,11 @@ def find_tree(function: Function) -> ast.FunctionDef:
     if file not in _parsed or _parsed[file][0] is not lines:
         trees = list_functions(parse_module("".join(lines)))
         starts = [
-            min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees
+            min([tree.lineno, *(decorator.lineno for decorator in tree.decorator_list)])
+            for tree in trees
         ]
-        found = {(start, tree.name): tree for start, tree in zip(starts, trees, strict=True)}
-        _parsed[file] = lines, found
+        tree_of_key = {(start, tree.name): tree for start, tree in zip(starts, trees, strict=True)}
+        _parsed[file] = lines, tree_of_key
     key = function.__code__.co_firstlineno, function.__code__.co_name
     if key not in _parsed[file][1]:
         raise OSError(
@@ -137,8 +138,8 @@ def list_functions(tree: ast.AST) -> list[ast.FunctionDef]:
         node = pending.pop()
         if isinstance(node, ast.FunctionDef):
             result.append(node)
-        for part in ("body", "orelse", "handlers", "finalbody", "cases"):
-            inner = getattr(node, part, ())
+        for field in ("body", "orelse", "handlers", "finalbody", "cases"):
+            inner = getattr(node, field, ())
             pending += inner if isinstance(inner, list) else ()
     return result
 

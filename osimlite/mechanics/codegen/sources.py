@@ -35,8 +35,11 @@ def compute_digest(function: Any, settings: str = "") -> str:
     Returns:
         The first 16 hexadecimal digits of a SHA-256.
     """
-    parts = [settings, *(_describe_function(part) for part in collect_functions(function))]
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+    descriptions = [
+        settings,
+        *(_describe_function(called) for called in collect_functions(function)),
+    ]
+    return hashlib.sha256(repr(descriptions).encode()).hexdigest()[:16]
 
 
 def collect_functions(function: Any) -> Iterator[FunctionType]:
@@ -48,12 +51,12 @@ def collect_functions(function: Any) -> Iterator[FunctionType]:
     """
     pending, seen = [function], set()
     while pending:
-        part = pending.pop()
-        if part in seen:
+        current = pending.pop()
+        if current in seen:
             continue
-        seen.add(part)
-        yield part
-        pending += [value for _, value in _global_values(part) if _is_local(value)]
+        seen.add(current)
+        yield current
+        pending += [value for _, value in _global_values(current) if _is_local(value)]
 
 
 def _describe_function(function: FunctionType) -> tuple[Any, ...]:

@@ -95,9 +95,9 @@ class Compiler(NamedTuple):
         elif target == NATIVE and self.system != "darwin":
             # On Arm, -mcpu is what g++ and clang both know.
             flags.append("-march=native" if self.machine == "x86_64" else "-mcpu=native")
-        return [*flags, *self._architectures()]
+        return [*flags, *self._list_architectures()]
 
-    def _architectures(self) -> list[str]:
+    def _list_architectures(self) -> list[str]:
         """Return the options that Python's build tools request on macOS, for universal binaries."""
         return shlex.split(os.environ.get("ARCHFLAGS", "")) if self.system == "darwin" else []
 
@@ -114,7 +114,7 @@ class Compiler(NamedTuple):
         """
         # Relative names, since the names of files become part of the code.
         flags = self.flags(target)
-        self._run([*flags, "-c", text.name, "-o", str(result.resolve())], text.parent)
+        self._run_compiler([*flags, "-c", text.name, "-o", str(result.resolve())], text.parent)
 
     def link(self, objects: Sequence[Path], result: Path) -> None:
         """Link object files to a shared library.
@@ -126,7 +126,7 @@ class Compiler(NamedTuple):
         Raises:
             CompilationError: the linker failed.
         """
-        flags = ["-shared", *self._architectures()]
+        flags = ["-shared", *self._list_architectures()]
         if self.system == "linux":
             flags += ["-Wl,--as-needed", "-s"]
         elif self.system == "win32":
@@ -141,9 +141,9 @@ class Compiler(NamedTuple):
             flags.append("-nostdlib++")
         folder = objects[0].parent
         names = [os.path.relpath(item, folder) for item in objects]
-        self._run([*flags, *names, "-o", str(result.resolve())], folder)
+        self._run_compiler([*flags, *names, "-o", str(result.resolve())], folder)
 
-    def _run(self, arguments: Sequence[str], folder: Path) -> None:
+    def _run_compiler(self, arguments: Sequence[str], folder: Path) -> None:
         import subprocess
 
         command = [*self.command, *arguments]
@@ -167,19 +167,19 @@ def find_compiler() -> Compiler | None:
     """
     import shutil
 
-    chosen = os.environ.get("CXX")
-    if chosen:
-        return _examine(tuple(shlex.split(chosen, posix=os.name != "nt")))
+    command = os.environ.get("CXX")
+    if command:
+        return _examine_compiler(tuple(shlex.split(command, posix=os.name != "nt")))
     if sys.platform == "darwin" and not _has_developer_tools():
         return None
     for program in PROGRAMS:
         path = shutil.which(program)
         # A program in the current folder has not been installed, and is not run.
         if path is not None and os.path.isabs(path):
-            more = ("--driver-mode=g++",) if program == "clang-cl" else ()
-            found = _examine((path, *more))
-            if found is not None:
-                return found
+            options = ("--driver-mode=g++",) if program == "clang-cl" else ()
+            compiler = _examine_compiler((path, *options))
+            if compiler is not None:
+                return compiler
     return None
 
 
@@ -203,7 +203,7 @@ def library_suffix(system: str = sys.platform) -> str:
     return {"win32": ".dll", "darwin": ".dylib"}.get(system, ".so")
 
 
-def _examine(command: tuple[str, ...]) -> Compiler | None:
+def _examine_compiler(command: tuple[str, ...]) -> Compiler | None:
     """Return the compiler that a command starts, or None if it does not run or is unknown."""
     import subprocess
 

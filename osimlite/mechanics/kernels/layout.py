@@ -34,7 +34,7 @@ class Record(type):
         Raises:
             TypeError: a field is missing, or an unknown one is given.
         """
-        names = _names(cls)
+        names = _list_fields(cls)
         if len(values) != len(names) or not values.keys() >= {*names}:
             raise TypeError(
                 f"{cls.__name__} has the fields {', '.join(names)}; got {', '.join(values)}"
@@ -43,7 +43,7 @@ class Record(type):
 
 
 @cache
-def _names(record: Record) -> tuple[str, ...]:
+def _list_fields(record: Record) -> tuple[str, ...]:
     """Return the names of the fields of a record, sorted by their offsets."""
     numbers = {name: number for name, number in vars(record).items() if name.isupper()}
     end = numbers["SIZE" if "SIZE" in numbers else "OWN"]

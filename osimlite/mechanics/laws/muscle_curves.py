@@ -50,11 +50,11 @@ def active_force_length(
     Raises:
         ValueError: there is no such curve.
     """
-    _require(
+    _require_condition(
         shortest >= 0.0 and min(transition - shortest, 1.0 - transition, longest - 1.0) > NEAREST,
         "its min_norm_active_fiber_length, transition_norm_fiber_length, 1, max_norm_active_fiber_length do not rise",
     )
-    _require(least >= 0.0, "its minimum_value is negative")
+    _require_condition(least >= 0.0, "its minimum_value is negative")
     _require_below(slope, (1.0 - least) / (1.0 - transition), "shallow_ascending_slope")
     # OpenSim's constants: the plateau is 0.05 to each side of the optimal length, and the curve is
     # steepest halfway between the smallest active length and the transition.
@@ -109,19 +109,21 @@ def force_velocity(
         ValueError: there is no such curve.
     """
     # The conditions are OpenSim's; outside them its curve has no corner or does not rise.
-    _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
+    _require_condition(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
     _require_below(concentric_end, concentric_near, "concentric_slope_at_vmax")
     # OpenSim accepts a slope of 1 for this curve, but not for the inverse one.
-    _require(
+    _require_condition(
         concentric_near < 1.0 or (concentric_near == 1.0 and not inverse),
         "its concentric_slope_near_vmax is not less than 1",
     )
-    _require(isometric > 1.0, "its isometric_slope is not above 1")
-    _require(
+    _require_condition(isometric > 1.0, "its isometric_slope is not above 1")
+    _require_condition(
         0.0 <= eccentric_end <= eccentric_near,
         "its eccentric_slope_at_vmax is not from 0 to the slope near vmax",
     )
-    _require(eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}")
+    _require_condition(
+        eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}"
+    )
     _require_below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
     # OpenSim places the corners near the maximum velocities at 90 % of them; each point lies on a
     # line with the mean of both slopes.
@@ -168,7 +170,7 @@ def fiber_force_length(
     Raises:
         ValueError: there is no such curve.
     """
-    _require(
+    _require_condition(
         one > zero,
         f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}",
     )
@@ -209,11 +211,11 @@ def tendon_force_length(
     Raises:
         ValueError: there is no such curve.
     """
-    _require(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
+    _require_condition(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
     stiffness, toe, curviness = _complete_properties(
         (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness_at_one_norm_force"
     )
-    _require(0.0 < toe < 1.0, "its norm_force_at_toe_end is not between 0 and 1")
+    _require_condition(0.0 < toe < 1.0, "its norm_force_at_toe_end is not between 0 and 1")
     _require_above(stiffness, 1.0 / one, "stiffness_at_one_norm_force")
     # The linear region begins where its line has the force `toe`.
     end = (toe - 1.0) / stiffness + 1.0 + one
@@ -244,11 +246,11 @@ def fiber_compressive_force_length(
     Raises:
         ValueError: there is no such curve.
     """
-    _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
+    _require_condition(zero > 0.0, "its norm_length_at_zero_force is not positive")
     stiffness, curviness = _complete_properties(
         (stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length"
     )
-    _require(
+    _require_condition(
         stiffness < -1.0 / zero, f"its stiffness_at_zero_length is not less than {-1.0 / zero:.4g}"
     )
     return make_curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
@@ -271,11 +273,11 @@ def fiber_compressive_force_cos_pennation(
         ValueError: there is no such curve.
     """
     zero = cos(radians(angle))
-    _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
+    _require_condition(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
     stiffness, curviness = _complete_properties(
         (stiffness, curviness), (-2.0 / zero, 0.1), "stiffness_at_perpendicular"
     )
-    _require(
+    _require_condition(
         # The curve must bend upwards: steeper at its upper end than the straight line.
         stiffness < -1.0 / zero,
         f"its stiffness_at_perpendicular is not less than {-1.0 / zero:.4g}",
@@ -283,17 +285,17 @@ def fiber_compressive_force_cos_pennation(
     return make_curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
-def _require(holds: bool, otherwise: str) -> None:
+def _require_condition(holds: bool, otherwise: str) -> None:
     if not holds:
         raise ValueError(otherwise)
 
 
 def _require_below(slope: float, limit: float, name: str) -> None:
-    _require(0.0 <= slope < limit, f"its {name} is not from 0 to less than {limit:.4g}")
+    _require_condition(0.0 <= slope < limit, f"its {name} is not from 0 to less than {limit:.4g}")
 
 
 def _require_above(slope: float, limit: float, name: str) -> None:
-    _require(slope > limit, f"its {name} is not above {limit:.4g}")
+    _require_condition(slope > limit, f"its {name} is not above {limit:.4g}")
 
 
 def _complete_properties(
@@ -310,7 +312,7 @@ def _complete_properties(
         ValueError: some are omitted and others are not, which OpenSim does not accept.
     """
     result = [x for x in given if x is not None]
-    _require(
+    _require_condition(
         len(result) in (0, len(usual)),
         f"its {first} and what follows it are neither all given nor all left out",
     )

@@ -43,6 +43,8 @@ class ArcPoint(SmoothFunction):
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Return the value, the gradient (2,) and the Hessian (2, 2) at the two angles (rad)."""
-        one, two = (float(own + start) for own, start in zip(arguments, self.neutral, strict=True))
-        value, a, b, aa, ab, bb = evaluate_arc(make_floats(self.table), one, two)
+        first_angle, second_angle = (
+            float(angle + start) for angle, start in zip(arguments, self.neutral, strict=True)
+        )
+        value, a, b, aa, ab, bb = evaluate_arc(make_floats(self.table), first_angle, second_angle)
         return value, [a, b], [[aa, ab], [ab, bb]]

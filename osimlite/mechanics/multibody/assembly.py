@@ -56,7 +56,9 @@ class UnmetConstraintsError(SimulationError):
         )
 
 
-def assemble_pose(mechanism: Mechanism, q: Array, time: float, kept: Collection[int] = ()) -> Array:
+def assemble_pose(
+    mechanism: Mechanism, q: Array, time: float, fixed: Collection[int] = ()
+) -> Array:
     """Return the coordinate values (n,) nearest to a pose that fulfil the constraints.
 
     Where no pose within the ranges of the clamped coordinates fulfils the constraints, the ranges
@@ -66,39 +68,39 @@ def assemble_pose(mechanism: Mechanism, q: Array, time: float, kept: Collection[
         mechanism: mechanism.
         q: pose to start from (n,).
         time: time of prescribed coordinates (s).
-        kept: indices of coordinates that keep their values, as locked ones do.
+        fixed: indices of coordinates that keep their values, as locked ones do.
 
     Raises:
         SimulationError: no pose near `q` fulfils the constraints.
     """
     infos = mechanism.coordinates
-    held = {
-        place: float(q[place]) for place, info in enumerate(infos) if info.locked or place in kept
+    fixed_values = {
+        index: float(q[index]) for index, info in enumerate(infos) if info.locked or index in fixed
     }
     unclamped: Array | None = None
     while True:
         # First without ranges: if that fails, no range can help.
         try:
-            result = _find_nearest_pose(mechanism, q, time, held)
+            result = _find_nearest_pose(mechanism, q, time, fixed_values)
         except SimulationError:
             if unclamped is None:
                 raise
             # OpenSim logs an error, relaxes the constraints, and its integrator then projects onto
             # them without ranges.
             return unclamped
-        outside = {
-            place: float(np.clip(result[place], *mechanism.coordinates[place].range))
-            for place in find_unclamped(mechanism, result)
-            if place not in held
+        beyond_range = {
+            index: float(np.clip(result[index], *mechanism.coordinates[index].range))
+            for index in find_unclamped(mechanism, result)
+            if index not in fixed_values
         }
-        if not outside:
+        if not beyond_range:
             return result
         if unclamped is None:
             unclamped = result
         # Fix the coordinate that leaves its range furthest at the end of it; then the others may
         # fit.
-        worst = max(outside, key=lambda place: abs(outside[place] - result[place]))
-        held[worst] = outside[worst]
+        worst = max(beyond_range, key=lambda index: abs(beyond_range[index] - result[index]))
+        fixed_values[worst] = beyond_range[worst]
 
 
 def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
@@ -134,18 +136,18 @@ def project_speeds(state: MechanismKinematics, kept: Collection[int] = ()) -> Ar
     constraints = state.mechanism.constraints
     if not constraints:
         return state.u
-    rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
+    rows, rhs = stack_equations([item.velocity_equations(state) for item in constraints])
     scales = np.maximum(np.abs(state.u), 1.0)
     # A scale of 0 takes the speed out of the unknowns.
     scales[list(kept)] = 0.0
-    missing = wanted - rows @ state.u
+    missing = rhs - rows @ state.u
     # In the scaled unknowns the shortest solution is Simbody's weighted one.
     change, _ = solve_with_null_space(rows * scales, missing)
     u: Array = state.u + scales * change
-    if kept and np.abs(rows @ u - wanted).max(initial=0.0) > 1e-9 * (
+    if kept and np.abs(rows @ u - rhs).max(initial=0.0) > 1e-9 * (
         1.0 + np.abs(missing).max(initial=0.0)
     ):
-        names = [state.mechanism.coordinates[place].name for place in kept]
+        names = [state.mechanism.coordinates[index].name for index in kept]
         raise SimulationError(
             f"the constraints of '{state.mechanism.name}' do not allow the speeds given for {join_words(names)}; "
             "leave some of them out"
@@ -154,17 +156,17 @@ def project_speeds(state: MechanismKinematics, kept: Collection[int] = ()) -> Ar
 
 
 def _find_nearest_pose(
-    mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]
+    mechanism: Mechanism, target: Array, time: float, fixed_values: Mapping[int, float]
 ) -> Array:
     """Return the nearest pose with some coordinates fixed, whatever their ranges.
 
     Args:
         mechanism: mechanism.
-        wanted: pose to start from (n,).
+        target: pose to start from (n,).
         time: time of prescribed coordinates (s).
-        held: value of each fixed coordinate, by its index.
+        fixed_values: value of each fixed coordinate, by its index.
     """
-    search = _Search(mechanism, wanted, time, held)
+    search = _Search(mechanism, target, time, fixed_values)
     q = search.restore_pose(search.start)
     if search.assembled:
         return q
@@ -175,10 +177,10 @@ def _find_nearest_pose(
         step = search.compute_step(q)
         if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
             return q
-        before, size = search.compute_cost(q), 1.0
+        cost, size = search.compute_cost(q), 1.0
         while True:
             trial = search.restore_pose(q + size * step)
-            if search.compute_cost(trial) < before:
+            if search.compute_cost(trial) < cost:
                 break
             size *= 0.5
             if size < 1e-3:
@@ -203,13 +205,13 @@ class _Search:
     """
 
     def __init__(
-        self, mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]
+        self, mechanism: Mechanism, target: Array, time: float, fixed_values: Mapping[int, float]
     ) -> None:
-        self.mechanism, self.wanted, self.time = mechanism, wanted, time
+        self.mechanism, self.wanted, self.time = mechanism, target, time
         self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
-        self.free = [index for index in range(len(wanted)) if index not in held]
-        self.start = wanted.copy()
-        self.start[list(held)] = list(held.values())
+        self.free = [index for index in range(len(target)) if index not in fixed_values]
+        self.start = target.copy()
+        self.start[list(fixed_values)] = list(fixed_values.values())
         self.tolerance = tolerance_of(mechanism)
         # OpenSim leaves an assembled pose unchanged; its integrator then projects it by the
         # shortest way onto the constraints.
@@ -242,19 +244,23 @@ class _Search:
         multipliers = np.asarray(
             np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64
         )
-        _, along = solve_with_null_space(rows, np.zeros(len(rows)))
-        curvature = along.T @ (weights[:, None] * along)
+        _, null_space = solve_with_null_space(rows, np.zeros(len(rows)))
+        curvature = null_space.T @ (weights[:, None] * null_space)
         if np.abs(multipliers).max(initial=0.0) > 1e-12:
-            bends = [self._differentiate_pull(q, direction, multipliers) for direction in along.T]
+            derivatives = [
+                self._differentiate_pull(q, direction, multipliers) for direction in null_space.T
+            ]
             # Second derivatives of the constraints times their multipliers, by finite differences.
-            curvature = curvature + along.T @ np.array(bends).T.reshape(len(self.free), -1)
+            curvature = curvature + null_space.T @ np.array(derivatives).T.reshape(
+                len(self.free), -1
+            )
         values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
-        slopes = np.asarray(vectors.T @ (along.T @ gradient), dtype=np.float64)
+        slopes = np.asarray(vectors.T @ (null_space.T @ gradient), dtype=np.float64)
         # Where the surface bends away (negative curvature) the step leads downhill; directions
         # without curvature do not change the cost, and are left alone.
         flat = np.abs(values) < 1e-7
         lengths: Array = np.where(flat, 0.0, slopes / np.where(flat, 1.0, np.abs(values)))
-        return self._spread_over_coordinates(-(along @ (vectors @ lengths)))
+        return self._spread_over_coordinates(-(null_space @ (vectors @ lengths)))
 
     def restore_pose(self, q: Array) -> Array:
         """Return the pose on the surface that Newton's method with shortest steps reaches.
@@ -275,13 +281,15 @@ class _Search:
             size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
             trial = q + size * self._spread_over_coordinates(step)
             state = self._compute_state(trial)
-            new = _compute_position_errors(state)
+            new_errors = _compute_position_errors(state)
             # Within the tolerance, continue only while errors at least halve; then rounding is
             # reached.
-            near = np.abs(errors).max(initial=0.0) <= self.tolerance
-            if near and np.abs(new).max(initial=0.0) >= 0.5 * np.abs(errors).max(initial=0.0):
+            is_within_tolerance = np.abs(errors).max(initial=0.0) <= self.tolerance
+            if is_within_tolerance and np.abs(new_errors).max(initial=0.0) >= 0.5 * np.abs(
+                errors
+            ).max(initial=0.0):
                 break
-            q, errors = trial, new
+            q, errors = trial, new_errors
         if np.abs(errors).max(initial=0.0) <= self.tolerance:
             return q
         state = self._compute_state(q)
@@ -316,8 +324,8 @@ class _Search:
         """
         change = 1e-6 * self._spread_over_coordinates(direction)
         ahead, behind = (
-            self._compute_rows(self._compute_state(place)).T @ multipliers
-            for place in (q + change, q - change)
+            self._compute_rows(self._compute_state(pose)).T @ multipliers
+            for pose in (q + change, q - change)
         )
         return (ahead - behind) / 2e-6
 
@@ -328,8 +336,8 @@ class _Search:
 
 
 def _compute_position_errors(state: MechanismKinematics) -> Array:
-    parts = [item.position_errors(state) for item in state.mechanism.constraints]
-    return np.concatenate([np.zeros(0), *parts])
+    errors = [item.position_errors(state) for item in state.mechanism.constraints]
+    return np.concatenate([np.zeros(0), *errors])
 
 
 def _compute_constraint_matrix(state: MechanismKinematics) -> Array:

@@ -128,7 +128,7 @@ class _Builder:
         """
         # Refuse unknown classes before anything else, with their own messages.
         for component in self.tree.components:
-            self._refuse(component)
+            self._refuse_unknown(component)
         for component in self.tree.components:
             if isinstance(component, Body):
                 self.bodies[self.placements.path(component)] = component
@@ -140,7 +140,7 @@ class _Builder:
         ]
         bodies = self._build_bodies(edges)
         ground = self.placements.path(self.model.ground)
-        index = {body.path: place for place, body in enumerate(bodies)} | {ground: GROUND}
+        index = {body.path: number for number, body in enumerate(bodies)} | {ground: GROUND}
         self._build_constraints(index)
         placed = self.placements
         for path, (base, _) in placed.found.items():
@@ -169,7 +169,7 @@ class _Builder:
             self.model.assembly_accuracy,
         )
 
-    def _refuse(self, component: Component) -> None:
+    def _refuse_unknown(self, component: Component) -> None:
         """Raise an error for an unknown component that would move the bodies differently."""
         if not isinstance(component, Unknown):
             return
@@ -204,15 +204,15 @@ class _Builder:
         middle = {
             motion.coordinates[1] for motion in motions if isinstance(motion, SphericalMotion)
         }
-        kinds = motion_types(motions, count)
-        for index, (coordinate, motion_type) in enumerate(zip(coordinates, kinds, strict=True)):
-            own_path = self.placements.path(coordinate)
+        types = motion_types(motions, count)
+        for index, (coordinate, motion_type) in enumerate(zip(coordinates, types, strict=True)):
+            coordinate_path = self.placements.path(coordinate)
             value = coordinate.default_value
             low, high = coordinate.range
             self.coordinates.append(
                 CoordinateInfo(
-                    name=_find_last_body(own_path),
-                    path=own_path,
+                    name=_find_last_body(coordinate_path),
+                    path=coordinate_path,
                     joint=path,
                     motion_type=motion_type,
                     default_value=avoid_right_angle(value) if index in middle else value,
@@ -220,13 +220,13 @@ class _Builder:
                     range=(low, high),
                     clamped=coordinate.clamped,
                     locked=coordinate.locked,
-                    prescribed=self._convert_prescribed_function(coordinate, own_path),
+                    prescribed=self._convert_prescribed_function(coordinate, coordinate_path),
                     yielding=coordinate.is_free_to_satisfy_constraints,
                 )
             )
-        own = tuple(range(first, first + count))
+        indices = tuple(range(first, first + count))
         return _Edge(
-            type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own
+            type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, indices
         )
 
     def _convert_prescribed_function(
@@ -266,7 +266,7 @@ class _Builder:
         while True:
             branches, loops = spanning_tree(edges, ground, masses)
             index = {ground: GROUND} | {
-                branch.outer: place for place, branch in enumerate(branches)
+                branch.outer: number for number, branch in enumerate(branches)
             }
             loose = [path for path in self.bodies if path not in index]
             if not loose:
@@ -290,11 +290,13 @@ class _Builder:
                 # OpenSim 4.6 carries the child's mass once more by the joint that it has turned
                 # into a constraint.
                 if self.opensim_derivatives:
-                    twice = mass_properties(self.bodies[edge.child], edge.child)
+                    repeated_mass = mass_properties(self.bodies[edge.child], edge.child)
                     carried = edge.build_mobilizer(reversed=False)
                     path = f"{edge.child}_again{len(bodies)}"
                     bodies.append(
-                        MobileBody(_find_last_body(path), path, index[edge.parent], twice, carried)
+                        MobileBody(
+                            _find_last_body(path), path, index[edge.parent], repeated_mass, carried
+                        )
                     )
             elif edge.child == ground or edge.kind == "FreeJoint":
                 raise UnsupportedError(
@@ -315,10 +317,12 @@ class _Builder:
         name, motions = f"free_{_find_last_body(body)}", MOTIONS["FreeJoint"]
         path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
         for index, motion_type in enumerate(motion_types(motions, 6)):
-            own = f"{name}_coord_{index}"
-            self.coordinates.append(CoordinateInfo(own, f"{path}/{own}", path, motion_type))
-        own_places, still = tuple(range(first, first + 6)), np.eye(4)
-        return _Edge("FreeJoint", path, ground, body, still, still, motions, own_places)
+            coordinate_name = f"{name}_coord_{index}"
+            self.coordinates.append(
+                CoordinateInfo(coordinate_name, f"{path}/{coordinate_name}", path, motion_type)
+            )
+        indices, identity = tuple(range(first, first + 6)), np.eye(4)
+        return _Edge("FreeJoint", path, ground, body, identity, identity, motions, indices)
 
     def _split_child(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
         """Split the child of a joint that closes a loop, and weld the parts.
@@ -328,32 +332,43 @@ class _Builder:
             index: index of each body, by path.
             bodies: bodies; the part is appended, and masses are divided.
         """
-        place, whole = index[edge.child], mass_properties(self.bodies[edge.child], edge.child)
-        parts = [
-            place,
+        child_index, undivided = (
+            index[edge.child],
+            mass_properties(self.bodies[edge.child], edge.child),
+        )
+        part_indices = [
+            child_index,
             *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part")),
         ]
-        path = f"{edge.child}_part{len(parts)}"
+        path = f"{edge.child}_part{len(part_indices)}"
         bodies.append(
             MobileBody(
                 _find_last_body(path),
                 path,
                 index[edge.parent],
-                whole,
+                undivided,
                 edge.build_mobilizer(reversed=False),
             )
         )
-        parts.append(len(bodies) - 1)
-        share = whole.share(len(parts))
-        for part in parts:
+        part_indices.append(len(bodies) - 1)
+        share = undivided.share(len(part_indices))
+        for part_index in part_indices:
             # OpenSim gives all parts but the body itself the inertia about the origin per kg of
             # body.
-            wrong = self.opensim_derivatives and part != place
-            inertia = whole.about_origin() / whole.mass if wrong and whole.mass else share.inertia
-            bodies[part] = replace(bodies[part], mass_properties=replace(share, inertia=inertia))
-        still = np.eye(4)
+            wrong = self.opensim_derivatives and part_index != child_index
+            inertia = (
+                undivided.about_origin() / undivided.mass
+                if wrong and undivided.mass
+                else share.inertia
+            )
+            bodies[part_index] = replace(
+                bodies[part_index], mass_properties=replace(share, inertia=inertia)
+            )
+        identity = np.eye(4)
         weld = WeldEquations(
-            FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path
+            FramePlacement(child_index, identity),
+            FramePlacement(len(bodies) - 1, identity),
+            edge.path,
         )
         self.constraints.append(weld)
 
@@ -363,8 +378,10 @@ class _Builder:
         Args:
             index: index of each body and of ground, by path.
         """
-        places = {info.path: place for place, info in enumerate(self.coordinates)}
-        reader = ConstraintReader(self.placements, index, places, self.opensim_derivatives)
+        coordinate_indices = {info.path: number for number, info in enumerate(self.coordinates)}
+        reader = ConstraintReader(
+            self.placements, index, coordinate_indices, self.opensim_derivatives
+        )
         for component in self.tree.components:
             if not isinstance(component, schema.Constraint) or not component.isEnforced:
                 continue
@@ -374,8 +391,8 @@ class _Builder:
             self.constraints.append(constraint)
             # OpenSim's assembly does not penalize the change of a dependent coordinate.
             if isinstance(constraint, Coupler):
-                place = constraint.dependent
-                self.coordinates[place] = replace(self.coordinates[place], yielding=True)
+                number = constraint.dependent
+                self.coordinates[number] = replace(self.coordinates[number], yielding=True)
 
 
 RIGHT_ANGLE_GAP = 1e-6

@@ -73,40 +73,42 @@ def constraint_record(
     match constraint:
         case Lock():
             # A lock is a prescribed speed of zero without a position equation: any value is right.
-            own = _coordinate(constraint.coordinate, places, balls)
+            ints = _encode_coordinate(constraint.coordinate, places, balls)
             return ConstraintRecord(
-                "prescribe", own, table_of_one(ConstantValue(0.0), constraint.name), positions=0
+                "prescribe", ints, table_of_one(ConstantValue(0.0), constraint.name), positions=0
             )
         case PrescribedCoordinate():
             table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
             return ConstraintRecord(
-                "prescribe", _coordinate(constraint.coordinate, places, balls), table
+                "prescribe", _encode_coordinate(constraint.coordinate, places, balls), table
             )
         case Coupler():
-            return _coupler(constraint, places, balls)
+            return _encode_coupler(constraint, places, balls)
         case b.RollingConstraint():
-            equations = _rolling(constraint, places)
+            equations = _make_rolling_equations(constraint, places)
             return _record_between_bodies(
                 equations, sum(item.kind != EQUATION_TYPE.SLIP for item in equations)
             )
         case b.DistanceConstraint():
-            arm = _arm(places, constraint.first, constraint.second)
+            arm = _make_arm(places, constraint.first, constraint.second)
             return _record_between_bodies(
                 [_Equation(EQUATION_TYPE.DISTANCE, arm, arm, constraint.distance)]
             )
         case b.PointEquations():
-            return _record_between_bodies(_meeting(places, constraint.first, constraint.second))
+            return _record_between_bodies(
+                _make_point_equations(places, constraint.first, constraint.second)
+            )
         case b.PointOnLineEquations():
-            arm = _arm(places, constraint.line, constraint.follower)
+            arm = _make_arm(places, constraint.line, constraint.follower)
             axes = (
-                _axis(places, constraint.line.body, axis)
+                _make_axis(places, constraint.line.body, axis)
                 for axis in constraint.find_normal_directions()
             )
             return _record_between_bodies(
                 [_Equation(EQUATION_TYPE.PRODUCT, axis, arm) for axis in axes]
             )
         case b.WeldEquations():
-            return _record_between_bodies(_weld(constraint, places))
+            return _record_between_bodies(_make_weld_equations(constraint, places))
     raise UnsupportedError(
         f"'{constraint.name}' ({type(constraint).__name__}) cannot be kept up; set its isEnforced to false"
     )
@@ -138,22 +140,22 @@ def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
     }
 
 
-def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
+def _encode_coordinate(index: int, places: Places, balls: Balls) -> list[int]:
     """Return the record of a coordinate, with its part of a ball joint if it has one.
 
     Args:
-        place: index of the coordinate in the mechanism.
+        index: index of the coordinate in the mechanism.
         places: degrees of freedom and links of the mechanism.
         balls: offset of the arguments of each ball joint, by its degrees of freedom.
     """
-    freedom = places.freedom(place)
+    freedom = places.freedom(index)
     for freedoms, arguments in balls.items():
         if freedom in freedoms:
             return COORDINATE.record(DOF=freedom, BALL=arguments, PART=freedoms.index(freedom))
     return COORDINATE.record(DOF=freedom, BALL=-1, PART=0)
 
 
-def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRecord:
+def _encode_coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRecord:
     """Return the record of a coordinate that is a function of others.
 
     Args:
@@ -161,16 +163,16 @@ def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRec
         places: degrees of freedom and links of the mechanism.
         balls: offset of the arguments of each ball joint, by its degrees of freedom.
     """
-    others = constraint.independent
+    independent = constraint.independent
     table = function_table(constraint.function, f"the function of '{constraint.name}'")
-    dependent = _coordinate(constraint.dependent, places, balls)
+    dependent = _encode_coordinate(constraint.dependent, places, balls)
     # The 0 is replaced by the offset of the workspace for the gradient.
-    ints = [*dependent, 0, len(others), *map(places.freedom, others)]
-    for place in others:
-        ints += _coordinate(place, places, balls)
-    numbers = [places.locked_value(place) for place in (constraint.dependent, *others)]
+    ints = [*dependent, 0, len(independent), *map(places.freedom, independent)]
+    for index in independent:
+        ints += _encode_coordinate(index, places, balls)
+    numbers = [places.locked_value(index) for index in (constraint.dependent, *independent)]
     return ConstraintRecord(
-        "couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent)
+        "couple", ints, [*numbers, *table], room=max(len(independent), 1), room_at=len(dependent)
     )
 
 
@@ -194,7 +196,7 @@ def _record_between_bodies(
     )
 
 
-def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
+def _make_axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
     """Return an axis that is fixed in a body, in the link of the body.
 
     Args:
@@ -208,7 +210,7 @@ def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
     )
 
 
-def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
+def _make_arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
     """Return the vector from a point of one body to a point of another.
 
     Args:
@@ -216,13 +218,15 @@ def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _
         first: point at its start.
         second: point at its end.
     """
-    (one, start), (two, end) = (
+    (first_link, start), (second_link, end) = (
         places.station(body, point.tolist()) for body, point in (first, second)
     )
-    return _Vector([VECTOR_TYPE.ARM, one, two], [*start, *end])
+    return _Vector([VECTOR_TYPE.ARM, first_link, second_link], [*start, *end])
 
 
-def _meeting(places: Places, first: StationPlacement, second: StationPlacement) -> list[_Equation]:
+def _make_point_equations(
+    places: Places, first: StationPlacement, second: StationPlacement
+) -> list[_Equation]:
     """Return three equations: the arm between two points vanishes along each axis of ground.
 
     Args:
@@ -230,7 +234,7 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
         first: first point.
         second: second point.
     """
-    arm = _arm(places, first, second)
+    arm = _make_arm(places, first, second)
     # Rates relative to the coincident point keep the equations exact while a small error remains.
     arm.ints[0] = VECTOR_TYPE.MEETING
     axes = (
@@ -240,28 +244,33 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
     return [_Equation(EQUATION_TYPE.PRODUCT, axis, arm) for axis in axes]
 
 
-def _weld(constraint: b.WeldEquations, places: Places) -> list[_Equation]:
+def _make_weld_equations(constraint: b.WeldEquations, places: Places) -> list[_Equation]:
     """Return the six equations of a weld: three of orientation, then three of position.
 
     Args:
         constraint: weld.
         places: degrees of freedom and links of the mechanism.
     """
-    (one, inner), (two, outer) = constraint.first, constraint.second
+    (first_body, inner), (second_body, outer) = constraint.first, constraint.second
     # Two frames have the same orientation if each axis of one is perpendicular to the next axis of
     # the other.
-    turns = [
+    orientations = [
         _Equation(
             EQUATION_TYPE.PRODUCT,
-            _axis(places, two, outer[:3, axis]),
-            _axis(places, one, inner[:3, (axis + 1) % 3]),
+            _make_axis(places, second_body, outer[:3, axis]),
+            _make_axis(places, first_body, inner[:3, (axis + 1) % 3]),
         )
         for axis in range(3)
     ]
-    return [*turns, *_meeting(places, _origin(constraint.first), _origin(constraint.second))]
+    return [
+        *orientations,
+        *_make_point_equations(
+            places, _get_origin(constraint.first), _get_origin(constraint.second)
+        ),
+    ]
 
 
-def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
+def _make_rolling_equations(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
     """Return the four equations of a body that rolls on a plane.
 
     They are the height, the direction of the z axis, and the two slips along x and z, see
@@ -272,20 +281,26 @@ def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]
         places: degrees of freedom and links of the mechanism.
     """
     surface, roller = constraint.surface, constraint.roller
-    arm = _arm(
+    arm = _make_arm(
         places, StationPlacement(surface, np.zeros(3)), StationPlacement(roller, np.zeros(3))
     )
     x, _, z = np.eye(3)
     normal: Array = constraint.normal / np.linalg.norm(constraint.normal)
-    square = _Equation(EQUATION_TYPE.PRODUCT, _axis(places, surface, x), _axis(places, roller, z))
-    slips = [_Equation(EQUATION_TYPE.SLIP, _axis(places, surface, axis), arm) for axis in (x, z)]
+    square = _Equation(
+        EQUATION_TYPE.PRODUCT, _make_axis(places, surface, x), _make_axis(places, roller, z)
+    )
+    slips = [
+        _Equation(EQUATION_TYPE.SLIP, _make_axis(places, surface, axis), arm) for axis in (x, z)
+    ]
     return [
-        _Equation(EQUATION_TYPE.PRODUCT, _axis(places, surface, normal), arm, constraint.height),
+        _Equation(
+            EQUATION_TYPE.PRODUCT, _make_axis(places, surface, normal), arm, constraint.height
+        ),
         square,
         *slips,
     ]
 
 
-def _origin(placement: FramePlacement) -> StationPlacement:
+def _get_origin(placement: FramePlacement) -> StationPlacement:
     """Return the origin of a frame as a point of its body."""
     return StationPlacement(placement.body, placement.transform[:3, 3])

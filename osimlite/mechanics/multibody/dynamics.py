@@ -139,8 +139,8 @@ def _load_inertias(
         for link in range(model[MODEL.LINKS]):
             acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
             # An upward acceleration of all links has the same effect as gravity.
-            for k, part in enumerate(gravity.tolist()):
-                acceleration[k] -= part
+            for k, component in enumerate(gravity.tolist()):
+                acceleration[k] -= component
         if udot is not None:
             add_accelerations(model, data, udot)
         spatial_inertias_and_bias(model, reals, data)

@@ -45,12 +45,12 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
             if is_meant or not is_numeric:
                 raise
             models = [value for value in (*values, *named.values()) if isinstance(value, Model)]
-            what = next(
+            extreme_number = next(
                 (text for model in models if (text := find_extreme_number(model))),
                 "a number of the model",
             )
             raise ModelError(
-                f"{what} is too large or too small to compute with ({fault}); give another"
+                f"{extreme_number} is too large or too small to compute with ({fault}); give another"
             ) from None
 
     return computing
@@ -74,12 +74,12 @@ def find_extreme_number(model: Model) -> str:
         (size, f"{name} of '{tree.path_of(component)}', {number:g},")
         for component in tree.components
         for name, number in _list_numbers(component)
-        if (size := _size(number))
+        if (size := _measure_excess(number))
     ]
     return max(result)[1] if result else ""
 
 
-def _size(number: float) -> float:
+def _measure_excess(number: float) -> float:
     """Return the ratio by which a number is beyond the usual sizes, 0 for a usual one."""
     if not isfinite(number):
         return np.inf
@@ -90,9 +90,9 @@ def _size(number: float) -> float:
 def _list_numbers(component: Component) -> Iterator[tuple[str, float]]:
     """List the numbers of a component, and of its parts that are not components."""
     for name, info in type(component).model_fields.items():
-        held: Any = getattr(component, name)
+        field_value: Any = getattr(component, name)
         # Some defaults are infinite, and correct.
-        pending = [] if held == info.default else [held]
+        pending = [] if field_value == info.default else [field_value]
         while pending:
             value = pending.pop()
             if isinstance(value, float):

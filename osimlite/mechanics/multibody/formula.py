@@ -122,8 +122,8 @@ class Formula:
                 reader.known[name] = reader.read(body)
             steps = reader.ending_with(reader.read(main))
         except _Wrong as wrong:
-            kind = UnknownVariableError if isinstance(wrong, _UnknownName) else ModelError
-            raise kind(f"{where} is '{text}': {wrong}") from None
+            error_class = UnknownVariableError if isinstance(wrong, _UnknownName) else ModelError
+            raise error_class(f"{where} is '{text}': {wrong}") from None
         return cls(tuple(variables), steps)
 
     def derivative(self, variable: int) -> Formula:
@@ -144,15 +144,19 @@ class Formula:
             reader.known = dict(zip("xy", step.arguments, strict=False))
             for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
                 if argument in derivatives:
-                    part = reader.add("*", reader.read(rule), derivatives[argument])
+                    contribution = reader.add("*", reader.read(rule), derivatives[argument])
                     derivatives[index] = (
-                        reader.add("+", derivatives[index], part) if index in derivatives else part
+                        reader.add("+", derivatives[index], contribution)
+                        if index in derivatives
+                        else contribution
                     )
-        last = first + len(self.steps) - 1
+        last_register = first + len(self.steps) - 1
         return Formula(
             self.variables,
             reader.ending_with(
-                derivatives[last] if last in derivatives else reader.add("number", value=0.0)
+                derivatives[last_register]
+                if last_register in derivatives
+                else reader.add("number", value=0.0)
             ),
         )
 
@@ -169,7 +173,7 @@ class _UnknownName(_Wrong):
     """Error of a formula that needs an unknown name."""
 
 
-def _compute(law: str, *numbers: float | None) -> float:
+def _evaluate_law(law: str, *numbers: float | None) -> float:
     """Return the result of a law for numbers.
 
     Args:
@@ -219,12 +223,12 @@ class _FormulaReader:
             value: value of a number.
         """
         if law in ("number", _UNKNOWN):
-            return self._append(law, value=value)
-        constants = [self._constant(argument) for argument in arguments]
+            return self._append_step(law, value=value)
+        constants = [self._get_constant(argument) for argument in arguments]
         # Lepton computes what is written in numbers alone, and only then applies its rules: 0/0 is
         # NaN, 0*q/0 is 1.
         if self._derived.isdisjoint(arguments) and None not in constants:
-            return self._append("number", value=_compute(law, *constants))
+            return self._append_step("number", value=_evaluate_law(law, *constants))
         return self._simplify(law, arguments, constants)
 
     def append_steps(self, steps: Sequence[FormulaStep]) -> None:
@@ -250,22 +254,24 @@ class _FormulaReader:
             register = waiting.pop()
             if register >= self._first and register not in needed:
                 needed.add(register)
-                waiting += self._step(register).arguments
-        places = {register: register for register in range(self._first)}
+                waiting += self._get_step(register).arguments
+        new_registers = {register: register for register in range(self._first)}
         steps: list[FormulaStep] = []
         for register in sorted(needed):
-            step = self._step(register)
+            step = self._get_step(register)
             self._expect_meaning(step)
-            places[register] = self._first + len(steps)
+            new_registers[register] = self._first + len(steps)
             steps.append(
-                step._replace(arguments=tuple(places[argument] for argument in step.arguments))
+                step._replace(
+                    arguments=tuple(new_registers[argument] for argument in step.arguments)
+                )
             )
         if not steps:
             # The result is a variable, but a formula ends with a step: add 0.
             steps = [FormulaStep("number"), FormulaStep("+", (result, self._first))]
         return tuple(steps)
 
-    def _append(self, law: str, *arguments: int, value: float = 0.0) -> int:
+    def _append_step(self, law: str, *arguments: int, value: float = 0.0) -> int:
         """Add a step unless the same one exists, and return its register.
 
         Args:
@@ -279,7 +285,7 @@ class _FormulaReader:
             self.steps.append(step)
         return self._registers[step]
 
-    def _derive(self, value: float) -> int:
+    def _append_derived_number(self, value: float) -> int:
         """Return the register of a number that a rule gives.
 
         Such numbers are distinguished from written ones, to which Lepton applies no rules.
@@ -290,35 +296,37 @@ class _FormulaReader:
             self.steps.append(FormulaStep("number", value=value))
         return self._numbers[value]
 
-    def _is_same(self, one: int, two: int) -> bool:
-        first = self._constant(one)
-        return one == two or (first is not None and first == self._constant(two))
+    def _is_same(self, first_register: int, second_register: int) -> bool:
+        first = self._get_constant(first_register)
+        return first_register == second_register or (
+            first is not None and first == self._get_constant(second_register)
+        )
 
-    def _step(self, register: int) -> FormulaStep:
+    def _get_step(self, register: int) -> FormulaStep:
         return (
             self.steps[register - self._first]
             if register >= self._first
             else FormulaStep("variable", (register,))
         )
 
-    def _constant(self, register: int) -> float | None:
-        step = self._step(register)
+    def _get_constant(self, register: int) -> float | None:
+        step = self._get_step(register)
         return step.value if step.law == "number" else None
 
-    def _argument(self, law: str, register: int) -> int | None:
+    def _get_argument(self, law: str, register: int) -> int | None:
         """Return the argument of a step of one law, None for a step of another law.
 
         Args:
             law: law of one number.
             register: register of the step.
         """
-        step = self._step(register)
+        step = self._get_step(register)
         return step.arguments[0] if step.law == law else None
 
     def _factor_of_multiple(self, register: int) -> tuple[float, int] | None:
         """Return the factor and the register of a multiple, None for another step."""
-        step = self._step(register)
-        factor = self._constant(step.arguments[0]) if step.law == "*" else None
+        step = self._get_step(register)
+        factor = self._get_constant(step.arguments[0]) if step.law == "*" else None
         return None if factor is None else (factor, step.arguments[1])
 
     def _scale(self, factor: float, register: int) -> int:
@@ -331,9 +339,9 @@ class _FormulaReader:
         inner = self._factor_of_multiple(register)
         if inner is not None:
             factor, register = factor * inner[0], inner[1]
-        elif (number := self._constant(register)) is not None:
-            return self._derive(factor * number)
-        return self._append("*", self._append("number", value=factor), register)
+        elif (number := self._get_constant(register)) is not None:
+            return self._append_derived_number(factor * number)
+        return self._append_step("*", self._append_step("number", value=factor), register)
 
     def _simplify(
         self, law: str, arguments: Sequence[int], constants: Sequence[float | None]
@@ -359,136 +367,173 @@ class _FormulaReader:
             case "negative":
                 return self._negate(*arguments)
             # Lepton's rule: the root of a square is the absolute value.
-            case "square_root" if (inner := self._argument("square", arguments[0])) is not None:
-                return self._append("magnitude", inner)
-            case "square" if (inner := self._argument("square_root", arguments[0])) is not None:
+            case "square_root" if (inner := self._get_argument("square", arguments[0])) is not None:
+                return self._append_step("magnitude", inner)
+            case "square" if (inner := self._get_argument("square_root", arguments[0])) is not None:
                 return inner
-        return self._append(law, *arguments)
+        return self._append_step(law, *arguments)
 
-    def _add_up(self, one: int, two: int, first: float | None, second: float | None) -> int:
+    def _add_up(
+        self, left: int, right: int, left_constant: float | None, right_constant: float | None
+    ) -> int:
         """Return the register of a sum, simplified as Lepton does.
 
         Args:
-            one: register of the first term.
-            two: register of the second term.
-            first: value of the first term if it is a constant, else None.
-            second: value of the second term if it is a constant, else None.
+            left: register of the first term.
+            right: register of the second term.
+            left_constant: value of the first term if it is a constant, else None.
+            right_constant: value of the second term if it is a constant, else None.
         """
-        if first == 0.0:
-            return two
-        if second == 0.0:
-            return one
+        if left_constant == 0.0:
+            return right
+        if right_constant == 0.0:
+            return left
         # Lepton puts the constant first.
-        if second is not None:
-            return self._append("+", two, one)
-        if first is None:
-            if (negated := self._argument("negative", two)) is not None:
-                return self._append("-", one, negated) if one != negated else self._derive(0.0)
-            if (negated := self._argument("negative", one)) is not None:
-                return self._append("-", two, negated) if two != negated else self._derive(0.0)
-        return self._append("+", one, two)
+        if right_constant is not None:
+            return self._append_step("+", right, left)
+        if left_constant is None:
+            if (negated := self._get_argument("negative", right)) is not None:
+                return (
+                    self._append_step("-", left, negated)
+                    if left != negated
+                    else self._append_derived_number(0.0)
+                )
+            if (negated := self._get_argument("negative", left)) is not None:
+                return (
+                    self._append_step("-", right, negated)
+                    if right != negated
+                    else self._append_derived_number(0.0)
+                )
+        return self._append_step("+", left, right)
 
-    def _subtract(self, one: int, two: int, first: float | None, second: float | None) -> int:
+    def _subtract(
+        self, left: int, right: int, left_constant: float | None, right_constant: float | None
+    ) -> int:
         """Return the register of a difference, with arguments as in `_add_up`."""
-        if self._is_same(one, two):
-            return self._derive(0.0)
-        if first == 0.0:
-            return self._negate(two)
-        if second is not None:
-            return self._add_up(self._append("number", value=-second), one, -second, first)
-        if (negated := self._argument("negative", two)) is not None:
-            return self._add_up(one, negated, first, None)
-        return self._append("-", one, two)
+        if self._is_same(left, right):
+            return self._append_derived_number(0.0)
+        if left_constant == 0.0:
+            return self._negate(right)
+        if right_constant is not None:
+            return self._add_up(
+                self._append_step("number", value=-right_constant),
+                left,
+                -right_constant,
+                left_constant,
+            )
+        if (negated := self._get_argument("negative", right)) is not None:
+            return self._add_up(left, negated, left_constant, None)
+        return self._append_step("-", left, right)
 
-    def _multiply(self, one: int, two: int, first: float | None, second: float | None) -> int:
+    def _multiply(
+        self, left: int, right: int, left_constant: float | None, right_constant: float | None
+    ) -> int:
         """Return the register of a product, with arguments as in `_add_up`."""
-        if first == 0.0 or second == 0.0:
-            return self._derive(0.0)
-        if first == 1.0:
-            return two
-        if second == 1.0:
-            return one
-        if first is not None:
-            return self._scale(first, two)
-        if second is not None:
-            return self._scale(second, one)
-        one_negated, two_negated = self._argument("negative", one), self._argument("negative", two)
-        if one_negated is not None or two_negated is not None:
+        if left_constant == 0.0 or right_constant == 0.0:
+            return self._append_derived_number(0.0)
+        if left_constant == 1.0:
+            return right
+        if right_constant == 1.0:
+            return left
+        if left_constant is not None:
+            return self._scale(left_constant, right)
+        if right_constant is not None:
+            return self._scale(right_constant, left)
+        left_negated, right_negated = (
+            self._get_argument("negative", left),
+            self._get_argument("negative", right),
+        )
+        if left_negated is not None or right_negated is not None:
             product = self.add(
                 "*",
-                one if one_negated is None else one_negated,
-                two if two_negated is None else two_negated,
+                left if left_negated is None else left_negated,
+                right if right_negated is None else right_negated,
             )
             return (
                 product
-                if one_negated is not None and two_negated is not None
+                if left_negated is not None and right_negated is not None
                 else self.add("negative", product)
             )
-        if (divisor := self._argument("reciprocal", two)) is not None:
-            return self.add("divide", one, divisor)
-        if (divisor := self._argument("reciprocal", one)) is not None:
-            return self.add("divide", two, divisor)
-        if self._is_same(one, two):
-            return self.add("square", one)
-        if one == self._argument("square", two) or two == self._argument("square", one):
-            return self._append("cube", one if one == self._argument("square", two) else two)
-        return self._append("*", one, two)
+        if (divisor := self._get_argument("reciprocal", right)) is not None:
+            return self.add("divide", left, divisor)
+        if (divisor := self._get_argument("reciprocal", left)) is not None:
+            return self.add("divide", right, divisor)
+        if self._is_same(left, right):
+            return self.add("square", left)
+        if left == self._get_argument("square", right) or right == self._get_argument(
+            "square", left
+        ):
+            return self._append_step(
+                "cube", left if left == self._get_argument("square", right) else right
+            )
+        return self._append_step("*", left, right)
 
-    def _divide(self, one: int, two: int, first: float | None, second: float | None) -> int:
+    def _divide(
+        self, left: int, right: int, left_constant: float | None, right_constant: float | None
+    ) -> int:
         """Return the register of a quotient, with arguments as in `_add_up`."""
-        if self._is_same(one, two):
-            return self._derive(1.0)
-        if first == 0.0:
-            return self._derive(0.0)
-        if first == 1.0:
-            return self._append("reciprocal", two)
-        if second is not None:
-            return one if second == 1.0 else self._scale(_compute("divide", 1.0, second), one)
-        one_negated, two_negated = self._argument("negative", one), self._argument("negative", two)
-        if one_negated is not None or two_negated is not None:
+        if self._is_same(left, right):
+            return self._append_derived_number(1.0)
+        if left_constant == 0.0:
+            return self._append_derived_number(0.0)
+        if left_constant == 1.0:
+            return self._append_step("reciprocal", right)
+        if right_constant is not None:
+            return (
+                left
+                if right_constant == 1.0
+                else self._scale(_evaluate_law("divide", 1.0, right_constant), left)
+            )
+        left_negated, right_negated = (
+            self._get_argument("negative", left),
+            self._get_argument("negative", right),
+        )
+        if left_negated is not None or right_negated is not None:
             ratio = self.add(
                 "divide",
-                one if one_negated is None else one_negated,
-                two if two_negated is None else two_negated,
+                left if left_negated is None else left_negated,
+                right if right_negated is None else right_negated,
             )
             return (
                 ratio
-                if one_negated is not None and two_negated is not None
+                if left_negated is not None and right_negated is not None
                 else self.add("negative", ratio)
             )
-        if (factor := self._argument("reciprocal", two)) is not None:
-            return self.add("*", one, factor)
-        return self._append("divide", one, two)
+        if (factor := self._get_argument("reciprocal", right)) is not None:
+            return self.add("*", left, factor)
+        return self._append_step("divide", left, right)
 
-    def _raise(self, one: int, two: int, base: float | None, exponent: float | None) -> int:
+    def _raise(
+        self, base: int, exponent: int, base_constant: float | None, exponent_constant: float | None
+    ) -> int:
         """Return the register of a power, simplified as Lepton does.
 
         Args:
-            one: register of the base.
-            two: register of the exponent.
-            base: value of the base if it is a constant, else None.
-            exponent: value of the exponent if it is a constant, else None.
+            base: register of the base.
+            exponent: register of the exponent.
+            base_constant: value of the base if it is a constant, else None.
+            exponent_constant: value of the exponent if it is a constant, else None.
         """
-        if base == 0.0 or base == 1.0:
-            return self._derive(base)
-        if exponent == 0.0:
-            return self._derive(1.0)
-        if exponent == 1.0:
-            return one
+        if base_constant == 0.0 or base_constant == 1.0:
+            return self._append_derived_number(base_constant)
+        if exponent_constant == 0.0:
+            return self._append_derived_number(1.0)
+        if exponent_constant == 1.0:
+            return base
         laws = {-1.0: "reciprocal", 2.0: "square", 3.0: "cube", 0.5: "square_root"}
-        if exponent in laws:
-            return self.add(laws[exponent], one)
-        return self._append("power", one, two)
+        if exponent_constant in laws:
+            return self.add(laws[exponent_constant], base)
+        return self._append_step("power", base, exponent)
 
-    def _negate(self, one: int) -> int:
+    def _negate(self, register: int) -> int:
         """Return the register of the negative of a register, simplified as Lepton does."""
-        if (inner := self._argument("negative", one)) is not None:
+        if (inner := self._get_argument("negative", register)) is not None:
             return inner
-        if (number := self._constant(one)) is not None:
-            return self._derive(-number)
-        if (multiple := self._factor_of_multiple(one)) is not None:
+        if (number := self._get_constant(register)) is not None:
+            return self._append_derived_number(-number)
+        if (multiple := self._factor_of_multiple(register)) is not None:
             return self._scale(-multiple[0], multiple[1])
-        return self._append("negative", one)
+        return self._append_step("negative", register)
 
     def _expect_meaning(self, step: FormulaStep) -> None:
         """Raise an error for a step without meaning.
@@ -497,11 +542,11 @@ class _FormulaReader:
         """
         if step.law == _UNKNOWN:
             word = self.unknown[int(step.value)]
-            near = suggest_name(word, self.known)
-            there = (
+            suggestion = suggest_name(word, self.known)
+            available = (
                 f"there is {join_words(list(self.known))}" if self.known else "it has no variables"
             )
-            raise _UnknownName(f"there is no '{word}'{near}; {there}")
+            raise _UnknownName(f"there is no '{word}'{suggestion}; {available}")
         if step.law == "number" and math.isnan(step.value):
             raise _Wrong("a part of it without variables is not a number, such as 0/0; remove it")
 
@@ -517,17 +562,17 @@ class _FormulaReader:
             if wants_operand and token["name"] and text.startswith("(", token.end()):
                 called = word
             elif wants_operand and word == "(":
-                self._open(called)
+                self._open_parenthesis(called)
                 called = ""
             elif wants_operand and word == "-":
-                self._wait("negative", SIGN, 0)
+                self._push_operation("negative", SIGN, 0)
             elif wants_operand and not token["sign"]:
                 self._operands.append(self._number_of(token))
                 wants_operand = False
             elif not wants_operand and word in PRECEDENCE:
                 # ^ is applied from the right, so it waits for a following ^; the others do not.
-                self._apply(PRECEDENCE[word] + (word == "^"))
-                self._wait(LAWS.get(word, word), PRECEDENCE[word], 1)
+                self._apply_waiting(PRECEDENCE[word] + (word == "^"))
+                self._push_operation(LAWS.get(word, word), PRECEDENCE[word], 1)
                 wants_operand = True
             elif not wants_operand and word in (",", ")"):
                 wants_operand = self._end_part(word)
@@ -535,7 +580,7 @@ class _FormulaReader:
                 raise _Wrong(f"there is an unexpected '{word}'; remove it")
         if wants_operand:
             raise _Wrong("it ends too early; complete it")
-        self._apply(0)
+        self._apply_waiting(0)
         if self._waiting:
             raise _Wrong("its parentheses do not match; close them")
         return self._operands.pop()
@@ -556,36 +601,40 @@ class _FormulaReader:
             return self.add(_UNKNOWN, value=float(self.unknown.index(word)))
         return self.known[word]
 
-    def _wait(self, law: str, precedence: int, taken: int, name: str = "") -> None:
-        self._waiting.append(_Waiting(law, precedence, len(self._operands) - taken, name))
+    def _push_operation(
+        self, law: str, precedence: int, operand_count: int, name: str = ""
+    ) -> None:
+        self._waiting.append(_Waiting(law, precedence, len(self._operands) - operand_count, name))
 
-    def _open(self, called: str) -> None:
-        if called and called not in FUNCTIONS:
-            raise _Wrong(f"there is no function '{called}'{suggest_name(called, FUNCTIONS)}")
-        self._wait(FUNCTIONS.get(called, ""), OPEN, 0, called)
+    def _open_parenthesis(self, function_name: str) -> None:
+        if function_name and function_name not in FUNCTIONS:
+            raise _Wrong(
+                f"there is no function '{function_name}'{suggest_name(function_name, FUNCTIONS)}"
+            )
+        self._push_operation(FUNCTIONS.get(function_name, ""), OPEN, 0, function_name)
 
-    def _apply(self, least: int) -> None:
+    def _apply_waiting(self, least: int) -> None:
         """Apply all waiting operations that bind at least as closely as a precedence."""
         while self._waiting and self._waiting[-1].precedence >= least:
-            self._take(self._waiting.pop())
+            self._apply_operation(self._waiting.pop())
 
-    def _take(self, waiting: _Waiting) -> None:
+    def _apply_operation(self, waiting: _Waiting) -> None:
         arguments = self._operands[waiting.before :]
         self._operands[waiting.before :] = [self.add(waiting.law, *arguments)]
 
     def _end_part(self, sign: str) -> bool:
         """End an argument or a parenthesis, and return whether another operand must follow."""
-        self._apply(0)
+        self._apply_waiting(0)
         if not self._waiting or (sign == "," and not self._waiting[-1].name):
             raise _Wrong(f"there is an unexpected '{sign}'; remove it")
         if sign == ",":
             return True
         opened = self._waiting.pop()
         if name := opened.name:
-            wanted, given = 2 if name in OF_TWO else 1, len(self._operands) - opened.before
-            if given != wanted:
-                raise _Wrong(f"'{name}' takes {format_count(wanted, 'argument')}, not {given}")
-            self._take(opened)
+            expected, count = 2 if name in OF_TWO else 1, len(self._operands) - opened.before
+            if count != expected:
+                raise _Wrong(f"'{name}' takes {format_count(expected, 'argument')}, not {count}")
+            self._apply_operation(opened)
         return False
 
 
@@ -601,9 +650,9 @@ def program(formula: Formula) -> tuple[list[int], list[float]]:
     steps: list[int] = []
     constants: list[float] = []
     for step in formula.steps:
-        one, two, *_ = *step.arguments, 0, 0
+        first_argument, second_argument, *_ = *step.arguments, 0, 0
         if step.law == "number":
-            one = len(constants)
+            first_argument = len(constants)
             constants.append(step.value)
-        steps += STEPS.index(step.law), one, two
+        steps += STEPS.index(step.law), first_argument, second_argument
     return steps, constants

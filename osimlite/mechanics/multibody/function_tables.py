@@ -67,8 +67,8 @@ def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
         where: its description for messages.
     """
     if isinstance(function, f.ScaledFunction):
-        kind, factor, *rest = _table_of_one(function.function, where)
-        return [kind, function.scale * factor, *rest]
+        function_type, factor, *remainder = _table_of_one(function.function, where)
+        return [function_type, function.scale * factor, *remainder]
     if isinstance(function, f.WeightedSum):
         # Functions of several numbers are written as polynomials of one.
         function = f.Linear(function.weights[0], function.start)
@@ -76,6 +76,9 @@ def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
         coefficients = [0.0] * (1 + max(power for (power,) in function.powers))
         for (power,), coefficient in zip(function.powers, function.coefficients, strict=True):
             coefficients[power] += coefficient
-        kind, *rest = f.Polynomial(tuple(reversed(coefficients))).table
-        return [FUNCTION_TYPE.PIECES_OF_OPENSIM if function.opensim_derivatives else kind, *rest]
+        function_type, *remainder = f.Polynomial(tuple(reversed(coefficients))).table
+        return [
+            FUNCTION_TYPE.PIECES_OF_OPENSIM if function.opensim_derivatives else function_type,
+            *remainder,
+        ]
     return _has_table([*function.table], function, where)

@@ -99,8 +99,8 @@ class Multivariate(SmoothFunction):
         Hessian follows from the rates of one or two arguments.
         """
         size = len(arguments)
-        places: Any = range(size)
-        given, table, gradient = (
+        indices: Any = range(size)
+        values, table, gradient = (
             make_floats(arguments),
             make_floats([*arguments, *self.table]),
             make_floats([0.0] * size),
@@ -112,17 +112,17 @@ class Multivariate(SmoothFunction):
             Returns:
                 Value and second derivative.
             """
-            rates = make_floats([float(k in moving) for k in places])
-            value, _, curvature = evaluate_monomials(size, places, table, given, rates, gradient)
+            rates = make_floats([float(k in moving) for k in indices])
+            value, _, curvature = evaluate_monomials(size, indices, table, values, rates, gradient)
             return value, curvature
 
         value, hessian = at_rates()[0], make_zero_derivatives(size)[2]
-        for k in places:
+        for k in indices:
             hessian[k][k] = at_rates(k)[1]
-        for one, two in combinations(places, 2):
+        for row, column in combinations(indices, 2):
             # The mixed entry is half of what both rates give together beyond each alone.
-            both = at_rates(one, two)[1] - hessian[one][one] - hessian[two][two]
-            hessian[one][two] = hessian[two][one] = 0.5 * both
+            mixed = at_rates(row, column)[1] - hessian[row][row] - hessian[column][column]
+            hessian[row][column] = hessian[column][row] = 0.5 * mixed
         return value, list(gradient), hessian
 
 
@@ -227,7 +227,7 @@ class WeightedSum(Multivariate):
     def table(self) -> Sequence[float]:
         """Table of monomials: one for each argument, and one for the constant."""
         size = len(self.weights)
-        powers = (float(term == place) for term in range(size + 1) for place in range(size))
+        powers = (float(term == argument) for term in range(size + 1) for argument in range(size))
         return [FUNCTION_TYPE.MONOMIALS, 1.0, size + 1.0, *self.weights, self.start, *powers]
 
 
@@ -295,13 +295,13 @@ class MultivariatePolynomial(Multivariate):
     @property
     def table(self) -> Sequence[float]:
         """Table of all monomials with their powers."""
-        kind = (
+        function_type = (
             FUNCTION_TYPE.MONOMIALS_OF_OPENSIM
             if self.opensim_derivatives
             else FUNCTION_TYPE.MONOMIALS
         )
-        powers = (float(power) for each in self.powers for power in each)
-        return [kind, 1.0, float(len(self.powers)), *self.coefficients, *powers]
+        powers = (float(power) for exponents in self.powers for power in exponents)
+        return [function_type, 1.0, float(len(self.powers)), *self.coefficients, *powers]
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Return the value, the gradient (k,) and the Hessian (k, k)."""
@@ -335,8 +335,12 @@ class ScaledFunction(SmoothFunction):
     @property
     def table(self) -> Sequence[float]:
         """Table of the function with another factor."""
-        head, rest = self.function.table[:2], self.function.table[2:]
-        return [head[0], self.scale * head[1], *rest] if head else ()
+        type_and_factor, remainder = self.function.table[:2], self.function.table[2:]
+        return (
+            [type_and_factor[0], self.scale * type_and_factor[1], *remainder]
+            if type_and_factor
+            else ()
+        )
 
 
 @dataclass(frozen=True)
@@ -385,8 +389,13 @@ class SimmCubicSpline(Univariate):
         # sigma: a sixth of the second derivative at every point.
         sigma = _spline_curvature(self.x, widths, slopes)
         self._pieces = [
-            (y, slope - width * (after + 2.0 * here), 3.0 * here, (after - here) / width)
-            for y, slope, width, (here, after) in zip(
+            (
+                y,
+                slope - width * (next_sigma + 2.0 * this_sigma),
+                3.0 * this_sigma,
+                (next_sigma - this_sigma) / width,
+            )
+            for y, slope, width, (this_sigma, next_sigma) in zip(
                 self.y[:-1], slopes, widths, pairwise(sigma), strict=True
             )
         ]
@@ -491,17 +500,21 @@ def _spline_curvature(
         return [0.0, 0.0]
     # Tridiagonal equations: the diagonal, and the right sides; the entries off the diagonal are the
     # widths.
-    diagonal = [-widths[0], *(2.0 * (one + two) for one, two in pairwise(widths)), -widths[-1]]
-    right = [0.0, *(after - before for before, after in pairwise(slopes)), 0.0]
+    diagonal = [
+        -widths[0],
+        *(2.0 * (left_width + right_width) for left_width, right_width in pairwise(widths)),
+        -widths[-1],
+    ]
+    rhs = [0.0, *(next_slope - slope for slope, next_slope in pairwise(slopes)), 0.0]
     if n > 3:
         # With three coincident points no spline exists: NaN.
         second = [
-            right[k + 1] / ((points[k + 2] - points[k]) or math.nan) for k in (0, 1, n - 4, n - 3)
+            rhs[k + 1] / ((points[k + 2] - points[k]) or math.nan) for k in (0, 1, n - 4, n - 3)
         ]
-        right[0] = (
+        rhs[0] = (
             widths[0] * widths[0] * (second[1] - second[0]) / ((points[3] - points[0]) or math.nan)
         )
-        right[-1] = (
+        rhs[-1] = (
             -widths[-1]
             * widths[-1]
             * (second[3] - second[2])
@@ -509,10 +522,10 @@ def _spline_curvature(
         )
     # Gaussian elimination without pivoting, as the equations are diagonally dominant inside.
     for k in range(1, n):
-        share = widths[k - 1] / diagonal[k - 1]
-        diagonal[k] -= share * widths[k - 1]
-        right[k] -= share * right[k - 1]
-    right[-1] /= diagonal[-1]
+        factor = widths[k - 1] / diagonal[k - 1]
+        diagonal[k] -= factor * widths[k - 1]
+        rhs[k] -= factor * rhs[k - 1]
+    rhs[-1] /= diagonal[-1]
     for k in range(n - 2, -1, -1):
-        right[k] = (right[k] - widths[k] * right[k + 1]) / diagonal[k]
-    return right
+        rhs[k] = (rhs[k] - widths[k] * rhs[k + 1]) / diagonal[k]
+    return rhs

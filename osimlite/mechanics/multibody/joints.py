@@ -51,17 +51,20 @@ from osimlite.schema.joints import (
 )
 
 
-def _make_plain_motions(kind: type[Joint]) -> tuple[JointMotion, ...]:
+def _make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
     """Return the motions of a joint type without properties, as its schema declares them.
 
     Translations come first, then rotations; those of a ball joint are one motion.
     """
-    axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((kind.moves or "").split())]
-    slides = [translate(axes[word[1]], own) for own, word in words if word[0] == "t"]
-    turns = [rotate_about(axes[word[1]], own) for own, word in words if word[0] == "r"]
-    if kind.speeds_are_rates:
-        return (*slides, *turns)
-    return (*slides, SphericalMotion(tuple(own for turn in turns for own in turn.coordinates)))
+    axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((joint_class.moves or "").split())]
+    translations = [translate(axes[word[1]], index) for index, word in words if word[0] == "t"]
+    rotations = [rotate_about(axes[word[1]], index) for index, word in words if word[0] == "r"]
+    if joint_class.speeds_are_rates:
+        return (*translations, *rotations)
+    return (
+        *translations,
+        SphericalMotion(tuple(index for turn in rotations for index in turn.coordinates)),
+    )
 
 
 MOTIONS: dict[str, tuple[JointMotion, ...]] = {
@@ -137,15 +140,15 @@ def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[JointMo
     """
     bend, swing, twist = (float(angle) for angle in neutral)
     # The point is on the arc of the first two angles; the twist about Y turns the end only.
-    slides = (
+    translations = (
         AxisMotion("translate", np.array(axis), (0, 1), ArcPoint(component, length, (bend, swing)))
         for component, axis in enumerate((X, Y, Z))
     )
-    turns = (
-        AxisMotion("rotate", np.array(axis), (place,), Linear(1.0, start))
-        for place, (axis, start) in enumerate(((X, bend), (Z, swing), (Y, twist)))
+    rotations = (
+        AxisMotion("rotate", np.array(axis), (index,), Linear(1.0, start))
+        for index, (axis, start) in enumerate(((X, bend), (Z, swing), (Y, twist)))
     )
-    return (*slides, *turns)
+    return (*translations, *rotations)
 
 
 class JointAxis(NamedTuple):
@@ -178,16 +181,16 @@ def make_custom_motions(
     Raises:
         ModelError: an axis has no direction.
     """
-    slides = tuple(_make_axis_motion("translate", axis) for axis in translations)
-    turns = tuple(_make_axis_motion("rotate", axis) for axis in rotations)
+    translation_motions = tuple(_make_axis_motion("translate", axis) for axis in translations)
+    rotation_motions = tuple(_make_axis_motion("rotate", axis) for axis in rotations)
     return (
-        (*slides, SimbodyAccelerationError(turns), *turns)
+        (*translation_motions, SimbodyAccelerationError(rotation_motions), *rotation_motions)
         if opensim_derivatives
-        else (*slides, *turns)
+        else (*translation_motions, *rotation_motions)
     )
 
 
-def _make_axis_motion(kind: Literal["rotate", "translate"], axis: JointAxis) -> AxisMotion:
+def _make_axis_motion(motion_kind: Literal["rotate", "translate"], axis: JointAxis) -> AxisMotion:
     """Return the motion along or about an axis of a CustomJoint, with a unit vector."""
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
@@ -195,7 +198,7 @@ def _make_axis_motion(kind: Literal["rotate", "translate"], axis: JointAxis) -> 
         raise ModelError(
             f"the axis {direction.tolist()} of a transform has no direction; give one that is not zero"
         )
-    return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
+    return AxisMotion(motion_kind, direction / length, axis.coordinates, axis.function)
 
 
 def motion_types(motions: Sequence[JointMotion], count: int) -> tuple[MotionType, ...]:
@@ -254,9 +257,9 @@ class Mobilizer:
             *self.motions,
             FixedTransform(invert_transform(self.child_frame)),
         )
-        chain = [part for motion in motions for part in motion.elementary()]
+        chain = [step for motion in motions for step in motion.elementary()]
         # The inverse of a product is the product of the inverses in the opposite order.
-        return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
+        return tuple(step.inverse() for step in reversed(chain)) if self.reversed else tuple(chain)
 
     def rate_matrix(self, q: Array) -> Array:
         """Return N (k, k) with qdot = N u.
@@ -270,9 +273,9 @@ class Mobilizer:
         matrix = np.eye(len(q))
         with _name_joint_in_errors(self.joint):
             for motion in self.motions:
-                part = motion.rates(q)
-                if part is not None:
-                    matrix[np.ix_(motion.coordinates, motion.coordinates)] = part
+                block = motion.rates(q)
+                if block is not None:
+                    matrix[np.ix_(motion.coordinates, motion.coordinates)] = block
         return matrix
 
     def rate_bias(self, q: Array, u: Array) -> Array:
@@ -288,9 +291,9 @@ class Mobilizer:
         bias = np.zeros(len(q))
         with _name_joint_in_errors(self.joint):
             for motion in self.motions:
-                part = motion.rate_bias(q, u)
-                if part is not None:
-                    bias[list(motion.coordinates)] = part
+                motion_bias = motion.rate_bias(q, u)
+                if motion_bias is not None:
+                    bias[list(motion.coordinates)] = motion_bias
         return bias
 
     @cached_property
@@ -308,7 +311,7 @@ class Mobilizer:
             Indices in the mechanism, group by group.
         """
         return tuple(
-            tuple(self.coordinates[place] for place in motion.coordinates)
+            tuple(self.coordinates[index] for index in motion.coordinates)
             for motion in self.motions
             if type(motion).rates is not JointMotion.rates
         )

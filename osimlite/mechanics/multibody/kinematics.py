@@ -99,9 +99,9 @@ class MechanismKinematics:
                 errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end]
             )
         # A foreign constraint needs a program of its own, and so another evaluation.
-        other = MechanismKinematics(self.mechanism, self.q, self.u, self.time)
-        other.program = program
-        return other.equations(constraint)
+        copied_state = MechanismKinematics(self.mechanism, self.q, self.u, self.time)
+        copied_state.program = program
+        return copied_state.equations(constraint)
 
     @cached_property
     def all_equations(self) -> Equations:

@@ -50,9 +50,11 @@ def solve_with_null_space(rows: Array, values: Array) -> tuple[Array, Array]:
         triangle = triangle[:count]
         if np.abs(triangle.diagonal()).min() > REDUNDANT:
             return basis[:, :count] @ np.linalg.solve(triangle.T, values), basis[:, count:]
-    left, strengths, right = np.linalg.svd(rows)
-    rank = int(np.sum(strengths > REDUNDANT * max(strengths[0], 1.0)))
-    return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T
+    left_vectors, singular_values, right_vectors = np.linalg.svd(rows)
+    rank = int(np.sum(singular_values > REDUNDANT * max(singular_values[0], 1.0)))
+    return right_vectors[:rank].T @ (
+        left_vectors[:, :rank].T @ values / singular_values[:rank]
+    ), right_vectors[rank:].T
 
 
 def solve_least_norm(rows: Array, values: Array, tolerance: float) -> Array:

@@ -175,22 +175,22 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
     free = set(free)
     for body in mechanism.bodies:
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
-        operations, rest = _list_operations(mechanism, body.mobilizer, frame, free)
+        operations, remaining_frame = _list_operations(mechanism, body.mobilizer, frame, free)
         # A body without motions of its own is merged into the link that carries it.
         if operations or apart:
             links.append(Link(parent, operations))
             parent = len(links) - 1
-        placements.append(Placement(parent, rest))
+        placements.append(Placement(parent, remaining_frame))
         if parent != GROUND:
-            _load(links[parent], body.mass_properties, rest)
+            _add_body_mass(links[parent], body.mass_properties, remaining_frame)
     order: list[int] = []
     ends = [0]
     for link in links:
-        own = {place for item in link.operations for place in item.arguments}
+        indices = {index for item in link.operations for index in item.arguments}
         # Within a link, degrees of freedom are in the order of the coordinates.
-        order += sorted(own & free)
+        order += sorted(indices & free)
         ends.append(len(order))
-    freedoms = {place: number for number, place in enumerate(order)}
+    freedoms = {index: number for number, index in enumerate(order)}
     return LinkTree(links, ends, tuple(order), Places(mechanism, freedoms, placements))
 
 
@@ -208,7 +208,7 @@ def _list_operations(
     Returns:
         Operations, and the frame of the carried body in the new link (4, 4).
     """
-    own = mobilizer.coordinates
+    joint_coordinates = mobilizer.coordinates
     chain: list[JointMotion] = [
         FixedTransform(mobilizer.parent_frame),
         *mobilizer.motions,
@@ -221,26 +221,31 @@ def _list_operations(
     of_motion: dict[int, Operation] = {}
     drifts: list[tuple[Operation, SimbodyAccelerationError]] = []
     for motion in chain:
-        places = [own[number] for number in motion.coordinates]
-        still = free.isdisjoint(places)
+        indices = [joint_coordinates[number] for number in motion.coordinates]
+        is_fixed = free.isdisjoint(indices)
         if isinstance(motion, FixedTransform):
             frame = frame @ (
                 invert_transform(motion.matrix) if mobilizer.reversed else motion.matrix
             )
         # An error of accelerations matters only where coordinates move.
         elif isinstance(motion, SimbodyAccelerationError):
-            if motion.elementary() and not free.isdisjoint(own):
+            if motion.elementary() and not free.isdisjoint(joint_coordinates):
                 sign = -1 if mobilizer.reversed else 1
                 result.append(
-                    Operation(MOTION.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]])
+                    Operation(
+                        MOTION.ACCELERATION_ERROR,
+                        frame,
+                        [],
+                        looked_at=[sign, *joint_coordinates[:2]],
+                    )
                 )
                 drifts.append((result[-1], motion))
                 frame = np.eye(4)
         # A motion whose coordinates are all locked is a fixed transform.
-        elif still:
-            q = np.zeros(len(own))
+        elif is_fixed:
+            q = np.zeros(len(joint_coordinates))
             q[list(motion.coordinates)] = [
-                mechanism.coordinates[place].default_value for place in places
+                mechanism.coordinates[index].default_value for index in indices
             ]
             matrix = motion.transform(q)
             frame = frame @ (invert_transform(matrix) if mobilizer.reversed else matrix)
@@ -250,16 +255,16 @@ def _list_operations(
             # Kernels rotate about z only; the fixed transforms before and behind bring the axis
             # there.
             if motion.kind == "rotate":
-                turned = make_transform(_to_axis(axis))
-                result.append(Operation(MOTION.TURN, frame @ turned, places, function))
+                rotation = make_transform(_to_axis(axis))
+                result.append(Operation(MOTION.TURN, frame @ rotation, indices, function))
                 of_motion[id(motion)] = result[-1]
-                frame = invert_transform(turned)
+                frame = invert_transform(rotation)
             else:
-                result.append(Operation(MOTION.SLIDE, frame, places, function, axis=axis))
+                result.append(Operation(MOTION.SLIDE, frame, indices, function, axis=axis))
                 frame = np.eye(4)
         elif isinstance(motion, SphericalMotion):
-            kind = MOTION.BALL_BACK if mobilizer.reversed else MOTION.BALL
-            result.append(Operation(kind, frame, places, radii=motion.radii))
+            operation_kind = MOTION.BALL_BACK if mobilizer.reversed else MOTION.BALL
+            result.append(Operation(operation_kind, frame, indices, radii=motion.radii))
             frame = np.eye(4)
         else:
             raise UnsupportedError(
@@ -281,13 +286,13 @@ def _to_axis(axis: Array) -> Array:
     if z == 1.0:
         return np.eye(3)
     if abs(x) == 1.0 or abs(y) == 1.0 or z == -1.0:
-        other = np.array((abs(y), abs(z), abs(x)))
-        return np.column_stack((other, np.cross(axis, other), axis))
+        perpendicular = np.array((abs(y), abs(z), abs(x)))
+        return np.column_stack((perpendicular, np.cross(axis, perpendicular), axis))
     angle = float(np.arctan2(np.hypot(x, y), z))
     return rotation_about(np.array((-y, x, 0.0)) / np.hypot(x, y), angle)
 
 
-def _load(link: Link, properties: Any, frame: Array) -> None:
+def _add_body_mass(link: Link, properties: Any, frame: Array) -> None:
     """Add the mass of a body to its link.
 
     Args:
@@ -337,22 +342,24 @@ class LinkPacker:
         self.balls: dict[tuple[int, ...], int] = {}
         self.laws: list[str] = ["evaluate"]
 
-    def mechanism_records(self, kept: Sequence[ConstraintEquations], locks: int = 0) -> None:
+    def mechanism_records(
+        self, constraints: Sequence[ConstraintEquations], lock_count: int = 0
+    ) -> None:
         """Write the records of the mechanism.
 
         Args:
-            kept: constraints to include.
-            locks: number of coordinates that are locked besides.
+            constraints: constraints to include.
+            lock_count: number of coordinates that are locked besides.
         """
         ints, size = self.ints, len(self.order)
         for link in self.links:
             self.numbers += _move_inertia(link)
         ints[MODEL.FIXED_AT] = len(self.numbers)
         for operation in self.operations:
-            before = operation.before
+            frame = operation.before
             self.numbers += [
-                *before[:3, :3].ravel().tolist(),
-                *before[:3, 3].tolist(),
+                *frame[:3, :3].ravel().tolist(),
+                *frame[:3, 3].tolist(),
                 *operation.axis.tolist(),
             ]
         ints[MODEL.LINKS], ints[MODEL.DOFS] = len(self.links), size
@@ -362,10 +369,10 @@ class LinkPacker:
             self.reserve_work(6 * size),
             self.reserve_work(size),
         )
-        above = self.link_records()
-        self.freedom_records(above)
+        ancestors = self.link_records()
+        self.freedom_records(ancestors)
         self.operation_records()
-        self.constraint_records(kept, locks)
+        self.constraint_records(constraints, lock_count)
 
     def reserve_work(self, count: int) -> int:
         """Reserve numbers in the work vector, and return their offset."""
@@ -384,33 +391,33 @@ class LinkPacker:
             Degree of freedom above each one on the path to ground, or -1.
         """
         self.ints[MODEL.LINK_AT] = len(self.ints)
-        above, carrying, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
+        ancestors, last_freedoms, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
         for number, link in enumerate(self.links):
             first, end = self.ends[number], self.ends[number + 1]
-            behind = operation + len(link.operations)
+            end_operation = operation + len(link.operations)
             self.ints += LINK.record(
                 PARENT=link.parent,
                 FIRST_OPERATION=operation,
-                END_OPERATION=behind,
+                END_OPERATION=end_operation,
                 FIRST_DOF=first,
                 END_DOF=end,
             )
-            operation = behind
-            last = carrying[link.parent] if link.parent >= 0 else -1
+            operation = end_operation
+            ancestor = last_freedoms[link.parent] if link.parent >= 0 else -1
             for freedom in range(first, end):
-                above[freedom], last = last, freedom
-            carrying[number] = last
-        return above
+                ancestors[freedom], ancestor = ancestor, freedom
+            last_freedoms[number] = ancestor
+        return ancestors
 
-    def freedom_records(self, above: Sequence[int]) -> None:
+    def freedom_records(self, ancestors: Sequence[int]) -> None:
         """Write the records of the degrees of freedom, and the list of those with summed columns.
 
         Args:
-            above: degree of freedom above each one, or -1.
+            ancestors: degree of freedom above each one, or -1.
         """
         self.ints[MODEL.DOF_AT] = len(self.ints)
         depths: list[int] = []
-        for freedom in above:
+        for freedom in ancestors:
             # A sparse row of the mass matrix has one entry per degree of freedom on the path to
             # ground.
             depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
@@ -419,7 +426,7 @@ class LinkPacker:
             )
             self.entries += depths[-1] + 1
         self.ints[MODEL.SUMMED_AT] = len(self.ints)
-        summed = [number for number in range(len(above)) if number not in self.simple_freedoms]
+        summed = [number for number in range(len(ancestors)) if number not in self.simple_freedoms]
         self.ints[MODEL.SUMMED] = len(summed)
         self.ints += summed
 
@@ -428,12 +435,14 @@ class LinkPacker:
         """Degrees of freedom that are the amount of a single one-axis operation only."""
         users: dict[int, list[Operation]] = {}
         for item in self.operations:
-            for freedom in {self.places.freedom(place) for place in item.arguments}:
+            for freedom in {self.places.freedom(index) for index in item.arguments}:
                 users.setdefault(freedom, []).append(item)
         return {
             freedom
-            for freedom, (first, *others) in users.items()
-            if not others and first.function is None and first.kind in (MOTION.TURN, MOTION.SLIDE)
+            for freedom, (first, *other_users) in users.items()
+            if not other_users
+            and first.function is None
+            and first.kind in (MOTION.TURN, MOTION.SLIDE)
         }
 
     def operation_records(self) -> None:
@@ -444,7 +453,7 @@ class LinkPacker:
         for number, item in enumerate(self.operations):
             freedom, law, gradient = -1, OPERATION.ALONE, 0
             extra = len(self.numbers)
-            freedoms = [self.places.freedom(place) for place in item.arguments]
+            freedoms = [self.places.freedom(index) for index in item.arguments]
             looked_at: list[int] = []
             if item.kind == MOTION.ACCELERATION_ERROR:
                 law = self.require_law("place_drift")
@@ -454,7 +463,7 @@ class LinkPacker:
                 sign, *watched = item.looked_at
                 looked_at = [
                     sign,
-                    *(self.places.freedom(place) for place in watched),
+                    *(self.places.freedom(index) for index in watched),
                     *[-1] * (2 - len(watched)),
                 ]
                 looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
@@ -466,7 +475,7 @@ class LinkPacker:
                 freedom = freedoms[0]
                 law = OPERATION.ALONE if freedom in self.simple_freedoms else OPERATION.TOGETHER
             else:
-                infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
+                infos = [self.places.mechanism.coordinates[index] for index in item.arguments]
                 table = function_table(
                     item.function, f"the function of an axis of the joint '{infos[0].joint}'"
                 )
@@ -480,7 +489,7 @@ class LinkPacker:
             self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = (
                 OPERATION.record(
                     MOTION=item.kind,
-                    BEFORE=_kind_of(item.before),
+                    BEFORE=_classify_transform(item.before),
                     DOF=freedom,
                     FUNCTION=law,
                     ARGUMENTS=arguments,
@@ -490,19 +499,19 @@ class LinkPacker:
                 )
             )
 
-    def constraint_records(self, kept: Sequence[ConstraintEquations], locks: int) -> None:
+    def constraint_records(self, enforced: Sequence[ConstraintEquations], locks: int) -> None:
         """Write the records of constraints, if there are any.
 
         Args:
-            kept: constraints.
+            enforced: constraints.
             locks: number of coordinates that are locked besides.
         """
-        if not kept:
+        if not enforced:
             return
         start, size = len(self.ints), self.ints[MODEL.DOFS]
         self.ints[MODEL.CONSTRAINED] = start
         self.ints += [0] * CONSTRAINED.SIZE
-        constraints = [constraint_record(item, self.places, self.balls) for item in kept]
+        constraints = [constraint_record(item, self.places, self.balls) for item in enforced]
         records: list[int] = []
         equations = 0
         for constraint in constraints:
@@ -545,7 +554,7 @@ class LinkPacker:
         )
 
 
-def _kind_of(matrix: Array) -> int:
+def _classify_transform(matrix: Array) -> int:
     if not np.array_equal(matrix[:3, :3], np.eye(3)):
         return TRANSFORM.MOVE
     return TRANSFORM.SHIFT if matrix[:3, 3].any() else TRANSFORM.NOTHING

@@ -92,8 +92,8 @@ class Mechanism:
                 raise ModelError(
                     f"body '{body.name}' stands before the body that carries it; sort the bodies from ground outwards"
                 )
-        places = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
-        if places != list(range(len(self.coordinates))):
+        indices = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
+        if indices != list(range(len(self.coordinates))):
             raise ModelError(
                 f"the joints of '{self.name}' do not share out its coordinates one by one"
             )
@@ -108,12 +108,12 @@ class Mechanism:
 
     # ------------------------------------------------------------------------------------ names and states
     def __repr__(self) -> str:
-        parts = [
+        counts = [
             format_count(len(self.bodies), "body"),
             format_count(len(self.coordinates), "coordinate"),
             format_count(len(self.constraints), "constraint"),
         ]
-        return f"Mechanism of '{self.name}': {', '.join(parts)}, {self.total_mass:.4g} kg"
+        return f"Mechanism of '{self.name}': {', '.join(counts)}, {self.total_mass:.4g} kg"
 
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -144,8 +144,8 @@ class Mechanism:
                 raise ModelError(
                     f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(alike)}"
                 ) from None
-            near = suggest_name(name, self.coordinate_names)
-            raise ModelError(f"'{self.name}' has no coordinate '{name}'{near}") from None
+            suggestion = suggest_name(name, self.coordinate_names)
+            raise ModelError(f"'{self.name}' has no coordinate '{name}'{suggestion}") from None
 
     def placement(self, name: str) -> FramePlacement:
         """Return the body index and transform of a frame, a body or ground.
@@ -159,8 +159,8 @@ class Mechanism:
         try:
             return self._placements[name]
         except KeyError:
-            near = suggest_name(name, self._placements)
-            raise ModelError(f"'{self.name}' has no body or frame '{name}'{near}") from None
+            suggestion = suggest_name(name, self._placements)
+            raise ModelError(f"'{self.name}' has no body or frame '{name}'{suggestion}") from None
 
     def default_state(self, time: float = 0.0) -> tuple[Array, Array]:
         """Return the default state, changed as little as the constraints demand.
@@ -226,11 +226,11 @@ class Mechanism:
 
     def values(self, q: Values) -> Array:
         """Return coordinate values as an array (n,)."""
-        return self._array(q, "value", self._default_values)
+        return self._convert_to_array(q, "value", self._default_values)
 
     def speeds(self, u: Values) -> Array:
         """Return generalized speeds as an array (n,)."""
-        return self._array(u, "speed", self._default_speeds)
+        return self._convert_to_array(u, "speed", self._default_speeds)
 
     def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> MechanismKinematics:
         """Return the kinematics at a state, from which everything else follows.
@@ -283,7 +283,7 @@ class Mechanism:
             Angular acceleration and acceleration of the origin (6,), rad/s² and m/s², by name of
             the body.
         """
-        accelerations = self.at(q, u).accelerations(self._array(udot, "acceleration"))
+        accelerations = self.at(q, u).accelerations(self._convert_to_array(udot, "acceleration"))
         return {body.name: accelerations[index] for index, body in enumerate(self.bodies)}
 
     def frame_transform(self, frame: str, q: Values) -> Array:
@@ -304,7 +304,7 @@ class Mechanism:
             station: point in the frame (3,), m.
             q: coordinate values.
         """
-        return self.at(q).point(*self._station(frame, station))
+        return self.at(q).point(*self._resolve_station(frame, station))
 
     def station_positions(self, q: Values) -> dict[str, Array]:
         """Compute the positions of all markers and other stations in ground.
@@ -327,7 +327,7 @@ class Mechanism:
             q: coordinate values.
             u: generalized speeds.
         """
-        return self.at(q, u).point_velocity(*self._station(frame, station))
+        return self.at(q, u).point_velocity(*self._resolve_station(frame, station))
 
     def jacobian(self, frame: str, q: Values, station: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """Return the Jacobian (6, n) of a frame and a point of it, in ground.
@@ -340,7 +340,7 @@ class Mechanism:
             q: coordinate values.
             station: point in the frame (3,), m.
         """
-        return self.at(q).point_jacobian(*self._station(frame, station))
+        return self.at(q).point_jacobian(*self._resolve_station(frame, station))
 
     def rate_matrix(self, q: Values) -> Array:
         """Return N (n, n) with qdot = N u.
@@ -352,8 +352,8 @@ class Mechanism:
             return self._unit
         values, matrix = self.values(q), np.eye(len(self.coordinates))
         for mobilizer in self.turning:
-            own = list(mobilizer.coordinates)
-            matrix[np.ix_(own, own)] = mobilizer.rate_matrix(values[own])
+            indices = list(mobilizer.coordinates)
+            matrix[np.ix_(indices, indices)] = mobilizer.rate_matrix(values[indices])
         return matrix
 
     def rate_bias(self, q: Values, u: Values) -> Array:
@@ -371,8 +371,8 @@ class Mechanism:
             return bias
         values, speeds = self.values(q), self.speeds(u)
         for mobilizer in self.turning:
-            own = list(mobilizer.coordinates)
-            bias[own] = mobilizer.rate_bias(values[own], speeds[own])
+            indices = list(mobilizer.coordinates)
+            bias[indices] = mobilizer.rate_bias(values[indices], speeds[indices])
         return bias
 
     def coordinate_rates(self, q: Values, u: Values) -> Array:
@@ -400,7 +400,7 @@ class Mechanism:
             SimulationError: a ball, free or ellipsoid joint is in a pose where the rates are not
                 defined.
         """
-        rates = self._array(qdot, "rate")
+        rates = self._convert_to_array(qdot, "rate")
         if not self.turning:
             return rates.copy()
         return np.asarray(np.linalg.solve(self.rate_matrix(q), rates), dtype=np.float64)
@@ -501,7 +501,9 @@ class Mechanism:
                 name.
         """
         state = self.at(q, u)
-        missing = dynamics.missing_forces(state, self._array(udot, "acceleration"), self.gravity)
+        missing = dynamics.missing_forces(
+            state, self._convert_to_array(udot, "acceleration"), self.gravity
+        )
         return missing - self._sum_applied_forces(state, {}, body_wrenches or {})
 
     @cached_property
@@ -511,7 +513,7 @@ class Mechanism:
 
     def center_of_mass(self, q: Values) -> Array:
         """Return the mass centre in ground (3,), m."""
-        return self._mean(MassCentres.of(self.at(q)).positions())
+        return self._average_by_mass(MassCentres.of(self.at(q)).positions())
 
     def center_of_mass_velocity(self, q: Values, u: Values) -> Array:
         """Return the velocity of the mass centre in ground (3,), m/s.
@@ -520,7 +522,7 @@ class Mechanism:
             q: coordinate values.
             u: generalized speeds.
         """
-        return self._mean(MassCentres.of(self.at(q, u)).velocities())
+        return self._average_by_mass(MassCentres.of(self.at(q, u)).velocities())
 
     def kinetic_energy(self, q: Values, u: Values) -> float:
         """Return the kinetic energy of all bodies (J).
@@ -563,17 +565,17 @@ class Mechanism:
 
     @cached_property
     def _coordinate_places(self) -> dict[str, int]:
-        places = {info.path: index for index, info in enumerate(self.coordinates)}
-        places.update((name, index) for index, name in enumerate(self.coordinate_names))
-        return places
+        indices = {info.path: index for index, info in enumerate(self.coordinates)}
+        indices.update((name, index) for index, name in enumerate(self.coordinate_names))
+        return indices
 
     @cached_property
     def _placements(self) -> dict[str, FramePlacement]:
-        still = np.eye(4)
-        places = {name: FramePlacement(GROUND, still) for name in ("ground", "/ground")}
+        identity = np.eye(4)
+        placements = {name: FramePlacement(GROUND, identity) for name in ("ground", "/ground")}
         for index, body in enumerate(self.bodies):
-            places[body.name] = places[body.path] = FramePlacement(index, still)
-        return places | dict(self.frames)
+            placements[body.name] = placements[body.path] = FramePlacement(index, identity)
+        return placements | dict(self.frames)
 
     @cached_property
     def _default_values(self) -> tuple[float, ...]:
@@ -603,7 +605,7 @@ class Mechanism:
         """
         return tuple(body.mobilizer for body in self.bodies if not body.mobilizer.speeds_are_rates)
 
-    def _mean(self, vectors: Array) -> Array:
+    def _average_by_mass(self, vectors: Array) -> Array:
         """Return the mean of one vector per body (b, 3), weighted by mass.
 
         It is zero if no body has mass.
@@ -611,7 +613,7 @@ class Mechanism:
         # A division by 1 instead of 0 leaves the sum, which is 0.
         return self.inertial[0] @ vectors / (self.total_mass or 1.0)
 
-    def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
+    def _resolve_station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
         """Return the body of a frame, and a point of the frame in the body (3,), m.
 
         Args:
@@ -632,7 +634,7 @@ class Mechanism:
             forces: generalized forces, zero where omitted.
             wrenches: wrenches at the origins of bodies or frames, by name.
         """
-        total = self._array(forces, "force")
+        total = self._convert_to_array(forces, "force")
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)
             # Spatial vectors have the angular part first.
@@ -640,12 +642,14 @@ class Mechanism:
             total = total + load @ state.point_jacobian(body, placed[:3, 3])
         return total
 
-    def _array(self, values: Values, what: str, defaults: Sequence[float] = ()) -> Array:
+    def _convert_to_array(
+        self, values: Values, quantity: str, defaults: Sequence[float] = ()
+    ) -> Array:
         """Return values of coordinates as an array (n,).
 
         Args:
             values: array, or numbers by coordinate name.
-            what: description of one number, for messages.
+            quantity: description of one number, for messages.
             defaults: values of omitted names; zeros if empty.
 
         Raises:
@@ -663,18 +667,18 @@ class Mechanism:
         result = np.asarray(values, dtype=float)
         if result.shape != (count,):
             raise ModelError(
-                f"'{self.name}' takes one {what} for each of its {count} coordinates, in their order; "
-                f"got {_sizes(result)}"
+                f"'{self.name}' takes one {quantity} for each of its {count} coordinates, in their order; "
+                f"got {_describe_shape(result)}"
             )
         return result
 
 
-def _make_vector(values: ArrayLike, what: str) -> Array:
+def _make_vector(values: ArrayLike, quantity: str) -> Array:
     result = np.asarray(values, dtype=float)
     if result.shape != (3,):
-        raise ModelError(f"a {what} has 3 numbers; got {_sizes(result)}")
+        raise ModelError(f"a {quantity} has 3 numbers; got {_describe_shape(result)}")
     return result
 
 
-def _sizes(values: Array) -> str:
+def _describe_shape(values: Array) -> str:
     return " × ".join(str(size) for size in values.shape) or "a single one"

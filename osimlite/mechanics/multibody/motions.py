@@ -50,7 +50,7 @@ class JointMotion(ABC):
 
     def transform(self, q: Array) -> Array:
         """Return the outgoing frame in the incoming frame (4, 4)."""
-        return reduce(np.matmul, (part.transform(q) for part in self.elementary()), np.eye(4))
+        return reduce(np.matmul, (motion.transform(q) for motion in self.elementary()), np.eye(4))
 
     def rates(self, q: Array) -> Array | None:
         """Return N (k, k) with qdot = N u for these `coordinates`.
@@ -167,9 +167,14 @@ class SimbodyAccelerationError(JointMotion):
             not turned[1] or (turned[0] <= {0} and not turned[1] & {0} and not turned[2] & {0})
         ) and (not turned[2] or (turned[0] | turned[1] <= {0, 1} and not turned[2] & {0, 1})):
             return ()
-        places = tuple(sorted(set().union(*(turn.coordinates for turn in self.turns))))
+        coordinates = tuple(sorted(set().union(*(turn.coordinates for turn in self.turns))))
         return tuple(
-            AxisMotion("rotate", np.array(axis), places, AccelerationErrorAngle(self, places, row))
+            AxisMotion(
+                "rotate",
+                np.array(axis),
+                coordinates,
+                AccelerationErrorAngle(self, coordinates, row),
+            )
             for row, axis in enumerate((X, Y, Z))
         )
 
@@ -205,11 +210,11 @@ class SphericalMotion(JointMotion):
         Returns:
             One-axis motions, in order.
         """
-        turns = tuple(
-            AxisMotion("rotate", np.array(axis), (place,))
-            for axis, place in zip((X, Y, Z), self.coordinates, strict=True)
+        rotations = tuple(
+            AxisMotion("rotate", np.array(axis), (coordinate,))
+            for axis, coordinate in zip((X, Y, Z), self.coordinates, strict=True)
         )
-        slides = tuple(
+        translations = tuple(
             AxisMotion(
                 "translate",
                 np.array(axis),
@@ -219,7 +224,7 @@ class SphericalMotion(JointMotion):
             for component, (axis, radius) in enumerate(zip((X, Y, Z), self.radii, strict=True))
             if radius != 0.0
         )
-        return slides + turns
+        return translations + rotations
 
     def rates(self, q: Array) -> Array:
         """Return N (3, 3) with the rates of the angles N u.
@@ -227,8 +232,8 @@ class SphericalMotion(JointMotion):
         Raises:
             SimulationError: the second angle is a right angle, where N is singular.
         """
-        own: Any = self._angles(q)
-        return np.array([angle_rate_row(own, _FIRST, part) for part in range(3)])
+        angles: Any = self._angles(q)
+        return np.array([angle_rate_row(angles, _FIRST, row) for row in range(3)])
 
     def rate_bias(self, q: Array, u: Array) -> Array:
         """Return Ndot u (3,).
@@ -240,10 +245,10 @@ class SphericalMotion(JointMotion):
         Raises:
             SimulationError: the second angle is a right angle, where N is singular.
         """
-        own, rows = self._angles(q), self.rates(q)
+        angles, rows = self._angles(q), self.rates(q)
         rates: Any = (rows @ u[list(self.coordinates)]).tolist()
         return np.array(
-            [angle_acceleration_bias(own, rates, _FIRST, tuple(row)) for row in rows.tolist()]
+            [angle_acceleration_bias(angles, rates, _FIRST, tuple(row)) for row in rows.tolist()]
         )
 
     def _angles(self, q: Array) -> Any:

@@ -65,7 +65,7 @@ class PackedMechanism:
         self.order = list(order)
         self.freedoms = np.argsort(order)
         self.constraints = {id(item): number for number, item in enumerate(constraints)}
-        self.bound = frozenset(place for item in constraints for place in item.coordinates)
+        self.bound = frozenset(index for item in constraints for index in item.coordinates)
         self.on_bodies = any(item.bodies for item in constraints)
         placements = [*tree.places.placements, tree.places.placement(GROUND)]
         self.links = np.array([item.link for item in placements])
@@ -92,10 +92,10 @@ class PackedMechanism:
             First equation, end of its equations, and end of those that constrain positions.
         """
         s = self.model
-        at = s[
+        record = s[
             s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]
         ]
-        return tuple(s[at + k] for k in _ENDS)
+        return tuple(s[record + k] for k in _ENDS)
 
     def equations(self, data: Floats) -> Equations:
         """Return all equations from a work vector after `evaluate_constraints`."""
@@ -109,19 +109,19 @@ class PackedMechanism:
         rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[
             :, self.freedoms
         ]
-        places = (CONSTRAINED.WORK_ERRORS, CONSTRAINED.WORK_RATES, CONSTRAINED.WORK_DRIFTS)
-        errors, rates, drifts = (vector[h[place] :][:count].copy() for place in places)
+        fields = (CONSTRAINED.WORK_ERRORS, CONSTRAINED.WORK_RATES, CONSTRAINED.WORK_DRIFTS)
+        errors, rates, drifts = (vector[h[field] :][:count].copy() for field in fields)
         return Equations(errors, rows, rates, drifts)
 
     @cached_property
     def still(self) -> NDArray[np.bool_]:
         """Table (b + 1, n) of whether a body, the last being ground, ignores a coordinate."""
         links, ends, order, _ = self.tree
-        still = np.ones((len(links) + 1, len(order)), dtype=bool)
+        is_independent = np.ones((len(links) + 1, len(order)), dtype=bool)
         for number, link in enumerate(links):
-            still[number] = still[link.parent]
-            still[number, list(order[ends[number] : ends[number + 1]])] = False
-        return np.asarray(still[self.links])
+            is_independent[number] = is_independent[link.parent]
+            is_independent[number, list(order[ends[number] : ends[number + 1]])] = False
+        return np.asarray(is_independent[self.links])
 
     @cached_property
     def _entries(self) -> NDArray[np.int_]:
@@ -129,17 +129,17 @@ class PackedMechanism:
         s, entries = self.model, []
         for freedom in range(len(self.order)):
             record = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom :]
-            above, place = freedom, record[DOF.ROW]
-            while above >= 0:
-                entries.append((self.order[freedom], self.order[above], place))
-                above, place = s[s[MODEL.DOF_AT] + DOF.SIZE * above + DOF.ABOVE], place + 1
+            ancestor, offset = freedom, record[DOF.ROW]
+            while ancestor >= 0:
+                entries.append((self.order[freedom], self.order[ancestor], offset))
+                ancestor, offset = s[s[MODEL.DOF_AT] + DOF.SIZE * ancestor + DOF.ABOVE], offset + 1
         return np.array(entries, dtype=int).reshape(-1, 3).T
 
     def mass_matrix(self, data: Floats) -> Array:
         """Return the mass matrix (n, n) from a work vector."""
-        (rows, columns, places), size = self._entries, len(self.order)
+        (rows, columns, offsets), size = self._entries, len(self.order)
         matrix = np.zeros((size, size))
-        matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(data)[places]
+        matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(data)[offsets]
         return matrix
 
     def state(self, q: Array, u: Array) -> tuple[Floats, Floats, Floats]:

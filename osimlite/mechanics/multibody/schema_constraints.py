@@ -193,24 +193,24 @@ class ConstraintReader:
         )
 
 
-def unknown_constraint(path: str, kind: str) -> UnsupportedError:
+def unknown_constraint(path: str, class_name: str) -> UnsupportedError:
     """Return the error for a constraint of an unknown class.
 
     Args:
         path: path of the constraint.
-        kind: name of its class.
+        class_name: name of its class.
     """
     return UnsupportedError(
-        f"the constraint '{path}' ({kind}) cannot be computed; set its isEnforced to false or remove it; "
+        f"the constraint '{path}' ({class_name}) cannot be computed; set its isEnforced to false or remove it; "
         f"those osimlite computes are {join_words([item.__name__ for item in _READERS], max_count=len(_READERS))}"
     )
 
 
-def _parse_direction(vector: tuple[float, float, float], what: str) -> Array:
+def _parse_direction(vector: tuple[float, float, float], description: str) -> Array:
     direction = np.array(vector, dtype=float)
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
-        raise ModelError(f"{what} has no direction; give a vector that is not zero")
+        raise ModelError(f"{description} has no direction; give a vector that is not zero")
     return direction / length
 
 

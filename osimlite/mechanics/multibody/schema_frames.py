@@ -43,28 +43,28 @@ class Placements:
         """
         # Each waiting frame is fixed to the next one. A list instead of recursion, because a chain
         # of frames may be of any length.
-        wanted = self.path(frame)
-        waiting = {} if wanted in self.found else {wanted: frame}
+        frame_path = self.path(frame)
+        waiting = {} if frame_path in self.found else {frame_path: frame}
         while waiting:
-            path, last = next(reversed(waiting.items()))
-            below = next(
+            path, unresolved = next(reversed(waiting.items()))
+            parent_frame = next(
                 (
                     item
-                    for item in self._list_parent_frames(last)
+                    for item in self._list_parent_frames(unresolved)
                     if self.path(item) not in self.found
                 ),
                 None,
             )
-            if below is None:
-                self.found[path] = self._place_frame(last, path)
+            if parent_frame is None:
+                self.found[path] = self._place_frame(unresolved, path)
                 del waiting[path]
-            elif (place := self.path(below)) in waiting:
+            elif (parent_path := self.path(parent_frame)) in waiting:
                 raise ModelError(
-                    f"the frame '{place}' is fixed to itself, through {join_words(waiting)}; fix it to a body"
+                    f"the frame '{parent_path}' is fixed to itself, through {join_words(waiting)}; fix it to a body"
                 )
             else:
-                waiting[place] = below
-        return self.found[wanted]
+                waiting[parent_path] = parent_frame
+        return self.found[frame_path]
 
     def _list_parent_frames(self, frame: PhysicalFrame) -> list[PhysicalFrame]:
         """Return the frames that a frame is defined by."""
@@ -114,9 +114,9 @@ class Placements:
         """
         target = self.tree.target(owner, socket, getattr(owner, socket))
         if not isinstance(target, PhysicalFrame):
-            kind = getattr(target, "class_name", "") or type(target).__name__
+            class_name = getattr(target, "class_name", "") or type(target).__name__
             raise UnsupportedError(
-                f"'{self.path(owner)}': {socket} names '{self.path(target)}', a {kind}, "
+                f"'{self.path(owner)}': {socket} names '{self.path(target)}', a {class_name}, "
                 "which osimlite cannot place; name a body or a PhysicalOffsetFrame"
             )
         return target
@@ -171,8 +171,8 @@ class Placements:
                 f"the stations of the frame '{path}' are fixed to {join_words(sorted(set(bases)))}; fix all to one body"
             )
         a, b, c, origin = points
-        along, across = b - a, cross(b - a, c - a)
-        if not np.linalg.norm(across) > 0.0:
+        ab, normal = b - a, cross(b - a, c - a)
+        if not np.linalg.norm(normal) > 0.0:
             raise ModelError(
                 f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it"
             )
@@ -183,9 +183,7 @@ class Placements:
         first = np.eye(3)[0] if first is None else first
         if second is None or first @ second != 0.0:
             second = np.roll(np.abs(first), 1)
-        vectors = [
-            vector / np.linalg.norm(vector) for vector in (along, across, cross(along, across))
-        ]
+        vectors = [vector / np.linalg.norm(vector) for vector in (ab, normal, cross(ab, normal))]
         axes = [first, second, cross(first, second)]
         rotation = np.array(vectors).T @ np.array(axes)
         return bases[0], make_transform(rotation, origin)

@@ -34,7 +34,7 @@ def convert_function(
     """
     if function is None:
         raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")
-    kind = type(function)
+    function_class = type(function)
     try:
         if isinstance(function, schema.MultiplierFunction):
             inner = convert_function(
@@ -42,7 +42,7 @@ def convert_function(
             )
             return f.ScaledFunction(function.scale, inner)
         if isinstance(function, schema.MultivariatePolynomialFunction):
-            _converts(function, function.dimension, arguments)
+            _require_argument_count(function, function.dimension, arguments)
             return f.MultivariatePolynomial.complete(
                 function.coefficients,
                 function.dimension,
@@ -53,33 +53,33 @@ def convert_function(
             return _convert_linear(function, arguments)
         if isinstance(function, schema.Constant):
             return f.ConstantValue(function.value)
-        if kind not in _UNIVARIATE:
-            name = function.class_name if isinstance(function, Unknown) else kind.__name__
-            can = [
+        if function_class not in _UNIVARIATE:
+            name = function.class_name if isinstance(function, Unknown) else function_class.__name__
+            supported = [
                 "Constant",
                 "LinearFunction",
                 "MultiplierFunction",
                 "MultivariatePolynomialFunction",
             ]
-            can += [item.__name__ for item in _UNIVARIATE]
+            supported += [item.__name__ for item in _UNIVARIATE]
             raise UnsupportedError(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
-                f"the functions it can are {join_words(can, max_count=len(can))}"
+                f"the functions it can are {join_words(supported, max_count=len(supported))}"
             )
-        _converts(function, 1, arguments)
-        return _UNIVARIATE[kind](function)
+        _require_argument_count(function, 1, arguments)
+        return _UNIVARIATE[function_class](function)
     except _Impossible as problem:
-        raise ModelError(f"{where} ({kind.__name__}): {problem}") from None
+        raise ModelError(f"{where} ({function_class.__name__}): {problem}") from None
 
 
 class _Impossible(Exception):
     """Error of a function, with the remedy but without its position in the model."""
 
 
-def _converts(function: Object, wanted: int, given: int) -> None:
-    if given != wanted:
+def _require_argument_count(function: Object, expected: int, count: int) -> None:
+    if count != expected:
         raise _Impossible(
-            f"it is a function of {wanted} variables and gets {given}; list as many coordinates"
+            f"it is a function of {expected} variables and gets {count}; list as many coordinates"
         )
 
 
@@ -99,7 +99,7 @@ def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Smooth
 
 
 def _read_points(
-    function: Any, least: int, *, apart: bool = False
+    function: Any, least: int, *, distinct: bool = False
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the abscissae and ordinates of a function through points, after checks.
 
@@ -107,7 +107,7 @@ def _read_points(
         function: function with properties `x` and `y`; ordinates beyond the last abscissa are
             ignored, as in OpenSim.
         least: smallest number of points.
-        apart: whether abscissae must differ.
+        distinct: whether abscissae must differ.
 
     Returns:
         Abscissae and ordinates.
@@ -120,8 +120,8 @@ def _read_points(
         )
     if not all(map(isfinite, (*x, *y))):
         raise _Impossible("a point is not finite; give numbers")
-    if any(after < before or (apart and after == before) for before, after in pairwise(x)):
-        repeated = " and remove repeated ones" if apart else ""
+    if any(right < left or (distinct and right == left) for left, right in pairwise(x)):
+        repeated = " and remove repeated ones" if distinct else ""
         raise _Impossible(f"its x do not increase; sort the points{repeated}")
     return x, y
 
@@ -148,11 +148,11 @@ def _convert_gcv_spline(function: schema.GCVSpline) -> f.SmoothFunction:
     half_order = function.half_order
     if half_order < 1:
         raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
-    x, y = _read_points(function, 2 * half_order, apart=True)
+    x, y = _read_points(function, 2 * half_order, distinct=True)
     # The module is imported here, because the linter evaluates other functions without numpy.
     splines: Any = import_module("osimlite.mechanics.multibody.smoothing_spline")
-    made: f.SmoothFunction = splines.smoothing_spline(x, y, half_order, function.error_variance)
-    return made
+    spline: f.SmoothFunction = splines.smoothing_spline(x, y, half_order, function.error_variance)
+    return spline
 
 
 def _convert_step(function: schema.StepFunction) -> f.SmoothFunction:

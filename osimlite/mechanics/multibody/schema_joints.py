@@ -55,7 +55,7 @@ def joint_motions(
             impossible.
         UnsupportedError: the joint or a function is of an unknown class.
     """
-    kind, coordinates = type(joint).__name__, list(joint.coordinates)
+    class_name, coordinates = type(joint).__name__, list(joint.coordinates)
     if isinstance(joint, schema.CustomJoint):
         return _build_custom_motions(joint, path, opensim_derivatives)
     if isinstance(joint, EllipsoidJoint):
@@ -72,25 +72,27 @@ def joint_motions(
                 f"the rod of '{path}' has the length {joint.length:g}; give a positive length in m"
             )
         motions = constant_curvature(joint.length, joint.neutral_angle_x_z_y)
-    elif kind in MOTIONS:
-        motions = MOTIONS[kind]
+    elif class_name in MOTIONS:
+        motions = MOTIONS[class_name]
     else:
-        raise unknown_joint(path, kind)
-    needed = 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
+        raise unknown_joint(path, class_name)
+    needed = 1 + max((index for motion in motions for index in motion.coordinates), default=-1)
     if len(coordinates) != needed:
-        raise ModelError(f"{kind} '{path}' has {len(coordinates)} coordinates and needs {needed}")
+        raise ModelError(
+            f"{class_name} '{path}' has {len(coordinates)} coordinates and needs {needed}"
+        )
     return motions, coordinates
 
 
-def unknown_joint(path: str, kind: str) -> UnsupportedError:
+def unknown_joint(path: str, class_name: str) -> UnsupportedError:
     """Return the error for a joint of an unknown class.
 
     Args:
         path: path of the joint.
-        kind: name of its class.
+        class_name: name of its class.
     """
     return UnsupportedError(
-        f"'{path}' is a {kind}, whose motion osimlite cannot compute; the joints it can are "
+        f"'{path}' is a {class_name}, whose motion osimlite cannot compute; the joints it can are "
         f"{join_words(JOINT_TYPES, max_count=len(JOINT_TYPES))}"
     )
 
@@ -111,13 +113,13 @@ def _build_custom_motions(
     Raises:
         ModelError: an axis has no direction or an unknown coordinate, or a coordinate is unused.
     """
-    known = {coordinate.name: coordinate for coordinate in joint.coordinates}
+    coordinates = {coordinate.name: coordinate for coordinate in joint.coordinates}
     order: dict[str, int] = {}
     axes: list[JointAxis] = []
     for name, axis in joint.spatial_transform.axes().items():
         where, words = f"{name} of '{path}'", axis.names
         for word in words:
-            if word not in known:
+            if word not in coordinates:
                 raise ModelError(
                     f"{where} names the coordinate '{word}', which the joint does not have; add it there"
                 )
@@ -134,14 +136,14 @@ def _build_custom_motions(
             opensim_derivatives=opensim_derivatives,
         )
         axes.append(JointAxis(tuple(order[word] for word in words), direction, function))
-    unused = [name for name in known if name not in order]
+    unused = [name for name in coordinates if name not in order]
     if unused:
         raise ModelError(
-            f"CustomJoint '{path}' has {len(known)} coordinates and needs {len(order)}: "
+            f"CustomJoint '{path}' has {len(coordinates)} coordinates and needs {len(order)}: "
             f"nothing in its SpatialTransform depends on {join_words(unused)}"
         )
     motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
-    return motions, [known[name] for name in order]
+    return motions, [coordinates[name] for name in order]
 
 
 def _read_radii(radii: Sequence[float], path: str) -> Sequence[float]:

@@ -36,8 +36,8 @@ class PiecewisePolynomial(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """Table of the pieces, see `kernels.functions`."""
-        head = FUNCTION_TYPE.PIECES, 1.0, len(self.knots), self.pieces.shape[1]
-        numbers: list[float] = np.concatenate([head, self.knots, self.pieces.ravel()]).tolist()
+        header = FUNCTION_TYPE.PIECES, 1.0, len(self.knots), self.pieces.shape[1]
+        numbers: list[float] = np.concatenate([header, self.knots, self.pieces.ravel()]).tolist()
         return numbers
 
 
@@ -56,7 +56,9 @@ def smoothing_spline(
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if error_variance != 0.0:
-        values = _smooth_values(_unit_spacing(points)[0], values, half_order, error_variance)
+        values = _smooth_values(
+            _scale_to_unit_spacing(points)[0], values, half_order, error_variance
+        )
     (spline,) = natural_splines(points, values[:, None], half_order)
     return spline
 
@@ -73,9 +75,10 @@ def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[Piecewi
         One spline per column.
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    places, scale = _unit_spacing(points)
+    scaled_points, scale = _scale_to_unit_spacing(points)
     pieces = (
-        _compute_pieces(places, values, half_order) / scale ** np.arange(2.0 * half_order)[:, None]
+        _compute_pieces(scaled_points, values, half_order)
+        / scale ** np.arange(2.0 * half_order)[:, None]
     )
     # The piece before the first point is relative to that point, too.
     knots = np.append(points[0], points)
@@ -86,21 +89,21 @@ def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[Piecewi
 
 
 def derivatives_of_samples(
-    x: ArrayLike, y: ArrayLike, at: ArrayLike, orders: Sequence[int], half_order: int = 3
+    x: ArrayLike, y: ArrayLike, arguments: ArrayLike, orders: Sequence[int], half_order: int = 3
 ) -> tuple[Array, ...]:
     """Return derivatives of natural splines through sampled points.
 
     Args:
         x: abscissae (n,), which increase.
         y: ordinates (n, m), in m columns.
-        at: arguments (k,).
+        arguments: arguments (k,).
         orders: orders of the derivatives; 0 is the value.
         half_order: half of the order of the splines, whose degree is 2 `half_order` - 1.
 
     Returns:
         One array (k, m) per order.
     """
-    return SampledCurves(x, y, half_order).derivatives(at, orders)
+    return SampledCurves(x, y, half_order).derivatives(arguments, orders)
 
 
 class SampledCurves:
@@ -114,32 +117,32 @@ class SampledCurves:
 
     def __init__(self, x: ArrayLike, y: ArrayLike, half_order: int = 3) -> None:
         points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        places, self._scale = _unit_spacing(points)
+        scaled_points, self._scale = _scale_to_unit_spacing(points)
         # Points that are nearly equal determine no slope between them within rounding: drop the
         # later ones.
-        kept = np.diff(places, prepend=-1.0) > TOUCHING
-        self._start, self._places = points[0], places[kept]
-        self._pieces = _compute_pieces(self._places, values[kept], half_order)
+        is_distinct = np.diff(scaled_points, prepend=-1.0) > TOUCHING
+        self._start, self._places = points[0], scaled_points[is_distinct]
+        self._pieces = _compute_pieces(self._places, values[is_distinct], half_order)
 
-    def derivatives(self, at: ArrayLike, orders: Sequence[int]) -> tuple[Array, ...]:
+    def derivatives(self, arguments: ArrayLike, orders: Sequence[int]) -> tuple[Array, ...]:
         """Return derivatives of the splines.
 
         Args:
-            at: arguments (k,).
+            arguments: arguments (k,).
             orders: orders of the derivatives; 0 is the value.
 
         Returns:
             One array (k, m) per order.
         """
-        own = (np.asarray(at, dtype=float) - self._start) / self._scale
-        found = (
-            (order, _evaluate_derivative(self._places, self._pieces, own, order))
+        scaled_arguments = (np.asarray(arguments, dtype=float) - self._start) / self._scale
+        scaled_derivatives = (
+            (order, _evaluate_derivative(self._places, self._pieces, scaled_arguments, order))
             for order in orders
         )
-        return tuple(values / self._scale**order for order, values in found)
+        return tuple(values / self._scale**order for order, values in scaled_derivatives)
 
 
-def _unit_spacing(points: Array) -> tuple[Array, float]:
+def _scale_to_unit_spacing(points: Array) -> tuple[Array, float]:
     """Scale points to a mean spacing of 1, which keeps powers of the widths in bounds.
 
     Args:
@@ -152,21 +155,24 @@ def _unit_spacing(points: Array) -> tuple[Array, float]:
     return (points - points[0]) / scale, scale
 
 
-def _evaluate_derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
+def _evaluate_derivative(points: Array, pieces: Array, arguments: Array, order: int) -> Array:
     """Return a derivative (j, k) at j arguments of the splines of `_compute_pieces`.
 
     Args:
         points: abscissae (n,).
         pieces: coefficients (n + 1, 2m, k).
-        at: arguments (j,).
+        arguments: arguments (j,).
         order: order of the derivative.
     """
-    place = np.searchsorted(points, at, side="right")
-    t, own = (at - points[np.maximum(place - 1, 0)])[:, None], pieces[place]
-    result = np.zeros_like(own[:, 0])
+    piece_indices = np.searchsorted(points, arguments, side="right")
+    t, coefficients = (
+        (arguments - points[np.maximum(piece_indices - 1, 0)])[:, None],
+        pieces[piece_indices],
+    )
+    result = np.zeros_like(coefficients[:, 0])
     # Horner's rule with the factors of the derivative.
     for power in range(pieces.shape[1] - 1, order - 1, -1):
-        result = result * t + math.perm(power, order) * own[:, power]
+        result = result * t + math.perm(power, order) * coefficients[:, power]
     return result
 
 
@@ -192,7 +198,7 @@ def _compute_pieces(points: Array, values: Array, half_order: int) -> Array:
     # set to 0, which keeps digits of small changes of large values.
     ends = np.concatenate([derivatives[:-1], derivatives[1:]], axis=1)
     ends[:, 0], ends[:, half_order] = 0.0, np.diff(values, axis=0)
-    shapes, _ = _unit_interval(half_order)
+    shapes, _ = _make_unit_interval_matrices(half_order)
     pieces = np.zeros((len(points) + 1, 2 * half_order, values.shape[1]))
     pieces[1:-1] = shapes @ (ends * np.tile(width[:, :half_order], (1, 2, 1))) / width
     pieces[1:, :half_order] = (
@@ -217,7 +223,7 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
     result[:, 0] = values
     if half_order == 1:
         return result
-    width, (_, bending) = np.diff(points), _unit_interval(half_order)
+    width, (_, bending) = np.diff(points), _make_unit_interval_matrices(half_order)
     powers = np.tile(width[:, None] ** np.arange(half_order), 2)
     stiffness = (
         bending
@@ -226,22 +232,27 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
         * width[:, None, None] ** (1 - 2 * half_order)
     )
     # The values at the points are known; only derivatives are unknown.
-    one, two = slice(1, half_order), slice(half_order + 1, 2 * half_order)
+    left_derivatives, right_derivatives = (
+        slice(1, half_order),
+        slice(half_order + 1, 2 * half_order),
+    )
     diagonal = np.zeros((len(points), half_order - 1, half_order - 1))
-    diagonal[:-1] += stiffness[:, one, one]
-    diagonal[1:] += stiffness[:, two, two]
-    rise, right = (
+    diagonal[:-1] += stiffness[:, left_derivatives, left_derivatives]
+    diagonal[1:] += stiffness[:, right_derivatives, right_derivatives]
+    rise, rhs = (
         np.diff(values, axis=0)[:, None],
         np.zeros((len(points), half_order - 1, values.shape[1])),
     )
-    right[:-1] -= stiffness[:, one, half_order, None] * rise
-    right[1:] -= stiffness[:, two, half_order, None] * rise
-    result[:, 1:] = _solve_block_tridiagonal(diagonal, stiffness[:, one, two], right)
+    rhs[:-1] -= stiffness[:, left_derivatives, half_order, None] * rise
+    rhs[1:] -= stiffness[:, right_derivatives, half_order, None] * rise
+    result[:, 1:] = _solve_block_tridiagonal(
+        diagonal, stiffness[:, left_derivatives, right_derivatives], rhs
+    )
     return result
 
 
 @cache
-def _unit_interval(half_order: int) -> tuple[Array, Array]:
+def _make_unit_interval_matrices(half_order: int) -> tuple[Array, Array]:
     """Return matrices of the polynomial of degree 2m - 1 over a unit interval.
 
     The polynomial is determined by its derivatives up to order m - 1 at 0, and then at 1.
@@ -251,20 +262,20 @@ def _unit_interval(half_order: int) -> tuple[Array, Array]:
         integral of its squared m-th derivative (2m, 2m). All entries are fractions of whole
         numbers.
     """
-    size, parts = 2 * half_order, math.factorial(half_order - 1)
+    size, denominator = 2 * half_order, math.factorial(half_order - 1)
     ends = np.zeros((size, size))
     for order in range(half_order):
         ends[order, order] = math.factorial(order)
         ends[half_order + order] = [math.perm(power, order) for power in range(size)]
     # Rounding to fractions removes the error of the inverse.
-    shapes = np.rint(np.linalg.inv(ends) * parts) / parts
+    shapes = np.rint(np.linalg.inv(ends) * denominator) / denominator
     falling = np.array([float(math.perm(power, half_order)) for power in range(size)])
     sums = np.add.outer(np.arange(size), np.arange(size)) - size + 1
     bending = shapes.T @ (np.outer(falling, falling) / np.maximum(sums, 1)) @ shapes
     return shapes, np.rint(bending)
 
 
-def _solve_block_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Array:
+def _solve_block_tridiagonal(diagonal: Array, off_diagonal: Array, rhs: Array) -> Array:
     """Return the solution (n, p, k) of symmetric block-tridiagonal equations.
 
     Every other unknown is eliminated at once until one is left: cyclic reduction (R. Hockney, J.
@@ -272,32 +283,32 @@ def _solve_block_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Ar
 
     Args:
         diagonal: blocks (n, p, p); the matrix is positive definite.
-        beside: blocks (n - 1, p, p) to the right of them.
-        right: right sides (n, p, k).
+        off_diagonal: blocks (n - 1, p, p) to the right of them.
+        rhs: right sides (n, p, k).
     """
     if len(diagonal) == 1:
-        return np.asarray(np.linalg.solve(diagonal, right), dtype=np.float64)
-    size, before, behind = diagonal.shape[1], beside[::2], beside[1::2]
-    count = len(behind)
-    wide = np.zeros((len(before), size, 2 * size + right.shape[2]))
-    wide[:, :, :size], wide[:count, :, size : 2 * size] = before.transpose(0, 2, 1), behind
-    wide[:, :, 2 * size :] = right[1::2]
-    from_before, from_behind, own = np.split(
+        return np.asarray(np.linalg.solve(diagonal, rhs), dtype=np.float64)
+    size, lower, upper = diagonal.shape[1], off_diagonal[::2], off_diagonal[1::2]
+    count = len(upper)
+    wide = np.zeros((len(lower), size, 2 * size + rhs.shape[2]))
+    wide[:, :, :size], wide[:count, :, size : 2 * size] = lower.transpose(0, 2, 1), upper
+    wide[:, :, 2 * size :] = rhs[1::2]
+    from_lower, from_upper, solution = np.split(
         np.linalg.solve(diagonal[1::2], wide), [size, 2 * size], axis=2
     )
-    kept, sides = diagonal[::2].copy(), right[::2].copy()
-    kept[: len(before)] -= before @ from_before
-    sides[: len(before)] -= before @ own
-    back = behind.transpose(0, 2, 1)
-    kept[1 : 1 + count] -= back @ from_behind[:count]
-    sides[1 : 1 + count] -= back @ own[:count]
-    result = np.empty_like(right)
+    reduced_diagonal, reduced_rhs = diagonal[::2].copy(), rhs[::2].copy()
+    reduced_diagonal[: len(lower)] -= lower @ from_lower
+    reduced_rhs[: len(lower)] -= lower @ solution
+    upper_transposed = upper.transpose(0, 2, 1)
+    reduced_diagonal[1 : 1 + count] -= upper_transposed @ from_upper[:count]
+    reduced_rhs[1 : 1 + count] -= upper_transposed @ solution[:count]
+    result = np.empty_like(rhs)
     result[::2] = half = _solve_block_tridiagonal(
-        kept, -before[:count] @ from_behind[:count], sides
+        reduced_diagonal, -lower[:count] @ from_upper[:count], reduced_rhs
     )
-    own -= from_before @ half[: len(before)]
-    own[:count] -= from_behind[:count] @ half[1 : 1 + count]
-    result[1::2] = own
+    solution -= from_lower @ half[: len(lower)]
+    solution[:count] -= from_upper[:count] @ half[1 : 1 + count]
+    result[1::2] = solution
     return result
 
 
@@ -315,12 +326,12 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
     # eigenvectors make the evaluation for each smoothing parameter p cheap.
     nodes, weights = np.polynomial.legendre.leggauss(half_order)
     width, middle = np.diff(points) / 2.0, (points[1:] + points[:-1]) / 2.0
-    places = (middle[:, None] + width[:, None] * nodes).ravel()
-    bends = _evaluate_derivative(
-        points, _compute_pieces(points, np.eye(n), half_order), places, half_order
+    abscissae = (middle[:, None] + width[:, None] * nodes).ravel()
+    basis_derivatives = _evaluate_derivative(
+        points, _compute_pieces(points, np.eye(n), half_order), abscissae, half_order
     )
     roughness, vectors = np.linalg.eigh(
-        bends.T @ ((width[:, None] * weights).ravel()[:, None] * bends)
+        basis_derivatives.T @ ((width[:, None] * weights).ravel()[:, None] * basis_derivatives)
     )
     roughness = np.maximum(roughness, 0.0)
     # Polynomials of degree m - 1 have no roughness; rounding must not give them any.
@@ -329,8 +340,11 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
 
     def criterion(logarithm: float) -> float:
         """Return what the smoothing minimizes, at the logarithm of the smoothing."""
-        left = 1.0 - 1.0 / (1.0 + math.exp(logarithm) * roughness)
-        trace, error = float(left.sum()) / n, float(np.sum((left * loads) ** 2)) / n
+        residual_factors = 1.0 - 1.0 / (1.0 + math.exp(logarithm) * roughness)
+        trace, error = (
+            float(residual_factors.sum()) / n,
+            float(np.sum((residual_factors * loads) ** 2)) / n,
+        )
         # Generalized cross validation (Woltring 1986), else the mean squared error for a known
         # variance.
         if error_variance < 0.0:

@@ -36,9 +36,9 @@ def skew_matrix(v: Array) -> Array:
 def skew_matrices(vectors: Array) -> Array:
     """Return the matrices [v] (b, 3, 3) with [v] a = v × a of vectors (b, 3)."""
     result = np.zeros((len(vectors), 3, 3))
-    for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
-        result[:, row, column] = sign * vectors[:, place]
-        result[:, column, row] = -sign * vectors[:, place]
+    for row, column, component, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
+        result[:, row, column] = sign * vectors[:, component]
+        result[:, column, row] = -sign * vectors[:, component]
     return result
 
 
@@ -115,11 +115,11 @@ def rotation_of(quaternions: ArrayLike) -> Array:
 
     Quaternions need not have unit length; zeros give NaN.
     """
-    given = np.asarray(quaternions, dtype=float)
+    components = np.asarray(quaternions, dtype=float)
     with np.errstate(invalid="ignore"):
         # Scale first, since the squares of very long or short quaternions overflow or vanish.
-        near = given / np.abs(given).max(axis=-1, keepdims=True)
-        w, x, y, z = np.moveaxis(near / np.linalg.norm(near, axis=-1, keepdims=True), -1, 0)
+        scaled = components / np.abs(components).max(axis=-1, keepdims=True)
+        w, x, y, z = np.moveaxis(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True), -1, 0)
     return np.stack(
         (
             np.stack(

@@ -76,12 +76,12 @@ def spanning_tree(
     branches: list[Branch[L]] = []
     used: set[int] = set()
 
-    def add(place: int) -> str:
+    def add(index: int) -> str:
         """Add a joint to the tree, and return the body that it carries."""
-        link = links[place]
+        link = links[index]
         backward = link.parent not in levels
         inner, outer = (link.child, link.parent) if backward else (link.parent, link.child)
-        used.add(place)
+        used.add(index)
         levels[outer] = levels[inner] + 1
         branches.append(Branch(link, outer, backward))
         return outer
@@ -92,12 +92,12 @@ def spanning_tree(
         Forward joints come first, and joints to bodies without mass last.
         """
         result: list[tuple[float, bool, int]] = []
-        for place, link in enumerate(links):
-            if place not in used and inner in (link.parent, link.child):
+        for index, link in enumerate(links):
+            if index not in used and inner in (link.parent, link.child):
                 backward = link.child == inner
                 outer = link.parent if backward else link.child
                 if outer not in levels:
-                    result.append((masses.get(outer, 0.0), not backward, -place))
+                    result.append((masses.get(outer, 0.0), not backward, -index))
         heavy = [item for item in result if item[0] > 0.0]
         best = (
             max(heavy, key=lambda item: (item[1], item[0], item[2]))
@@ -108,25 +108,25 @@ def spanning_tree(
 
     level = 0
     while level in levels.values():
-        for place, link in enumerate(links):
-            if place in used or (link.parent in levels) == (link.child in levels):
+        for index, link in enumerate(links):
+            if index in used or (link.parent in levels) == (link.child in levels):
                 continue
             if levels.get(link.parent, levels.get(link.child)) != level:
                 continue
-            outer = add(place)
+            outer = add(index)
             # A massless body needs a body with mass beyond it, or its coordinates could not be
             # solved for.
-            while links[place].coordinates and not masses.get(outer, 0.0) > 0.0:
+            while links[index].coordinates and not masses.get(outer, 0.0) > 0.0:
                 following = onward(outer)
                 if following is None:
                     break
-                place = following
-                outer = add(place)
+                index = following
+                outer = add(index)
                 if masses.get(outer, 0.0) > 0.0:
                     break
         level += 1
     return branches, [
         link
-        for place, link in enumerate(links)
-        if place not in used and link.parent in levels and link.child in levels
+        for index, link in enumerate(links)
+        if index not in used and link.parent in levels and link.child in levels
     ]
