@@ -48,8 +48,8 @@ def place_drift(
     Returns:
         `OUTCOME.OK`.
     """
-    kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
-    copy_numbers(12, frame, kept)
+    operation_record, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
+    copy_numbers(12, frame, operation_record)
     return OUTCOME.OK
 
 
@@ -73,42 +73,46 @@ def move_drift(
     Returns:
         `OUTCOME.OK`.
     """
-    own = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
-    kept, result, u = (
+    drift_ints = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
+    operation_record, result, u = (
         operation_work(model, data, operation),
         at(data, WORK.SCRATCH),
         at(y, model[MODEL.DOFS]),
     )
-    arm, total = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), ZERO
+    arm, total = minus(vector(operation_record, OPERATION_WORK.POINT), vector(result, 0)), ZERO
     # The first axis is fixed in the parent, so that only the second and third rotation have an
     # error.
     for row in range(1, 3):
-        last = own[DRIFT.TURNS + row]
-        if last < 0:
+        last_turn = drift_ints[DRIFT.TURNS + row]
+        if last_turn < 0:
             continue
         # Simbody rotates the axis of this angle by wrong rates of the angles before it: it takes the
         # rates of all rotations by the coordinates before the row; the true rates are those of the
         # rotations before the axis.
         drift = ZERO
         for turn in range(3):
-            number = own[DRIFT.TURNS + turn]
+            number = drift_ints[DRIFT.TURNS + turn]
             if number < 0:
                 continue
-            wrong = 0.0
+            rate_error = 0.0
             for c in range(row):
-                freedom = own[DRIFT.COORDINATES + c]
+                freedom = drift_ints[DRIFT.COORDINATES + c]
                 if freedom >= 0:
-                    wrong += operation_gradient(model, data, number, freedom) * u[freedom]
+                    rate_error += operation_gradient(model, data, number, freedom) * u[freedom]
             if turn < row:
-                wrong -= operation_rate(model, data, u, number)
+                rate_error -= operation_rate(model, data, u, number)
             drift = add_scaled(
-                drift, wrong, vector(operation_work(model, data, number), OPERATION_WORK.AXIS)
+                drift, rate_error, vector(operation_work(model, data, number), OPERATION_WORK.AXIS)
             )
-        axis = vector(operation_work(model, data, last), OPERATION_WORK.AXIS)
-        total = add_scaled(total, -operation_rate(model, data, u, last), cross(axis, drift))
-    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
+        axis = vector(operation_work(model, data, last_turn), OPERATION_WORK.AXIS)
+        total = add_scaled(total, -operation_rate(model, data, u, last_turn), cross(axis, drift))
+    (
+        operation_record[OPERATION_WORK.AMOUNT],
+        operation_record[OPERATION_WORK.RATE],
+        operation_record[OPERATION_WORK.CURVATURE],
+    ) = total
     # Traversed from child to parent, the same error has the opposite sign.
-    total = times(float(own[DRIFT.SIGN]), total)
+    total = times(float(drift_ints[DRIFT.SIGN]), total)
     set_spatial_vector(result, ZERO, ZERO)
     # As a spatial acceleration about the common origin.
     set_spatial_vector(at(result, 6), cross(arm, total), total)

@@ -214,12 +214,12 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     while True:
         if not find_nearest(a, target, q):
             return False
-        worst, most = -1, OUTSIDE
+        worst, largest_violation = -1, OUTSIDE
         for k in range(size):
             if clamped[k] > 0 and status[k] == HOLD.FREED:
-                outside = max(ranges[2 * k] - q[k], q[k] - ranges[2 * k + 1])
-                if outside > most:
-                    worst, most = k, outside
+                violation = max(ranges[2 * k] - q[k], q[k] - ranges[2 * k + 1])
+                if violation > largest_violation:
+                    worst, largest_violation = k, violation
         if worst < 0:
             return True
         # Fix the coordinate that leaves its range furthest at the end of it; then the others may
@@ -255,7 +255,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     if is_assembled:
         return True
     # Minimize the change of the coordinates along the constraints.
-    before, has_curvature, step = inf, False, at(a.w, size)
+    previous_length, has_curvature, step = inf, False, at(a.w, size)
     for _ in range(MAX_STEPS):
         value = measure_change(a, target, q)
         # Squares of changes below the tolerance do not count as motion.
@@ -265,7 +265,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
         length = find_step(a, target, q, has_curvature)
         # Curvature costs 2 evaluations per free direction, so it is used only where convergence is
         # slow.
-        if not has_curvature and length > FAST * before:
+        if not has_curvature and length > FAST * previous_length:
             has_curvature = True
             length = find_step(a, target, q, has_curvature)
         furthest = 1.0
@@ -275,27 +275,27 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
             return True
         # Within rounding the cost cannot be compared; a step that is at most half as long as the
         # last one is taken as progress.
-        is_tiny, part = length < TINY_STEP and length <= 0.5 * before, 1.0
+        is_tiny, fraction = length < TINY_STEP and length <= 0.5 * previous_length, 1.0
         while True:
             for k in range(size):
-                trial[k] = q[k] + part * step[k]
+                trial[k] = q[k] + fraction * step[k]
             if not restore_pose(a, trial, False):
                 return False
             if is_tiny or measure_change(a, target, trial) < value:
                 break
-            part *= 0.5
+            fraction *= 0.5
             # A thousandth of the step that still does not decrease the cost means that the
             # direction is poor.
-            if part < 1e-3:
+            if fraction < 1e-3:
                 break
-        if part < 1e-3:
+        if fraction < 1e-3:
             # The step does not decrease the cost: rounding, or missing curvature of the constraints.
             if has_curvature:
                 return True
-            has_curvature, before = True, inf
+            has_curvature, previous_length = True, inf
         else:
             copy_numbers(size, trial, q)
-            before = length if part == 1.0 else inf
+            previous_length = length if fraction == 1.0 else inf
     return True
 
 
@@ -507,59 +507,59 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
         at(status, ASSEMBLY_ARRAY.COUNTED * size),
         at(status, ASSEMBLY_ARRAY.FREE * size),
     )
-    gradient, along = (
+    gradient, null_space = (
         at(a.w, 5 * size),
         at(factor, factor_size(count, size) + count * size + count * count),
     )
     evaluate_equations(a, q)
     free = list_freed(a)
     rank = factorise_rows(a, free, False)
-    left = free - rank
-    curvature, spare = at(along, size * size), at(along, 2 * size * size)
+    dimension = free - rank
+    curvature, spare = at(null_space, size * size), at(null_space, 2 * size * size)
     # The cost is half the sum of squares, so that its Hessian is the identity for the coordinates
     # that count.
     for k in range(free):
         gradient[k] = q[free_list[k]] - target[free_list[k]] if counted[free_list[k]] > 0 else 0.0
-    write_null_space(free, factor, rank, along)
-    for k in range(left):
-        for m in range(left):
+    write_null_space(free, factor, rank, null_space)
+    for k in range(dimension):
+        for m in range(dimension):
             total = 0.0
             for j in range(free):
                 if counted[free_list[j]] > 0:
-                    total += along[free * k + j] * along[free * m + j]
-            curvature[left * k + m] = total
+                    total += null_space[free * k + j] * null_space[free * m + j]
+            curvature[dimension * k + m] = total
     if has_curvature:
-        add_curvature(a, q, free, left, along, curvature)
+        add_curvature(a, q, free, dimension, null_space, curvature)
     # The negative gradient in the null space, replaced by the solution of the linear system.
     # `lengths` are the components p of the step along the basis.
     lengths = at(a.w, 6 * size)
-    for k in range(left):
+    for k in range(dimension):
         lengths[k] = 0.0
         for j in range(free):
-            lengths[k] -= along[free * k + j] * gradient[j]
-    copy_numbers(left * left, curvature, spare)
-    is_convex = factorise_cholesky(left, spare, 0.0)
+            lengths[k] -= null_space[free * k + j] * gradient[j]
+    copy_numbers(dimension * dimension, curvature, spare)
+    is_convex = factorise_cholesky(dimension, spare, 0.0)
     # A pivot that is too small hides a direction without curvature, which `step_downhill` handles.
-    for k in range(left):
-        is_convex = is_convex and spare[left * k + k] * spare[left * k + k] > SAFE
+    for k in range(dimension):
+        is_convex = is_convex and spare[dimension * k + k] * spare[dimension * k + k] > SAFE
     if is_convex:
-        solve_cholesky(left, spare, lengths)
+        solve_cholesky(dimension, spare, lengths)
     else:
-        step_downhill(left, curvature, spare, at(spare, size * size), lengths)
+        step_downhill(dimension, curvature, spare, at(spare, size * size), lengths)
     for k in range(size):
         step[k] = 0.0
     largest = 0.0
     for j in range(free):
         total = 0.0
-        for k in range(left):
-            total += along[free * k + j] * lengths[k]
+        for k in range(dimension):
+            total += null_space[free * k + j] * lengths[k]
         step[free_list[j]] = total
         largest = max(largest, abs(total))
     return largest
 
 
 def add_curvature(
-    a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats
+    a: Assembly, q: Floats, free: int, dimension: int, null_space: Floats, curvature: Floats
 ) -> None:
     """Add the second derivatives of the equations times their multipliers to the Hessian.
 
@@ -570,8 +570,8 @@ def add_curvature(
         a: the assembly, whose rows and gradient are known.
         q: present values (n,).
         free: number of free degrees of freedom.
-        left: dimension of the null space.
-        along: basis of the null space, by rows (left, free).
+        dimension: dimension of the null space.
+        null_space: basis of the null space, by rows (left, free).
         curvature: reduced Hessian (left, left); changed.
     """
     size, count = a.model[MODEL.DOFS], count_equations(a)
@@ -583,7 +583,7 @@ def add_curvature(
     )
     free_list, trial = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.FREE * size), at(a.w, 3 * size)
     unit = at(factor, factor_size(count, size))
-    normal, row_change = at(unit, count * size), at(along, 2 * size * size)
+    normal, row_change = at(unit, count * size), at(null_space, 2 * size * size)
     for i in range(count):
         multipliers[i] = 0.0
         for k in range(free):
@@ -602,25 +602,25 @@ def add_curvature(
     # Multipliers of the equations themselves, which were scaled to unit length.
     for i in range(count):
         multipliers[i] /= lengths[i]
-    for k in range(left):
+    for k in range(dimension):
         for j in range(free):
             row_change[j] = 0.0
         for side in range(2):
             change = DIFFERENCE if side == 0 else -DIFFERENCE
             copy_numbers(size, q, trial)
             for j in range(free):
-                trial[free_list[j]] += change * along[free * k + j]
+                trial[free_list[j]] += change * null_space[free * k + j]
             evaluate_equations(a, trial)
             for j in range(free):
                 for i in range(count):
                     row_change[j] += multipliers[i] * rows[size * i + free_list[j]] / (2.0 * change)
-        for m in range(left):
+        for m in range(dimension):
             total = 0.0
             for j in range(free):
-                total += along[free * m + j] * row_change[j]
+                total += null_space[free * m + j] * row_change[j]
             # Half on either side of the diagonal keeps the matrix symmetric despite rounding.
-            curvature[left * k + m] += 0.5 * total
-            curvature[left * m + k] += 0.5 * total
+            curvature[dimension * k + m] += 0.5 * total
+            curvature[dimension * m + k] += 0.5 * total
 
 
 def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, x: Floats) -> None:

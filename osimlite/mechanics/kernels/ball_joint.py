@@ -66,7 +66,7 @@ def place_ball(
         `OUTCOME.OK`.
     """
     j = operation_ints(model, operation)
-    kept, frame, radii = (
+    operation_record, frame, radii = (
         operation_work(model, data, operation),
         at(data, WORK.SCRATCH),
         at(reals, j[OPERATION.EXTRA]),
@@ -80,7 +80,7 @@ def place_ball(
     # The frame that the speeds are about is that of the parent: before the motion, or, if the joint
     # is traversed from its end, behind it.
     if j[OPERATION.MOTION] == MOTION.BALL:
-        copy_numbers(12, frame, kept)
+        copy_numbers(12, frame, operation_record)
         set_frame(
             frame,
             multiply_rotations(axes, turned_by),
@@ -89,7 +89,7 @@ def place_ball(
     else:
         axes = multiply_rotations(axes, transpose_rotation(turned_by))
         set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), combine_axes(axes, end)))
-        copy_numbers(12, frame, kept)
+        copy_numbers(12, frame, operation_record)
     return OUTCOME.OK
 
 
@@ -113,7 +113,7 @@ def move_ball(
         `OUTCOME.SINGULAR_RATES` where the second angle is a right angle, else `OUTCOME.OK`.
     """
     j = operation_ints(model, operation)
-    kept, result, radii = (
+    operation_record, result, radii = (
         operation_work(model, data, operation),
         at(data, WORK.SCRATCH),
         at(reals, j[OPERATION.EXTRA]),
@@ -121,9 +121,9 @@ def move_ball(
     angles, u = at(model, j[OPERATION.ARGUMENTS]), at(y, model[MODEL.DOFS])
     # Traversed from end to start, all velocities are opposite.
     sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
-    n, far = third_axis(y, angles), vector(radii, 0)
+    n, end_radii = third_axis(y, angles), vector(radii, 0)
     arm, spin = (
-        minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)),
+        minus(vector(operation_record, OPERATION_WORK.POINT), vector(result, 0)),
         (u[angles[0]], u[angles[1]], u[angles[2]]),
     )
     turn = shift = ZERO
@@ -131,13 +131,18 @@ def move_ball(
     # ellipsoid.
     for k in range(3):
         axis = replace_component(ZERO, k, 1.0)
-        e = times(sign, rotate(kept, axis))
-        m = plus(times(sign, rotate(kept, far_end_velocity(far, axis, n))), cross(arm, e))
+        e = times(sign, rotate(operation_record, axis))
+        m = plus(
+            times(sign, rotate(operation_record, far_end_velocity(end_radii, axis, n))),
+            cross(arm, e),
+        )
         add_spatial_vector(at(data, model[MODEL.WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
         turn, shift = add_scaled(turn, spin[k], e), add_scaled(shift, spin[k], m)
     set_spatial_vector(result, turn, shift)
     set_spatial_vector(
-        at(result, 6), times(sign, rotate(kept, far_end_velocity(far, spin, cross(spin, n)))), ZERO
+        at(result, 6),
+        times(sign, rotate(operation_record, far_end_velocity(end_radii, spin, cross(spin, n)))),
+        ZERO,
     )
     # N contains 1 / cos of the second angle; near a right angle the angles have no finite rates.
     if abs(sine_cosine(y[angles[1]])[1]) < 1e-12:
@@ -147,7 +152,7 @@ def move_ball(
     return OUTCOME.OK
 
 
-def angle_rate_row(y: Floats, angles: Ints, part: int) -> Vector:
+def angle_rate_row(y: Floats, angles: Ints, angle_index: int) -> Vector:
     """Return the row of N that gives the rate of one angle from the three speeds.
 
     N is the matrix of body-fixed X-Y-Z angles with angular velocity along the axes of the parent;
@@ -156,13 +161,13 @@ def angle_rate_row(y: Floats, angles: Ints, part: int) -> Vector:
     Args:
         y: state.
         angles: degrees of freedom of the three angles.
-        part: number of the angle, 0, 1 or 2.
+        angle_index: number of the angle, 0, 1 or 2.
     """
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
-    if part == 1:
+    if angle_index == 1:
         return 0.0, c1, s1
-    return (1.0, s1 * s2 / c2, -c1 * s2 / c2) if part == 0 else (0.0, -s1 / c2, c1 / c2)
+    return (1.0, s1 * s2 / c2, -c1 * s2 / c2) if angle_index == 0 else (0.0, -s1 / c2, c1 / c2)
 
 
 def angle_acceleration_bias(y: Floats, f: Floats, angles: Ints, row: Vector) -> float:
@@ -198,16 +203,17 @@ def third_axis(y: Floats, angles: Ints) -> Vector:
     return s2, -s1 * c2, c1 * c2
 
 
-def far_end_velocity(far: Vector, turn: Vector, n: Vector) -> Vector:
+def far_end_velocity(end_radii: Vector, turn: Vector, n: Vector) -> Vector:
     """Return the velocity of the end r * n less that of the rotating frame.
 
     It is r * (e x n) - e x (r * n), where * is the elementwise product.
 
     Args:
-        far: half axes r (m).
+        end_radii: half axes r (m).
         turn: angular velocity e in the parent (rad/s).
         n: third axis of the rotation, or its rate for the acceleration.
     """
     return minus(
-        multiply_elementwise(far, cross(turn, n)), cross(turn, multiply_elementwise(far, n))
+        multiply_elementwise(end_radii, cross(turn, n)),
+        cross(turn, multiply_elementwise(end_radii, n)),
     )

@@ -52,19 +52,19 @@ class CURVE_ROW(metaclass=Record):
     """Number of rows, each of LANES numbers."""
 
 
-def request_value(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
+def request_value(x: Floats, lanes: Floats, number: int, offset: int, z: float) -> None:
     """Request the value of a curve.
 
     Args:
         x: numbers of the model.
-        room: workspace of the requests.
+        lanes: workspace of the requests.
         number: number of the request.
-        place: offset of the curve in `x`.
+        offset: offset of the curve in `x`.
         z: argument.
     """
     # The result of a linear end needs no search, but the lane must take part in it without harm.
-    c: Any = at(x, place)
-    lane = at(room, number)
+    c: Any = at(x, offset)
+    lane = at(lanes, number)
     end = FIRST if not z >= c[FIRST] else LAST
     if end == FIRST or z > c[LAST]:
         lane[LANES * CURVE_ROW.VALUE] = c[end + 1] + c[end + 2] * (z - c[end])
@@ -74,10 +74,10 @@ def request_value(x: Floats, room: Floats, number: int, place: int, z: float) ->
         ] = 0.0
         lane[LANES * CURVE_ROW.OF_X] = 1.0
         return
-    section, rest, u = find_section(c, z)
+    section, remainder, u = find_section(c, z)
     lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.U] = (
         1.0,
-        rest,
+        remainder,
         u,
     )
     for k in range(COEFFICIENTS):
@@ -85,21 +85,21 @@ def request_value(x: Floats, room: Floats, number: int, place: int, z: float) ->
 
 
 def request_sum(
-    x: Floats, room: Floats, number: int, place: int, of_y: float, of_x: float, total: float
+    x: Floats, lanes: Floats, number: int, offset: int, of_y: float, of_x: float, total: float
 ) -> None:
     """Request the value of a curve where ``of_y * y + of_x * x`` has a total, see `bezier.solve_sum`.
 
     Args:
         x: numbers of the model.
-        room: workspace of the requests.
+        lanes: workspace of the requests.
         number: number of the request.
-        place: offset of the curve in `x`.
+        offset: offset of the curve in `x`.
         of_y: factor of the curve.
         of_x: factor of its argument.
         total: value of the sum.
     """
-    c: Any = at(x, place)
-    lane = at(room, number)
+    c: Any = at(x, offset)
+    lane = at(lanes, number)
     end = end_beyond_sum(c, of_y, of_x, total)
     if end > 0:
         lane[LANES * CURVE_ROW.VALUE] = extrapolate_sum(c, of_y, of_x, total, end)
@@ -109,10 +109,10 @@ def request_sum(
         for k in range(1, COEFFICIENTS):
             lane[LANES * (CURVE_ROW.OF_X + k)] = 0.0
         return
-    section, rest, u = find_section_of_sum(c, of_y, of_x, total)
+    section, remainder, u = find_section_of_sum(c, of_y, of_x, total)
     lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.U] = (
         1.0,
-        rest,
+        remainder,
         u,
     )
     # The polynomial in u that the lane solves is that of the sum instead of that of x.
@@ -124,89 +124,93 @@ def request_sum(
         lane[LANES * (CURVE_ROW.OF_X + k)] = c[section + X + k]
 
 
-def request_residual(room: Any, number: int) -> float:
+def request_residual(lanes: Any, number: int) -> float:
     """Return the residual of a search.
 
     Args:
-        room: workspace of the requests.
+        lanes: workspace of the requests.
         number: number of the request.
     """
     return search_residual(
-        room,
+        lanes,
         LANES * CURVE_ROW.OF_X + number,
         LANES,
-        room[LANES * CURVE_ROW.U + number],
-        room[LANES * CURVE_ROW.REST + number],
+        lanes[LANES * CURVE_ROW.U + number],
+        lanes[LANES * CURVE_ROW.REST + number],
     )
 
 
-def request_result(room: Floats, number: int) -> float:
+def request_result(lanes: Floats, number: int) -> float:
     """Return the result of a request.
 
     Args:
-        room: workspace of the requests.
+        lanes: workspace of the requests.
         number: number of the request.
     """
-    return room[LANES * CURVE_ROW.VALUE + number]
+    return lanes[LANES * CURVE_ROW.VALUE + number]
 
 
-def compute_requests(room: Any, asked: int, rounds: int) -> None:
+def compute_requests(lanes: Any, request_count: int, rounds: int) -> None:
     """Compute all requests.
 
     Args:
-        room: workspace of the requests.
-        asked: number of requests.
+        lanes: workspace of the requests.
+        request_count: number of requests.
         rounds: number of search steps that all lanes take together; it is usually enough.
     """
     # Separate loops over the lanes, so that each becomes vector instructions.
-    for lane in range(asked):
-        room[LANES * CURVE_ROW.GOES_ON + lane] = 1.0
+    for lane in range(request_count):
+        lanes[LANES * CURVE_ROW.GOES_ON + lane] = 1.0
     for _ in range(rounds):
-        for lane in range(asked):
-            step_lane(room, lane)
-    for lane in range(asked):
-        store_result(room, lane)
+        for lane in range(request_count):
+            step_lane(lanes, lane)
+    for lane in range(request_count):
+        store_result(lanes, lane)
     # Lanes that need more steps than most continue alone.
-    for lane in range(asked):
-        if room[LANES * CURVE_ROW.GOES_ON + lane] > 0.0:
-            u, rest = room[LANES * CURVE_ROW.U + lane], room[LANES * CURVE_ROW.REST + lane]
+    for lane in range(request_count):
+        if lanes[LANES * CURVE_ROW.GOES_ON + lane] > 0.0:
+            u, remainder = lanes[LANES * CURVE_ROW.U + lane], lanes[LANES * CURVE_ROW.REST + lane]
             u, _, _, _ = search_section(
-                room, LANES * CURVE_ROW.OF_X + lane, LANES, u, rest, ROUNDS - rounds
+                lanes, LANES * CURVE_ROW.OF_X + lane, LANES, u, remainder, ROUNDS - rounds
             )
-            room[LANES * CURVE_ROW.U + lane] = u
-            store_result(room, lane)
+            lanes[LANES * CURVE_ROW.U + lane] = u
+            store_result(lanes, lane)
 
 
-def step_lane(room: Any, lane: int) -> None:
+def step_lane(lanes: Any, lane: int) -> None:
     """Take a search step in one lane.
 
     Args:
-        room: workspace of the requests.
+        lanes: workspace of the requests.
         lane: number of the lane.
     """
-    before, is_going = (
-        room[LANES * CURVE_ROW.U + lane],
-        room[LANES * CURVE_ROW.GOES_ON + lane] > 0.0,
+    previous_u, is_going = (
+        lanes[LANES * CURVE_ROW.U + lane],
+        lanes[LANES * CURVE_ROW.GOES_ON + lane] > 0.0,
     )
     u, goes_on = take_halley_step(
-        room, LANES * CURVE_ROW.OF_X + lane, LANES, before, room[LANES * CURVE_ROW.REST + lane]
+        lanes,
+        LANES * CURVE_ROW.OF_X + lane,
+        LANES,
+        previous_u,
+        lanes[LANES * CURVE_ROW.REST + lane],
     )
     # Select instead of branching, since lanes of one vector instruction do the same.
-    room[LANES * CURVE_ROW.U + lane] = u if is_going else before
-    room[LANES * CURVE_ROW.GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
+    lanes[LANES * CURVE_ROW.U + lane] = u if is_going else previous_u
+    lanes[LANES * CURVE_ROW.GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
 
 
-def store_result(room: Any, lane: int) -> None:
+def store_result(lanes: Any, lane: int) -> None:
     """Store the result of a search.
 
     Args:
-        room: workspace of the requests.
+        lanes: workspace of the requests.
         lane: number of the lane.
     """
     value, _ = evaluate_section(
-        room, LANES * CURVE_ROW.OF_X + lane, LANES, room[LANES * CURVE_ROW.U + lane]
+        lanes, LANES * CURVE_ROW.OF_X + lane, LANES, lanes[LANES * CURVE_ROW.U + lane]
     )
-    is_inside = room[LANES * CURVE_ROW.INSIDE + lane] > 0.0
-    room[LANES * CURVE_ROW.VALUE + lane] = (
-        value if is_inside else room[LANES * CURVE_ROW.VALUE + lane]
+    is_inside = lanes[LANES * CURVE_ROW.INSIDE + lane] > 0.0
+    lanes[LANES * CURVE_ROW.VALUE + lane] = (
+        value if is_inside else lanes[LANES * CURVE_ROW.VALUE + lane]
     )

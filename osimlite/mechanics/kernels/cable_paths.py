@@ -212,19 +212,23 @@ def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: F
         p: numbers of the cable.
         record: record of the cable; the part of the element is filled.
     """
-    numbers, part, link = (
+    numbers, element_record, link = (
         at(p, element[ELEMENT.AT]),
         at(record, element[ELEMENT.KEPT]),
         element[ELEMENT.LINK],
     )
     if element[ELEMENT.IS_OBSTACLE] == 0:
-        store_vector(part, 0, station(model, data, link, vector(numbers, CABLE_POINT.PLACE)))
+        store_vector(
+            element_record, 0, station(model, data, link, vector(numbers, CABLE_POINT.PLACE))
+        )
         return
-    place_frame(model, data, link, numbers, vector(numbers, 9), at(part, OBSTACLE_WORK.IN_GROUND))
+    place_frame(
+        model, data, link, numbers, vector(numbers, 9), at(element_record, OBSTACLE_WORK.IN_GROUND)
+    )
     # Every search starts from the contact in the default pose, so that it depends on the pose
     # alone.
     for k in range(OBSTACLE_WORK.TOUCH_SIZE):
-        part[k] = numbers[OBSTACLE.BEGIN + k]
+        element_record[k] = numbers[OBSTACLE.BEGIN + k]
 
 
 def surface_to_ground(pose: Floats, point: Vector) -> Vector:
@@ -238,7 +242,7 @@ def surface_to_ground(pose: Floats, point: Vector) -> Vector:
 
 
 def find_cable(
-    elements: Ints, p: Floats, record: Floats, first: int, last: int, work: Floats
+    elements: Ints, p: Floats, record: Floats, first: int, last_element: int, work: Floats
 ) -> float:
     """Find the cable between two points.
 
@@ -247,7 +251,7 @@ def find_cable(
         p: numbers of the cable.
         record: record of the cable.
         first: number of the first point.
-        last: number of the last point.
+        last_element: number of the last point.
         work: workspace of the search.
 
     Returns:
@@ -258,18 +262,18 @@ def find_cable(
     for round_number in range(ROUNDS + 1):
         # Contacts change while the search runs, as in Simbody, because lines move with the
         # geodesics.
-        for k in range(first + 1, last):
-            if not update_contact(elements, p, record, first, k, last, work):
+        for k in range(first + 1, last_element):
+            if not update_contact(elements, p, record, first, k, last_element, work):
                 return nan
-        count = draw_lines(elements, record, first, last, lines)
+        count = draw_lines(elements, record, first, last_element, lines)
         values = at(lines, 4 * (count + 1))
-        rough = measure_kinks(elements, record, first, last, lines, values)
+        rough = measure_kinks(elements, record, first, last_element, lines, values)
         # NaN arises where two points coincide or a geodesic degenerates.
         if isnan(rough):
             return nan
         if rough <= SMOOTH or round_number == ROUNDS:
             break
-        if not correct_geodesics(elements, p, record, first, last, count, rough, work):
+        if not correct_geodesics(elements, p, record, first, last_element, count, rough, work):
             return nan
     # Directions at the points, for the forces.
     store_vector(
@@ -278,17 +282,17 @@ def find_cable(
         vector(lines, 0),
     )
     store_vector(
-        at(record, elements[ELEMENT.SIZE * last + ELEMENT.KEPT]),
+        at(record, elements[ELEMENT.SIZE * last_element + ELEMENT.KEPT]),
         CABLE_POINT_WORK.BEFORE,
         vector(lines, 4 * count),
     )
     length = 0.0
     for k in range(count + 1):
         length += lines[4 * k + 3]
-    for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
-        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            length += part[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
+    for k in range(first + 1, last_element):
+        element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            length += element_record[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
     return length
 
 
@@ -310,49 +314,59 @@ def update_contact(
         False if a neighbouring point is inside the obstacle or there is no geodesic.
     """
     element = at(elements, ELEMENT.SIZE * number)
-    numbers, part = at(p, element[ELEMENT.AT]), at(record, element[ELEMENT.KEPT])
+    numbers, obstacle_record = at(p, element[ELEMENT.AT]), at(record, element[ELEMENT.KEPT])
     geodesic, pose, surface = (
-        at(part, OBSTACLE_WORK.CURVE),
-        at(part, OBSTACLE_WORK.IN_GROUND),
+        at(obstacle_record, OBSTACLE_WORK.CURVE),
+        at(obstacle_record, OBSTACLE_WORK.IN_GROUND),
         at(numbers, OBSTACLE.SURFACE),
     )
     # A geodesic with a length touches for certain; only one that has shrunk to a point may lift
     # off.
-    if part[OBSTACLE_WORK.STATE] != OBSTACLE_STATE.TOUCHES or not geodesic[GEODESIC.ARC] > 0.0:
-        before = find_neighbour(elements, record, pose, number, -1, first)
-        after = find_neighbour(elements, record, pose, number, 1, last)
+    if (
+        obstacle_record[OBSTACLE_WORK.STATE] != OBSTACLE_STATE.TOUCHES
+        or not geodesic[GEODESIC.ARC] > 0.0
+    ):
+        previous_end = find_neighbour(elements, record, pose, number, -1, first)
+        next_end = find_neighbour(elements, record, pose, number, 1, last)
         # No cable starts from inside an obstacle.
-        if surface_value(surface, before) > 0.0 or surface_value(surface, after) > 0.0:
+        if surface_value(surface, previous_end) > 0.0 or surface_value(surface, next_end) > 0.0:
             return False
-        chord = minus(after, before)
-        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.GUESSED:
-            part[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.TOUCHES
+        chord = minus(next_end, previous_end)
+        if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.GUESSED:
+            obstacle_record[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.TOUCHES
             if not shoot_geodesic(
-                surface, vector(part, OBSTACLE_WORK.TRACKED), chord, 0.0, geodesic, work
+                surface, vector(obstacle_record, OBSTACLE_WORK.TRACKED), chord, 0.0, geodesic, work
             ):
                 return False
-        elif part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+        elif obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             point, normal = (
                 vector(geodesic, GEODESIC.START + END_NUMBERS.POINT),
                 vector(geodesic, GEODESIC.START + END_NUMBERS.NORMAL),
             )
             # Both neighbours above the tangent plane: the line passes over the surface.
-            if dot(minus(before, point), normal) > 0.0 and dot(minus(after, point), normal) > 0.0:
-                part[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.LIFTED
-                store_vector(part, OBSTACLE_WORK.TRACKED, point)
+            if (
+                dot(minus(previous_end, point), normal) > 0.0
+                and dot(minus(next_end, point), normal) > 0.0
+            ):
+                obstacle_record[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.LIFTED
+                store_vector(obstacle_record, OBSTACLE_WORK.TRACKED, point)
         else:
-            below, point = nearest_on_line(
-                surface, before, after, vector(part, OBSTACLE_WORK.TRACKED)
+            is_below, point = nearest_on_line(
+                surface, previous_end, next_end, vector(obstacle_record, OBSTACLE_WORK.TRACKED)
             )
-            store_vector(part, OBSTACLE_WORK.TRACKED, point)
-            if below:
-                part[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.TOUCHES
+            store_vector(obstacle_record, OBSTACLE_WORK.TRACKED, point)
+            if is_below:
+                obstacle_record[OBSTACLE_WORK.STATE] = OBSTACLE_STATE.TOUCHES
                 # A touch begins with a geodesic of zero length in the direction of the chord.
                 if not shoot_geodesic(surface, point, chord, 0.0, geodesic, work):
                     return False
-    if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-        end_to_ground(pose, at(geodesic, GEODESIC.START), at(part, OBSTACLE_WORK.GROUND_START))
-        end_to_ground(pose, at(geodesic, GEODESIC.END), at(part, OBSTACLE_WORK.GROUND_END))
+    if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+        end_to_ground(
+            pose, at(geodesic, GEODESIC.START), at(obstacle_record, OBSTACLE_WORK.GROUND_START)
+        )
+        end_to_ground(
+            pose, at(geodesic, GEODESIC.END), at(obstacle_record, OBSTACLE_WORK.GROUND_END)
+        )
     return True
 
 
@@ -376,14 +390,14 @@ def find_neighbour(
         == OBSTACLE_STATE.LIFTED
     ):
         k += step
-    part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+    element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
     if k == limit:
-        point = vector(part, 0)
+        point = vector(element_record, 0)
     else:
         point = surface_to_ground(
-            at(part, OBSTACLE_WORK.IN_GROUND),
+            at(element_record, OBSTACLE_WORK.IN_GROUND),
             vector(
-                part,
+                element_record,
                 OBSTACLE_WORK.CURVE
                 + (GEODESIC.END if step < 0 else GEODESIC.START)
                 + END_NUMBERS.POINT,
@@ -401,21 +415,21 @@ def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
         ground: filled with the end in ground.
     """
     store_vector(ground, END_NUMBERS.POINT, surface_to_ground(pose, vector(end, END_NUMBERS.POINT)))
-    for place in (END_NUMBERS.ALONG, END_NUMBERS.NORMAL, END_NUMBERS.ACROSS):
-        store_vector(ground, place, rotate(pose, vector(end, place)))
+    for field in (END_NUMBERS.ALONG, END_NUMBERS.NORMAL, END_NUMBERS.ACROSS):
+        store_vector(ground, field, rotate(pose, vector(end, field)))
     # Curvatures and torsion do not depend on the frame.
-    for place in (END_NUMBERS.ALONG_BENDS, END_NUMBERS.ACROSS_BENDS, END_NUMBERS.TORSION):
-        ground[place] = end[place]
+    for field in (END_NUMBERS.ALONG_BENDS, END_NUMBERS.ACROSS_BENDS, END_NUMBERS.TORSION):
+        ground[field] = end[field]
 
 
-def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Floats) -> int:
+def draw_lines(elements: Ints, record: Floats, first: int, last_element: int, lines: Floats) -> int:
     """Compute direction and length of each straight part.
 
     Args:
         elements: integers of the elements.
         record: record of the cable.
         first: number of the point before.
-        last: number of the point after.
+        last_element: number of the point after.
         lines: filled per line with its unit vector (3,) and its length (m).
 
     Returns:
@@ -423,17 +437,20 @@ def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Flo
     """
     count = 0
     start = vector(record, elements[ELEMENT.SIZE * first + ELEMENT.KEPT])
-    for k in range(first + 1, last + 1):
-        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
-        if k == last or part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+    for k in range(first + 1, last_element + 1):
+        element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if k == last_element or element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             chord = minus(
-                vector(part, 0 if k == last else OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT),
+                vector(
+                    element_record,
+                    0 if k == last_element else OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT,
+                ),
                 start,
             )
             store_vector(lines, 4 * count, unit(chord))
             lines[4 * count + 3] = norm(chord)
-            if k < last:
-                start = vector(part, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
+            if k < last_element:
+                start = vector(element_record, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
                 count += 1
     return count
 
@@ -457,22 +474,22 @@ def measure_kinks(
     Returns:
         The largest kink, NaN if one is not a number.
     """
-    most, number = 0.0, 0
+    largest_kink, number = 0.0, 0
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
-        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             for end in (OBSTACLE_WORK.GROUND_START, OBSTACLE_WORK.GROUND_END):
                 line = vector(
                     lines, 4 * (number // 4 + (0 if end == OBSTACLE_WORK.GROUND_START else 1))
                 )
                 for axis in (END_NUMBERS.NORMAL, END_NUMBERS.ACROSS):
-                    error = dot(line, vector(part, end + axis))
+                    error = dot(line, vector(obstacle_record, end + axis))
                     if isnan(error):
                         return nan
                     values[number] = error
-                    most = max(most, abs(error))
+                    largest_kink = max(largest_kink, abs(error))
                     number += 1
-    return most
+    return largest_kink
 
 
 def correct_geodesics(
@@ -507,36 +524,42 @@ def correct_geodesics(
     a = at(corrections, size)
     for k in range(equations * size):
         a[k] = 0.0
-    number, before = 0, first
+    number, previous_obstacle = 0, first
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
-        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             line, next_line, row = (
                 at(lines, 4 * number),
                 at(lines, 4 * number + 4),
                 at(a, 4 * number * size),
             )
-            set_rows(part, OBSTACLE_WORK.GROUND_START, line, at(row, 4 * number), size)
+            set_rows(obstacle_record, OBSTACLE_WORK.GROUND_START, line, at(row, 4 * number), size)
             set_rows(
-                part, OBSTACLE_WORK.GROUND_END, next_line, at(row, 2 * size + 4 * number), size
+                obstacle_record,
+                OBSTACLE_WORK.GROUND_END,
+                next_line,
+                at(row, 2 * size + 4 * number),
+                size,
             )
             if number > 0:
-                other = at(record, elements[ELEMENT.SIZE * before + ELEMENT.KEPT])
+                previous_record = at(
+                    record, elements[ELEMENT.SIZE * previous_obstacle + ELEMENT.KEPT]
+                )
                 set_far_rows(
-                    part,
+                    obstacle_record,
                     OBSTACLE_WORK.GROUND_START,
                     line,
-                    other,
+                    previous_record,
                     OBSTACLE_WORK.GROUND_END,
                     at(row, 4 * number - 4),
                     size,
                 )
                 back = at(a, (4 * number - 2) * size + 4 * number)
                 set_far_rows(
-                    other,
+                    previous_record,
                     OBSTACLE_WORK.GROUND_END,
                     line,
-                    part,
+                    obstacle_record,
                     OBSTACLE_WORK.GROUND_START,
                     back,
                     size,
@@ -544,7 +567,7 @@ def correct_geodesics(
             # Penalize changes of the length in proportion to the kinks, as Scholz et al. do.
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
-            number, before = number + 1, k
+            number, previous_obstacle = number + 1, k
     # The threshold of independence is Simbody's.
     rank = factorise_equations(equations, size, a, SIGNIFICANT * equations)
     solve_minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
@@ -554,34 +577,38 @@ def correct_geodesics(
     # same part.
     step, number = 1.0, 0
     for k in range(first + 1, last):
-        part = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
-        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            most = largest_turn(part, at(corrections, 4 * number))
-            if most > LARGEST:
-                step = min(step, LARGEST / most)
+        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            largest_rotation = largest_turn(obstacle_record, at(corrections, 4 * number))
+            if largest_rotation > LARGEST:
+                step = min(step, LARGEST / largest_rotation)
             number += 1
     number = 0
     for k in range(first + 1, last):
         element = at(elements, ELEMENT.SIZE * k)
-        part = at(record, element[ELEMENT.KEPT])
-        if part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+        obstacle_record = at(record, element[ELEMENT.KEPT])
+        if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             surface = at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE)
             if not shoot_again(
-                surface, at(part, OBSTACLE_WORK.CURVE), at(corrections, 4 * number), step, work
+                surface,
+                at(obstacle_record, OBSTACLE_WORK.CURVE),
+                at(corrections, 4 * number),
+                step,
+                work,
             ):
                 return False
             number += 1
     return True
 
 
-def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> None:
+def set_rows(obstacle_record: Floats, end: int, line: Floats, rows: Floats, size: int) -> None:
     """Fill the derivatives of both kinks at an end of a geodesic by its own variations.
 
     With the unit vector e of a line of length l and an axis a of the frame, the kink e . a changes
     by (a - (e . a) e) / l per displacement of the end, and by a x e per rotation of the frame.
 
     Args:
-        part: record of the obstacle.
+        obstacle_record: record of the obstacle.
         end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         line: direction and length of the line at this end.
         rows: filled with two rows (2, size).
@@ -589,46 +616,52 @@ def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> N
     """
     e = vector(line, 0)
     for k in range(2):
-        a = vector(part, end + (END_NUMBERS.NORMAL if k == 0 else END_NUMBERS.ACROSS))
+        a = vector(obstacle_record, end + (END_NUMBERS.NORMAL if k == 0 else END_NUMBERS.ACROSS))
         shift = times(
             (1.0 if end == OBSTACLE_WORK.GROUND_START else -1.0) / line[3],
             add_scaled(a, -dot(e, a), e),
         )
-        differentiate_end(part, end, shift, cross(a, e), at(rows, k * size))
+        differentiate_end(obstacle_record, end, shift, cross(a, e), at(rows, k * size))
 
 
 def set_far_rows(
-    part: Floats, end: int, line: Floats, other: Floats, far: int, rows: Floats, size: int
+    obstacle_record: Floats,
+    end: int,
+    line: Floats,
+    other_record: Floats,
+    other_end: int,
+    rows: Floats,
+    size: int,
 ) -> None:
     """Fill the derivatives of both kinks at an end by the geodesic at the other end of the line.
 
     Args:
-        part: record of the obstacle of the end.
+        obstacle_record: record of the obstacle of the end.
         end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         line: direction and length of the line between both geodesics.
-        other: record of the other obstacle.
-        far: end of the other geodesic, GROUND_END or GROUND_START of `OBSTACLE_WORK`.
+        other_record: record of the other obstacle.
+        other_end: end of the other geodesic, GROUND_END or GROUND_START of `OBSTACLE_WORK`.
         rows: filled with two rows (2, size).
         size: length of a row.
     """
     e = vector(line, 0)
     for k in range(2):
-        a = vector(part, end + (END_NUMBERS.NORMAL if k == 0 else END_NUMBERS.ACROSS))
+        a = vector(obstacle_record, end + (END_NUMBERS.NORMAL if k == 0 else END_NUMBERS.ACROSS))
         shift = times(
             (-1.0 if end == OBSTACLE_WORK.GROUND_START else 1.0) / line[3],
             add_scaled(a, -dot(e, a), e),
         )
-        differentiate_end(other, far, shift, (0.0, 0.0, 0.0), at(rows, k * size))
+        differentiate_end(other_record, other_end, shift, (0.0, 0.0, 0.0), at(rows, k * size))
 
 
-def jacobi_fields(part: Floats, end: int) -> tuple[float, float, float, float]:
+def jacobi_fields(obstacle_record: Floats, end: int) -> tuple[float, float, float, float]:
     """Return A, R and their derivatives at an end of a geodesic.
 
     A is the lateral displacement per unit lateral displacement of the start, R that per unit
     rotation.
 
     Args:
-        part: record of the obstacle.
+        obstacle_record: record of the obstacle.
         end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
 
     Returns:
@@ -637,22 +670,24 @@ def jacobi_fields(part: Floats, end: int) -> tuple[float, float, float, float]:
     if end == OBSTACLE_WORK.GROUND_START:
         # At the start: a displacement is kept, and a rotation displaces nothing yet.
         return 1.0, 0.0, 0.0, 1.0
-    g = at(part, OBSTACLE_WORK.CURVE)
+    g = at(obstacle_record, OBSTACLE_WORK.CURVE)
     return g[GEODESIC.A], g[GEODESIC.R], g[GEODESIC.A_RATE], g[GEODESIC.R_RATE]
 
 
-def differentiate_end(part: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> None:
+def differentiate_end(
+    obstacle_record: Floats, end: int, shift: Vector, turn: Vector, row: Floats
+) -> None:
     """Fill the derivatives by the four variations of a geodesic of a function of its end.
 
     Args:
-        part: record of the obstacle.
+        obstacle_record: record of the obstacle.
         end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         shift: derivative of the function by the position of the end.
         turn: derivative of the function by the rotation of its frame.
         row: filled (4,).
     """
-    a, r, a_rate, r_rate = jacobi_fields(part, end)
-    frame = at(part, end)
+    a, r, a_rate, r_rate = jacobi_fields(obstacle_record, end)
+    frame = at(obstacle_record, end)
     t, n, b = (
         vector(frame, END_NUMBERS.ALONG),
         vector(frame, END_NUMBERS.NORMAL),
@@ -672,19 +707,19 @@ def differentiate_end(part: Floats, end: int, shift: Vector, turn: Vector, row: 
     row[3] = forwards if end == OBSTACLE_WORK.GROUND_END else 0.0
 
 
-def largest_turn(part: Floats, corrections: Floats) -> float:
+def largest_turn(obstacle_record: Floats, corrections: Floats) -> float:
     """Return the largest component of the rotation of the ends by corrections.
 
     As in Simbody, only positive products count.
 
     Args:
-        part: record of the obstacle.
+        obstacle_record: record of the obstacle.
         corrections: corrections of the four variations.
     """
-    most = 0.0
+    largest = 0.0
     for end in (OBSTACLE_WORK.GROUND_START, OBSTACLE_WORK.GROUND_END):
-        a, r, a_rate, r_rate = jacobi_fields(part, end)
-        frame = at(part, end)
+        a, r, a_rate, r_rate = jacobi_fields(obstacle_record, end)
+        frame = at(obstacle_record, end)
         t, n, b = (
             vector(frame, END_NUMBERS.ALONG),
             vector(frame, END_NUMBERS.NORMAL),
@@ -696,16 +731,16 @@ def largest_turn(part: Floats, corrections: Floats) -> float:
         sideways = add_scaled(
             times(-frame[END_NUMBERS.ACROSS_BENDS], t), -frame[END_NUMBERS.TORSION], b
         )
-        most = max(most, corrections[0] * largest_component(forwards))
-        most = max(
-            most, corrections[1] * largest_component(add_scaled(times(a, sideways), -a_rate, n))
+        largest = max(largest, corrections[0] * largest_component(forwards))
+        largest = max(
+            largest, corrections[1] * largest_component(add_scaled(times(a, sideways), -a_rate, n))
         )
-        most = max(
-            most, corrections[2] * largest_component(add_scaled(times(r, sideways), -r_rate, n))
+        largest = max(
+            largest, corrections[2] * largest_component(add_scaled(times(r, sideways), -r_rate, n))
         )
         if end == OBSTACLE_WORK.GROUND_END:
-            most = max(most, corrections[3] * largest_component(forwards))
-    return most
+            largest = max(largest, corrections[3] * largest_component(forwards))
+    return largest
 
 
 def largest_component(a: Vector) -> float:
@@ -764,24 +799,29 @@ def lengthening_speed(
         record: record of the cable.
     """
     total = 0.0
-    here = vector(record, elements[ELEMENT.KEPT])
-    moves = velocity(model, data, elements[ELEMENT.LINK], here)
+    segment_start = vector(record, elements[ELEMENT.KEPT])
+    start_velocity = velocity(model, data, elements[ELEMENT.LINK], segment_start)
     for k in range(1, count):
         element = at(elements, ELEMENT.SIZE * k)
-        part = at(record, element[ELEMENT.KEPT])
-        if element[ELEMENT.IS_OBSTACLE] == 0 or part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            place = (
+        element_record = at(record, element[ELEMENT.KEPT])
+        if (
+            element[ELEMENT.IS_OBSTACLE] == 0
+            or element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES
+        ):
+            end_offset = (
                 0
                 if element[ELEMENT.IS_OBSTACLE] == 0
                 else OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT
             )
-            ahead = vector(part, place)
-            ahead_moves = velocity(model, data, element[ELEMENT.LINK], ahead)
-            total += dot(unit(minus(ahead, here)), minus(ahead_moves, moves))
-            here, moves = ahead, ahead_moves
+            segment_end = vector(element_record, end_offset)
+            end_velocity = velocity(model, data, element[ELEMENT.LINK], segment_end)
+            total += dot(
+                unit(minus(segment_end, segment_start)), minus(end_velocity, start_velocity)
+            )
+            segment_start, start_velocity = segment_end, end_velocity
             if element[ELEMENT.IS_OBSTACLE] != 0:
-                here = vector(part, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
-                moves = velocity(model, data, element[ELEMENT.LINK], here)
+                segment_start = vector(element_record, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
+                start_velocity = velocity(model, data, element[ELEMENT.LINK], segment_start)
     return total
 
 
@@ -803,29 +843,40 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result, elements = at(data, i[ITEM.RECORD]), at(i, CABLE.ELEMENTS)
-    tension, last = result[PATH_WORK.TENSION], i[CABLE.COUNT] - 1
+    tension, last_element = result[PATH_WORK.TENSION], i[CABLE.COUNT] - 1
     if tension < 0.0:
         return OUTCOME.OK
-    for k in range(last + 1):
+    for k in range(last_element + 1):
         element = at(elements, ELEMENT.SIZE * k)
-        numbers, part, link = (
+        numbers, element_record, link = (
             at(p, element[ELEMENT.AT]),
             at(result, element[ELEMENT.KEPT]),
             element[ELEMENT.LINK],
         )
         if element[ELEMENT.IS_OBSTACLE] == 0:
             # The station at which the cable pulls may differ from the point that it passes.
-            place = station(model, data, link, vector(numbers, CABLE_POINT.PULLED))
+            point = station(model, data, link, vector(numbers, CABLE_POINT.PULLED))
             if k > 0:
                 apply_force(
-                    model, data, link, place, times(-tension, vector(part, CABLE_POINT_WORK.BEFORE))
+                    model,
+                    data,
+                    link,
+                    point,
+                    times(-tension, vector(element_record, CABLE_POINT_WORK.BEFORE)),
                 )
-            if k < last:
+            if k < last_element:
                 apply_force(
-                    model, data, link, place, times(tension, vector(part, CABLE_POINT_WORK.AFTER))
+                    model,
+                    data,
+                    link,
+                    point,
+                    times(tension, vector(element_record, CABLE_POINT_WORK.AFTER)),
                 )
-        elif part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            start, end = at(part, OBSTACLE_WORK.GROUND_START), at(part, OBSTACLE_WORK.GROUND_END)
+        elif element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            start, end = (
+                at(element_record, OBSTACLE_WORK.GROUND_START),
+                at(element_record, OBSTACLE_WORK.GROUND_END),
+            )
             apply_force(
                 model,
                 data,

@@ -230,24 +230,24 @@ def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[boo
     Returns:
         Whether the segment passes below the surface, and the point.
     """
-    way = minus(b, a)
-    square = dot(way, way)
+    chord = minus(b, a)
+    square = dot(chord, chord)
     if square < EPSILON:
         return surface_value(p, a) > 0.0, a
     # Start from the point of the segment nearest to the last result.
-    part = min(max(-dot(way, minus(a, start)) / square, 0.0), 1.0)
+    fraction = min(max(-dot(chord, minus(a, start)) / square, 0.0), 1.0)
     for _ in range(50):
-        point = add_scaled(a, part, way)
+        point = add_scaled(a, fraction, chord)
         if -surface_value(p, point) < EPSILON:
             return True, point
-        curvature = abs(dot(way, hessian_times(p, point, way)))
+        curvature = abs(dot(chord, hessian_times(p, point, chord)))
         # Newton's step with Simbody's safeguards: 1/2 added to the curvature, and at most a fifth
         # of the segment.
-        step = -dot(surface_gradient(p, point), way) / (curvature + 0.5)
-        before = part
-        part = min(max(part - min(max(step, -0.2), 0.2), 0.0), 1.0)
-        if abs(part - before) < CONSTRAINT:
-            return False, add_scaled(a, part, way)
+        step = -dot(surface_gradient(p, point), chord) / (curvature + 0.5)
+        previous_fraction = fraction
+        fraction = min(max(fraction - min(max(step, -0.2), 0.2), 0.0), 1.0)
+        if abs(fraction - previous_fraction) < CONSTRAINT:
+            return False, add_scaled(a, fraction, chord)
     return False, start
 
 
@@ -360,7 +360,7 @@ def integrate_by_merson(
         return False
     geodesic_derivative(p, y, rates)
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.START))
-    t, step, first, second, taken = 0.0, geodesic[GEODESIC.STEP], 0.0, 0.0, 0
+    t, step, first, second, step_count = 0.0, geodesic[GEODESIC.STEP], 0.0, 0.0, 0
     while t != length:
         next_t = t + step
         # Stretch the last step rather than add a tiny one.
@@ -380,12 +380,12 @@ def integrate_by_merson(
             else:
                 h *= LEAST
             next_t = t + h
-        taken += 1
-        if taken == 1:
+        step_count += 1
+        if step_count == 1:
             first = h
-        elif taken == 2:
+        elif step_count == 2:
             second = h
-        if taken >= MOST_STEPS or error != error:
+        if step_count >= MOST_STEPS or error != error:
             return False
         for k in range(SIZE):
             y[k] = trial[k]
@@ -403,7 +403,7 @@ def integrate_by_merson(
         geodesic[GEODESIC.A_RATE],
     ) = y[3], y[4], y[8], y[9]
     # As in Simbody, the next geodesic begins with the size of the first or second step of this one.
-    if taken >= 2:
+    if step_count >= 2:
         geodesic[GEODESIC.STEP] = (
             first if first < geodesic[GEODESIC.STEP] else max(geodesic[GEODESIC.STEP], second)
         )
@@ -433,15 +433,15 @@ def integrate_by_extrapolation(
     if not project_to_surface(p, y, ROUNDED):
         return False
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.START))
-    left = step = length
-    while left > 0.0:
-        step = min(step, left)
+    remaining_length = step = length
+    while remaining_length > 0.0:
+        step = min(step, remaining_length)
         while not extrapolate_step(p, step, work):
             # Most geodesics succeed in one step over their complete length.
             step *= 0.5
             if not step > SMALLEST:
                 return False
-        left -= step
+        remaining_length -= step
         if not project_to_surface(p, y, ROUNDED):
             return False
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.END))
@@ -467,30 +467,30 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
     """
     y, f, old, columns = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
     for column in range(COLUMNS):
-        new, parts = at(columns, column * SIZE), 2 * column + 2
-        h = step / parts
+        new, substeps = at(columns, column * SIZE), 2 * column + 2
+        h = step / substeps
         geodesic_derivative(p, y, f)
         for k in range(SIZE):
             old[k], new[k] = y[k], y[k] + h * f[k]
-        for _ in range(1, parts):
+        for _ in range(1, substeps):
             geodesic_derivative(p, new, f)
             for k in range(SIZE):
                 old[k], new[k] = new[k], old[k] + 2.0 * h * f[k]
         # Neville's scheme towards h = 0: each row overwrites the previous one, from its end on.
         error = 0.0
-        for other in range(column - 1, -1, -1):
-            row, last, ratio = (
-                at(columns, other * SIZE),
-                at(columns, (other + 1) * SIZE),
-                (column + 1.0) / (other + 1.0),
+        for lower in range(column - 1, -1, -1):
+            row, finer_row, ratio = (
+                at(columns, lower * SIZE),
+                at(columns, (lower + 1) * SIZE),
+                (column + 1.0) / (lower + 1.0),
             )
             error = 0.0
             for k in range(SIZE):
                 # The error of Gragg's midpoint rule contains even powers of h only, hence squared
                 # ratios.
-                row[k] = last[k] + (last[k] - row[k]) / (ratio * ratio - 1.0)
+                row[k] = finer_row[k] + (finer_row[k] - row[k]) / (ratio * ratio - 1.0)
                 if k < 3:
-                    error = max(error, abs(row[k] - last[k]))
+                    error = max(error, abs(row[k] - finer_row[k]))
         # Three columns are the least from which the error can be judged.
         if column > 1 and error <= EXACT:
             for k in range(SIZE):

@@ -116,7 +116,7 @@ def subtract_inertia(
     """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     while freedom >= 0:
-        a, row, other, place = (
+        a, row, ancestor, column = (
             at(columns, 6 * freedom),
             at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]),
             freedom,
@@ -127,11 +127,11 @@ def subtract_inertia(
         right[freedom] += moment * (
             a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2]
         )
-        while other >= 0:
-            b = at(columns, 6 * other)
-            row[place] -= moment * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-            other = freedoms[DOF.SIZE * other + DOF.ABOVE]
-            place += 1
+        while ancestor >= 0:
+            b = at(columns, 6 * ancestor)
+            row[column] -= moment * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+            ancestor = freedoms[DOF.SIZE * ancestor + DOF.ABOVE]
+            column += 1
         freedom = freedoms[DOF.SIZE * freedom + DOF.ABOVE]
 
 
@@ -152,21 +152,21 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number),
             at(data, h[CHAIN.WORK_JOINTS] + number),
         )
-        kind, source, part, shares = (
+        joint_kind, source, component_index, shares = (
             joint[JOINT.KIND],
             joint[JOINT.SOURCE],
             joint[JOINT.PART],
             at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
         )
         # A joint that is a coordinate, or a multiple of one, is the usual case.
-        if kind == JOINT_KIND.LINE:
-            factor = reals[part]
+        if joint_kind == JOINT_KIND.LINE:
+            factor = reals[component_index]
             shares[0] = factor
             moves[0], moves[count], moves[2 * count] = factor * y[source], factor * f[source], 0.0
             continue
         j = operation_ints(model, source)
         a = operation_work(model, data, source)
-        if kind == JOINT_KIND.AMOUNT_OF:
+        if joint_kind == JOINT_KIND.AMOUNT_OF:
             for k in range(j[OPERATION.ARGUMENT_COUNT]):
                 shares[k] = data[j[OPERATION.GRADIENT] + k]
             moves[0], moves[count], moves[2 * count] = (
@@ -174,22 +174,22 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                 a[OPERATION_WORK.RATE],
                 a[OPERATION_WORK.CURVATURE],
             )
-        elif kind == JOINT_KIND.ANGLE:
+        elif joint_kind == JOINT_KIND.ANGLE:
             angles = at(model, j[OPERATION.ARGUMENTS])
-            moves[0], moves[count] = y[angles[part]], f[angles[part]]
-            moves[2 * count] = move_angle(angles, y, f, part, shares)
-        elif kind == JOINT_KIND.ELLIPSOID:
+            moves[0], moves[count] = y[angles[component_index]], f[angles[component_index]]
+            moves[2 * count] = move_angle(angles, y, f, component_index, shares)
+        elif joint_kind == JOINT_KIND.ELLIPSOID:
             moves[0], moves[count], moves[2 * count] = move_end(
                 at(model, j[OPERATION.ARGUMENTS]),
                 y,
                 at(y, model[MODEL.DOFS]),
-                part,
-                reals[j[OPERATION.EXTRA] + part],
+                component_index,
+                reals[j[OPERATION.EXTRA] + component_index],
                 shares,
             )
         else:
             # The joint of a drift has no motion, but an acceleration.
-            turn = at(a, OPERATION_WORK.AXIS + part)
+            turn = at(a, OPERATION_WORK.AXIS + component_index)
             moves[0] = moves[count] = 0.0
             moves[2 * count] = (
                 turn[0] * a[OPERATION_WORK.AMOUNT]
@@ -198,25 +198,25 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             )
 
 
-def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:
+def move_angle(angles: Ints, y: Floats, f: Floats, angle_index: int, row: Floats) -> float:
     """Fill the row of N of one angle of a ball.
 
     Args:
         angles: degrees of freedom of the ball.
         y: state.
         f: rates of the coordinates.
-        part: number of the angle, 0, 1 or 2.
+        angle_index: number of the angle, 0, 1 or 2.
         row: filled with the derivatives by the three speeds.
 
     Returns:
         Acceleration of the angle while udot = 0 (rad/s²).
     """
-    store_vector(row, 0, angle_rate_row(y, angles, part))
+    store_vector(row, 0, angle_rate_row(y, angles, angle_index))
     return angle_acceleration_bias(y, f, angles, vector(row, 0))
 
 
 def move_end(
-    angles: Ints, y: Floats, u: Floats, part: int, radius: float, row: Floats
+    angles: Ints, y: Floats, u: Floats, axis: int, radius: float, row: Floats
 ) -> tuple[float, float, float]:
     """Compute the motion of one component of r n, where n is the third axis of a ball.
 
@@ -224,7 +224,7 @@ def move_end(
         angles: degrees of freedom of the ball.
         y: state.
         u: generalized speeds.
-        part: component, 0, 1 or 2.
+        axis: component, 0, 1 or 2.
         radius: half axis r of the ellipsoid (m).
         row: filled with the derivatives by the three speeds.
 
@@ -233,6 +233,6 @@ def move_end(
     """
     n, spin = third_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
     # n moves by u x n, and that by u x (u x n).
-    store_vector(row, 0, times(radius, cross(n, replace_component(ZERO, part, 1.0))))
-    own = spin[part] * dot(spin, n) - n[part] * dot(spin, spin)
-    return radius * n[part], dot(vector(row, 0), spin), radius * own
+    store_vector(row, 0, times(radius, cross(n, replace_component(ZERO, axis, 1.0))))
+    centripetal = spin[axis] * dot(spin, n) - n[axis] * dot(spin, spin)
+    return radius * n[axis], dot(vector(row, 0), spin), radius * centripetal

@@ -64,10 +64,10 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     u, v, w = point
     aa, bb, cc = a * a, b * b, c * c
     aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
-    inside = (u / a) * (u / a) + (v / b) * (v / b) + (w / c) * (w / c) < 1.0
+    is_inside = (u / a) * (u / a) + (v / b) * (v / b) + (w / c) * (w / c) < 1.0
     # Outside, this start is beyond the largest root, from which Newton's method converges
     # monotonically.
-    t = 0.0 if inside else max(a, b, c) * norm(point)
+    t = 0.0 if is_inside else max(a, b, c) * norm(point)
     for _ in range(STEPS):
         value, slope = evaluate_polynomial(t + aa, t + bb, t + cc, aauu, bbvv, ccww)
         if abs(value) < SMALL:
@@ -179,19 +179,19 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
     total = 0.0, 0.0, 0.0
     for first in range(1, SAMPLES - 1, LANES):
         for k in range(LANES):
-            part = min(first + k, SAMPLES - 2) / SAMPLES
+            fraction = min(first + k, SAMPLES - 2) / SAMPLES
             # Each blade solves the equation of `closest_point`; all lanes take the same steps.
-            u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
+            u, v, w = sx + fraction * dx, sy + fraction * dy, sz + fraction * dz
             aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
             # The first step is that from t = 0, since the points of the chord are inside.
             value, slope = evaluate_polynomial(aa, bb, cc, aauu, bbvv, ccww)
             work[BLADES.PART + k], work[BLADES.MULTIPLIER + k] = (
-                part,
+                fraction,
                 -value / slope if abs(value) >= SMALL else 0.0,
             )
             work[BLADES.X + k], work[BLADES.Y + k], work[BLADES.Z + k] = aauu, bbvv, ccww
         for _ in range(STEPS):
-            going = 0
+            active_lanes = 0
             for k in range(LANES):
                 t = work[BLADES.MULTIPLIER + k]
                 value, slope = evaluate_polynomial(
@@ -204,13 +204,13 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
                 )
                 if abs(value) >= SMALL:
                     t -= value / slope
-                    going += 1
+                    active_lanes += 1
                 work[BLADES.MULTIPLIER + k] = t
-            if going == 0:
+            if active_lanes == 0:
                 break
         for k in range(LANES):
-            part, t = work[BLADES.PART + k], work[BLADES.MULTIPLIER + k]
-            u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
+            fraction, t = work[BLADES.PART + k], work[BLADES.MULTIPLIER + k]
+            u, v, w = sx + fraction * dx, sy + fraction * dy, sz + fraction * dz
             P, Q, R = t + aa, t + bb, t + cc
             # Direction from the point to the closest one, times (t + aa)(t + bb)(t + cc): -t u / (t
             # + aa) and so on.

@@ -306,19 +306,19 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
         i = at(model, model[model[MODEL.CONTACT_AT] + pair])
         contact = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
         force, point = vector(contact, CONTACT_WORK.FORCE), vector(contact, CONTACT_WORK.FORCE + 3)
-        one, two = i[ITEM.OWN], i[ITEM.OWN + 1]
+        first_link, second_link = i[ITEM.OWN], i[ITEM.OWN + 1]
         # Contacts with ground only move one link; pairs of surfaces on ground have no degrees of
         # freedom.
-        if contact[CONTACT_WORK.DEPTH] > 0.0 and max(one, two) >= 0:
+        if contact[CONTACT_WORK.DEPTH] > 0.0 and max(first_link, second_link) >= 0:
             center = station(
-                model, data, two, vector(reals, i[ITEM.NUMBERS] + CONTACT_NUMBERS.CENTER)
+                model, data, second_link, vector(reals, i[ITEM.NUMBERS] + CONTACT_NUMBERS.CENTER)
             )
-            add_load(model, data, two, point, force, minus(center, point))
-            add_load(model, data, one, point, times(-1.0, force), ZERO)
+            add_load(model, data, second_link, point, force, minus(center, point))
+            add_load(model, data, first_link, point, times(-1.0, force), ZERO)
     # Inwards from the leaves: the load of a link contains those of its subtree.
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        i, here = link_ints(model, link), link_work(model, data, link)
-        load, origin = at(here, LINK_WORK.INERTIA), vector(here, LINK_WORK.ORIGIN)
+        i, link_record = link_ints(model, link), link_work(model, data, link)
+        load, origin = at(link_record, LINK_WORK.INERTIA), vector(link_record, LINK_WORK.ORIGIN)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             j = operation_ints(model, operation)
             # Only motions about or along one axis; those of balls and functions are omitted from J.
@@ -327,27 +327,33 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
             turn, shift = unit_twist(j, operation_work(model, data, operation), origin)
             # Change of the moment of the load as it moves along this operation: with the sum S of
             # products of positions and forces, it is shift x F + S turn - trace(S) turn.
-            moved = minus(cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn))
+            load_change = minus(
+                cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn)
+            )
             # Each pair of an operation and a rotation on its path to ground is visited once, so both
             # entries of the symmetric matrix are changed.
-            moved, inner, within = plus(moved, rotate(at(load, 3), turn)), operation, link
+            load_change, inner, within = (
+                plus(load_change, rotate(at(load, 3), turn)),
+                operation,
+                link,
+            )
             while within >= 0:
-                other = operation_ints(model, inner)
-                if other[OPERATION.DOF] >= 0 and other[OPERATION.MOTION] == MOTION.TURN:
+                inner_ints = operation_ints(model, inner)
+                if inner_ints[OPERATION.DOF] >= 0 and inner_ints[OPERATION.MOTION] == MOTION.TURN:
                     change = dot(
-                        moved, vector(operation_work(model, data, inner), OPERATION_WORK.AXIS)
+                        load_change, vector(operation_work(model, data, inner), OPERATION_WORK.AXIS)
                     )
-                    levers[size * j[OPERATION.DOF] + other[OPERATION.DOF]] += change
+                    levers[size * j[OPERATION.DOF] + inner_ints[OPERATION.DOF]] += change
                     if inner != operation:
-                        levers[size * other[OPERATION.DOF] + j[OPERATION.DOF]] += change
+                        levers[size * inner_ints[OPERATION.DOF] + j[OPERATION.DOF]] += change
                 inner -= 1
                 while within >= 0 and inner < link_ints(model, within)[LINK.FIRST_OPERATION]:
                     within = link_ints(model, within)[LINK.PARENT]
                     inner = link_ints(model, within)[LINK.END_OPERATION] - 1 if within >= 0 else -1
         if i[LINK.PARENT] >= 0:
-            below = at(link_work(model, data, i[LINK.PARENT]), LINK_WORK.INERTIA)
+            parent_load = at(link_work(model, data, i[LINK.PARENT]), LINK_WORK.INERTIA)
             for n in range(LOAD):
-                below[n] += load[n]
+                parent_load[n] += load[n]
 
 
 def add_load(
@@ -364,8 +370,11 @@ def add_load(
         offset: offset from `point` to the material point that the force moves with (m).
     """
     if link >= 0:
-        here = link_work(model, data, link)
-        load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
+        link_record = link_work(model, data, link)
+        load, arm = (
+            at(link_record, LINK_WORK.INERTIA),
+            minus(point, vector(link_record, LINK_WORK.ORIGIN)),
+        )
         store_vector(load, 0, plus(vector(load, 0), force))
         # The products contain the motion of the point where the material point is not the point of
         # action.
@@ -385,7 +394,7 @@ def add_outer_product(
     end: int,
     b: Floats,
     start: int,
-    last: int,
+    stop: int,
     matrix: Floats,
 ) -> None:
     """Add a multiple of the outer product of two vectors to a matrix.
@@ -398,13 +407,13 @@ def add_outer_product(
         end: end of its nonzero entries.
         b: second vector.
         start: start of its nonzero entries.
-        last: end of its nonzero entries.
+        stop: end of its nonzero entries.
         matrix: matrix (size, size); changed.
     """
     for i in range(first, end):
         if a[i] != 0.0:
             scaled, target = factor * a[i], at(matrix, size * i)
-            for k in range(start, last):
+            for k in range(start, stop):
                 target[k] += scaled * b[k]
 
 
@@ -452,8 +461,8 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
             has_state = states[i] >= 0
             driven[i] = c * (c * rates[0] + rates[1]) if has_state else 0.0
             for k in range(count):
-                own = c * rates[2 + k] if has_state and states[k] >= 0 else 0.0
-                inverse[count * i + k] = (1.0 if i == k else 0.0) - own
+                scaled_rate = c * rates[2 + k] if has_state and states[k] >= 0 else 0.0
+                inverse[count * i + k] = (1.0 if i == k else 0.0) - scaled_rate
         invert_matrix(count, inverse)
         # Schur complement: what the states add to the derivatives of the force by speed and
         # displacement.
@@ -502,12 +511,12 @@ def factorise_matrix(size: int, a: Floats, masses: Floats) -> bool:
         # Store inverse pivots, because divisions are slow and each is used in every solution.
         row[k] = 1.0 / row[k]
         for i in range(k + 1, size):
-            other = at(a, size * i)
-            if other[k] != 0.0:
-                factor = other[k] * row[k]
-                other[k] = factor
+            lower_row = at(a, size * i)
+            if lower_row[k] != 0.0:
+                factor = lower_row[k] * row[k]
+                lower_row[k] = factor
                 for j in range(k + 1, size):
-                    other[j] -= factor * row[j]
+                    lower_row[j] -= factor * row[j]
     return True
 
 

@@ -45,24 +45,30 @@ def amount_by_arc(
     Returns:
         `OUTCOME.OK`.
     """
-    j, kept = (
+    j, operation_record = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
     )
-    one, two, p = (
+    first_freedom, second_freedom, p = (
         model[j[OPERATION.ARGUMENTS]],
         model[j[OPERATION.ARGUMENTS] + 1],
         at(reals, j[OPERATION.EXTRA]),
     )
     table, u = at(p, 2), at(y, model[MODEL.DOFS])
-    a = (y[one] if one >= 0 else p[0]) + table[ROD.NEUTRAL]
-    b = (y[two] if two >= 0 else p[1]) + table[ROD.NEUTRAL + 1]
-    ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
+    a = (y[first_freedom] if first_freedom >= 0 else p[0]) + table[ROD.NEUTRAL]
+    b = (y[second_freedom] if second_freedom >= 0 else p[1]) + table[ROD.NEUTRAL + 1]
+    ua, ub = (
+        u[first_freedom] if first_freedom >= 0 else 0.0,
+        u[second_freedom] if second_freedom >= 0 else 0.0,
+    )
     value, da, db, daa, dab, dbb = evaluate_arc(table, a, b)
     data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
-    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = value, da * ua + db * ub
+    operation_record[OPERATION_WORK.AMOUNT], operation_record[OPERATION_WORK.RATE] = (
+        value,
+        da * ua + db * ub,
+    )
     # Second derivative by time of the amount at constant speeds.
-    kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
+    operation_record[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
     return OUTCOME.OK
 
 

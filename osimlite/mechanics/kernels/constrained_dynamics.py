@@ -92,7 +92,7 @@ def evaluate_constraints(model: Ints, reals: Floats, data: Floats, y: Floats, f:
         call(model[MODEL.LAWS + model[constraint + ITEM.LAW]], model, reals, data, y, f, constraint)
 
 
-def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bool:
+def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats) -> bool:
     """Correct unconstrained accelerations by constraint forces, if M is well conditioned.
 
     With M = Uᵀ D U, the equations G U⁻¹ D^(-1/2) x = b - G udot have the shortest solution x, and
@@ -102,7 +102,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
         model: integers of the model.
         data: results with the factor of M and the equations.
         right: unconstrained accelerations (n,); corrected.
-        room: workspace of 2 (n + m) numbers.
+        work: workspace of 2 (n + m) numbers.
 
     Returns:
         Whether M is well conditioned; if not, nothing is changed.
@@ -114,10 +114,10 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
         at(data, model[MODEL.WORK_PIVOT]),
     )
     scales, push, values, spare = (
-        room,
-        at(room, size),
-        at(room, 2 * size),
-        at(room, 2 * size + count),
+        work,
+        at(work, size),
+        at(work, 2 * size),
+        at(work, 2 * size + count),
     )
     for k in range(size):
         pivot = data[freedoms[DOF.SIZE * k + DOF.ROW]]
@@ -131,14 +131,14 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
     )
     for i in range(count):
         # An equation of rounding errors must not be enlarged by a light degree of freedom.
-        row, turned, longest = at(rows, size * i), at(weighted, size * i), 0.0
+        row, weighted_row, longest = at(rows, size * i), at(weighted, size * i), 0.0
         for k in range(size):
             longest = max(longest, abs(row[k]))
         for k in range(size):
-            turned[k] = row[k] if longest > ROUNDING else 0.0
-        solve_transposed_factor(model, data, turned)
+            weighted_row[k] = row[k] if longest > ROUNDING else 0.0
+        solve_transposed_factor(model, data, weighted_row)
         for k in range(size):
-            turned[k] *= scales[k]
+            weighted_row[k] *= scales[k]
     factorise_by_law(model, data, count, weighted, SLIGHT * sqrt(count))
     # The second pass removes rounding errors of the first.
     for _ in range(2):
@@ -196,7 +196,7 @@ def solve_factor(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def solve_in_null_space(
-    model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats
+    model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, work: Floats
 ) -> int:
     """Compute the accelerations in the null space of the constraint equations.
 
@@ -206,7 +206,7 @@ def solve_in_null_space(
         matrix: entries of the mass matrix.
         forces: generalized forces (n,); changed.
         right: filled with the accelerations (n,).
-        room: workspace of 2 n (n + 1) + 2 m numbers.
+        work: workspace of 2 n (n + 1) + 2 m numbers.
 
     Returns:
         `OUTCOME.OK`, or SINGULAR_MASS if the reduced mass matrix is not positive definite.
@@ -219,7 +219,7 @@ def solve_in_null_space(
         at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     # Scale all equations to unit length, and drop those that are rounding errors.
-    values, spare = room, at(room, count)
+    values, spare = work, at(work, count)
     longest = 0.0
     for i in range(count):
         square = 0.0
@@ -242,7 +242,7 @@ def solve_in_null_space(
         at(spare, count + 2 * size),
         at(spare, count + 2 * size + size * size),
     )
-    rest = at(pushed, size)
+    reduced_rhs = at(pushed, size)
     # Its inertial forces reduce the forces of the free motion.
     multiply_mass(model, matrix, right, pushed)
     for k in range(size):
@@ -262,13 +262,13 @@ def solve_in_null_space(
         total = 0.0
         for k in range(size):
             total += direction[k] * forces[k]
-        rest[j] = total
+        reduced_rhs[j] = total
     if not factorise_cholesky(free, reduced, SMALLEST_PIVOT):
         return OUTCOME.SINGULAR_MASS
-    solve_cholesky(free, reduced, rest)
+    solve_cholesky(free, reduced, reduced_rhs)
     for j in range(free):
         for k in range(size):
-            right[k] += rest[j] * basis[size * j + k]
+            right[k] += reduced_rhs[j] * basis[size * j + k]
     return OUTCOME.OK
 
 

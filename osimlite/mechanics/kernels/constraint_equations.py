@@ -101,13 +101,18 @@ def prescribe(
         `OUTCOME.OK`.
     """
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
-    row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
+    row, coordinate_ints = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
     value, slope, curvature = evaluate_function(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
-    data[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
+    data[h[CONSTRAINED.WORK_ERRORS] + row] = y[coordinate_ints[0]] - value
     data[h[CONSTRAINED.WORK_RATES] + row] = slope
     # The angles of a ball accelerate while its speeds are constant; this bias is subtracted.
     bias = add_coordinate(
-        model, y, f, own, 1.0, at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
+        model,
+        y,
+        f,
+        coordinate_ints,
+        1.0,
+        at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row),
     )
     data[h[CONSTRAINED.WORK_DRIFTS] + row] = curvature - bias
     return OUTCOME.OK
@@ -137,9 +142,13 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
         at(model, model[MODEL.CONSTRAINED]),
         at(reals, model[constraint + CONSTRAINT.NUMBERS]),
     )
-    row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
-    size, freedoms = own[COORDINATE.SIZE + 1], at(own, COORDINATE.SIZE + 2)
-    others, gradient, constants = at(freedoms, size), at(data, own[COORDINATE.SIZE]), at(p, 1)
+    row, coupler_ints = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
+    size, freedoms = coupler_ints[COORDINATE.SIZE + 1], at(coupler_ints, COORDINATE.SIZE + 2)
+    coordinate_records, gradient, constants = (
+        at(freedoms, size),
+        at(data, coupler_ints[COORDINATE.SIZE]),
+        at(p, 1),
+    )
     if int(constants[size]) >= FUNCTION_TYPE.MONOMIALS:
         # A function of one coordinate, or a constant.
         value, _, curvature = evaluate_monomials(size, freedoms, constants, y, f, gradient)
@@ -151,12 +160,16 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
         value, slope, bend = evaluate_function(at(constants, size), argument)
         curvature = bend * rate * rate
         gradient[0] = slope
-    to = at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
+    target_row = at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
     # The dependent coordinate has the factor -1: the error is the function less the coordinate.
-    bias = add_coordinate(model, y, f, own, -1.0, to)
+    bias = add_coordinate(model, y, f, coupler_ints, -1.0, target_row)
     for k in range(size):
-        bias += add_coordinate(model, y, f, at(others, COORDINATE.SIZE * k), gradient[k], to)
-    data[h[CONSTRAINED.WORK_ERRORS] + row] = value - (y[own[0]] if own[0] >= 0 else p[0])
+        bias += add_coordinate(
+            model, y, f, at(coordinate_records, COORDINATE.SIZE * k), gradient[k], target_row
+        )
+    data[h[CONSTRAINED.WORK_ERRORS] + row] = value - (
+        y[coupler_ints[0]] if coupler_ints[0] >= 0 else p[0]
+    )
     data[h[CONSTRAINED.WORK_DRIFTS] + row] = -bias - curvature
     return OUTCOME.OK
 
@@ -187,10 +200,10 @@ def add_coordinate(
     # The rate of an angle of a ball is a row of N times its three speeds.
     angles = at(model, ball)
     n = angle_rate_row(y, angles, coordinate[COORDINATE.PART])
-    one, two, three = n
-    row[angles[0]] += factor * one
-    row[angles[1]] += factor * two
-    row[angles[2]] += factor * three
+    first_rate, second_rate, third_rate = n
+    row[angles[0]] += factor * first_rate
+    row[angles[1]] += factor * second_rate
+    row[angles[2]] += factor * third_rate
     return factor * angle_acceleration_bias(y, f, angles, n)
 
 
@@ -213,38 +226,46 @@ def bind_bodies(
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
     for row in range(first, i[CONSTRAINT.END_EQUATION]):
-        own, p = (
+        equation_ints, p = (
             at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first)),
             at(reals, i[CONSTRAINT.NUMBERS] + EQUATION_NUMBERS * (row - first)),
         )
-        one, two, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), p[12]
-        to = at(data, h[CONSTRAINED.WORK_ROWS] + size * row)
-        a, a_rate, a_bias = differentiate_vector(model, reals, data, one, p)
-        b, b_rate, b_bias = differentiate_vector(model, reals, data, two, at(p, 6))
+        first_vector, second_vector, target_value = (
+            at(equation_ints, 1),
+            at(equation_ints, 1 + VECTOR_INTS),
+            p[12],
+        )
+        target_row = at(data, h[CONSTRAINED.WORK_ROWS] + size * row)
+        a, a_rate, a_bias = differentiate_vector(model, reals, data, first_vector, p)
+        b, b_rate, b_bias = differentiate_vector(model, reals, data, second_vector, at(p, 6))
         error = drift = 0.0
         # Second derivative of a scalar product: both vectors change, hence twice the product of
         # their rates.
-        if own[0] == EQUATION_TYPE.PRODUCT:
-            error = dot(a, b) - wanted
+        if equation_ints[0] == EQUATION_TYPE.PRODUCT:
+            error = dot(a, b) - target_value
             drift = dot(a, b_bias) + dot(b, a_bias) + 2.0 * dot(a_rate, b_rate)
             # The derivative of a . b is that of a along b, plus that of b along a.
-            add_vector_row(model, data, one, p, b, to)
-            add_vector_row(model, data, two, at(p, 6), a, to)
-        elif own[0] == EQUATION_TYPE.DISTANCE:
+            add_vector_row(model, data, first_vector, p, b, target_row)
+            add_vector_row(model, data, second_vector, at(p, 6), a, target_row)
+        elif equation_ints[0] == EQUATION_TYPE.DISTANCE:
             length = norm(b)
-            error = length - wanted
+            error = length - target_value
             # At zero distance any direction of the rate is as good.
             e, stretch = (1.0, 0.0, 0.0), 0.0
             if length > 0.0:
                 e = divide(b, length)
                 stretch = (dot(b_rate, b_rate) - dot(e, b_rate) ** 2) / length
             drift = dot(e, b_bias) + stretch
-            add_vector_row(model, data, two, at(p, 6), e, to)
+            add_vector_row(model, data, second_vector, at(p, 6), e, target_row)
         else:
             # A roller must not slip on the surface at the point of the surface that it touches.
-            surface, roller, point = two[1], two[2], station(model, data, two[1], vector(p, 6))
-            add_force_row(model, data, surface, point, times(-1.0, a), to)
-            add_force_row(model, data, roller, point, a, to)
+            surface, roller, point = (
+                second_vector[1],
+                second_vector[2],
+                station(model, data, second_vector[1], vector(p, 6)),
+            )
+            add_force_row(model, data, surface, point, times(-1.0, a), target_row)
+            add_force_row(model, data, roller, point, a, target_row)
             turning, turning_bias = (
                 angular_velocity(model, data, roller),
                 angular_acceleration_bias(model, data, roller),
@@ -260,7 +281,7 @@ def bind_bodies(
 
 
 def differentiate_vector(
-    model: Ints, reals: Floats, data: Floats, kind: Ints, p: Floats
+    model: Ints, reals: Floats, data: Floats, vector_ints: Ints, p: Floats
 ) -> tuple[Vector, Vector, Vector]:
     """Compute a vector, its rate, and its second derivative while udot = 0.
 
@@ -268,70 +289,85 @@ def differentiate_vector(
         model: integers of the model.
         reals: its numbers.
         data: results of an evaluation.
-        kind: integers of the vector.
+        vector_ints: integers of the vector.
         p: numbers of the vector.
 
     Returns:
         Vector, rate and second derivative, along the axes of ground.
     """
-    one, two = kind[1], kind[2]
-    if kind[0] == VECTOR_TYPE.AXIS:
+    first_link, second_link = vector_ints[1], vector_ints[2]
+    if vector_ints[0] == VECTOR_TYPE.AXIS:
         axis, turning = (
-            direction(model, data, one, vector(p, 0)),
-            angular_velocity(model, data, one),
+            direction(model, data, first_link, vector(p, 0)),
+            angular_velocity(model, data, first_link),
         )
         rate = cross(turning, axis)
         return (
             axis,
             rate,
-            plus(cross(angular_acceleration_bias(model, data, one), axis), cross(turning, rate)),
+            plus(
+                cross(angular_acceleration_bias(model, data, first_link), axis),
+                cross(turning, rate),
+            ),
         )
-    start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
+    start, end = (
+        station(model, data, first_link, vector(p, 0)),
+        station(model, data, second_link, vector(p, 3)),
+    )
     arm = minus(end, start)
     # Both velocities at the same point of ground: what remains is the motion of the end relative to
     # link 1.
-    if kind[0] == VECTOR_TYPE.MEETING:
+    if vector_ints[0] == VECTOR_TYPE.MEETING:
         start = end
-    rate = minus(velocity(model, data, two, end), velocity(model, data, one, start))
+    rate = minus(velocity(model, data, second_link, end), velocity(model, data, first_link, start))
     bias = minus(
-        acceleration(model, reals, data, two, end), acceleration(model, reals, data, one, start)
+        acceleration(model, reals, data, second_link, end),
+        acceleration(model, reals, data, first_link, start),
     )
-    if kind[0] == VECTOR_TYPE.MEETING:
+    if vector_ints[0] == VECTOR_TYPE.MEETING:
         # Subtract the Coriolis acceleration of the nearest common ancestor of both links.
-        while one != two:
-            if one > two:
-                one = link_ints(model, one)[LINK.PARENT]
+        while first_link != second_link:
+            if first_link > second_link:
+                first_link = link_ints(model, first_link)[LINK.PARENT]
             else:
-                two = link_ints(model, two)[LINK.PARENT]
-        bias = minus(bias, times(2.0, cross(angular_velocity(model, data, one), rate)))
+                second_link = link_ints(model, second_link)[LINK.PARENT]
+        bias = minus(bias, times(2.0, cross(angular_velocity(model, data, first_link), rate)))
     return arm, rate, bias
 
 
 def add_vector_row(
-    model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floats
+    model: Ints, data: Floats, vector_ints: Ints, p: Floats, projection: Vector, row: Floats
 ) -> None:
     """Add to a row the derivative by the speeds of a vector's rate along a direction.
 
     Args:
         model: integers of the model.
         data: results of an evaluation.
-        kind: integers of the vector.
+        vector_ints: integers of the vector.
         p: numbers of the vector.
-        on: direction, along the axes of ground.
+        projection: direction, along the axes of ground.
         row: row of G (n,); changed.
     """
-    # An axis changes by w x a, whose component along `on` is w . (a x on): a torque.
-    one, two = kind[1], kind[2]
-    if kind[0] == VECTOR_TYPE.AXIS:
+    # An axis changes by w x a, whose component along `projection` is w . (a x on): a torque.
+    first_link, second_link = vector_ints[1], vector_ints[2]
+    if vector_ints[0] == VECTOR_TYPE.AXIS:
         add_wrench_row(
-            model, data, one, cross(direction(model, data, one, vector(p, 0)), on), ZERO, row
+            model,
+            data,
+            first_link,
+            cross(direction(model, data, first_link, vector(p, 0)), projection),
+            ZERO,
+            row,
         )
         return
-    start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
-    if kind[0] == VECTOR_TYPE.MEETING:
+    start, end = (
+        station(model, data, first_link, vector(p, 0)),
+        station(model, data, second_link, vector(p, 3)),
+    )
+    if vector_ints[0] == VECTOR_TYPE.MEETING:
         start = end
-    add_force_row(model, data, one, start, times(-1.0, on), row)
-    add_force_row(model, data, two, end, on, row)
+    add_force_row(model, data, first_link, start, times(-1.0, projection), row)
+    add_force_row(model, data, second_link, end, projection, row)
 
 
 def add_force_row(

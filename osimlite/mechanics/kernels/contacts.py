@@ -116,9 +116,14 @@ def measure_half_space(
         Depth (m), effective radius (m), normal, and point of application (m).
     """
     i = at(model, item)
-    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
-    o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
-    d, point = half_space_sphere(o, n, station(model, data, two, vector(p, 7)), p[10], p[12])
+    first_link, second_link, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    o, n = (
+        station(model, data, first_link, vector(p, 0)),
+        direction(model, data, first_link, vector(p, 3)),
+    )
+    d, point = half_space_sphere(
+        o, n, station(model, data, second_link, vector(p, 7)), p[10], p[12]
+    )
     return d, p[10], n, point
 
 
@@ -138,11 +143,11 @@ def measure_spheres(
     """
     i = at(model, item)
     p = at(reals, i[ITEM.NUMBERS])
-    one, two = (
+    first_center, second_center = (
         station(model, data, i[ITEM.OWN], vector(p, 0)),
         station(model, data, i[ITEM.OWN + 1], vector(p, 7)),
     )
-    return sphere_sphere(one, p[6], two, p[10], p[12])
+    return sphere_sphere(first_center, p[6], second_center, p[10], p[12])
 
 
 def contact_response(
@@ -175,17 +180,19 @@ def contact_response(
         else measure_spheres(model, reals, data, pair)
     )
     if d > 0.0:
-        one, two, p = (
+        first_link, second_link, p = (
             model[pair + ITEM.OWN],
             model[pair + ITEM.OWN + 1],
             at(reals, model[pair + ITEM.NUMBERS]),
         )
-        v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
+        v = minus(
+            velocity(model, data, first_link, point), velocity(model, data, second_link, point)
+        )
         changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-        center = station(model, data, two, vector(p, CONTACT_NUMBERS.CENTER))
+        center = station(model, data, second_link, vector(p, CONTACT_NUMBERS.CENTER))
         # The elastic force grows with d^(3/2), so that its relative derivative by the depth is 1.5
         # / d.
-        contact = PushedContact(one, two, point, center, n, v, 1.0 - p[12])
+        contact = PushedContact(first_link, second_link, point, center, n, v, 1.0 - p[12])
         write_response(model, data, y, f, contact, axis, changes, 1.5 / d)
     return OUTCOME.OK
 
@@ -215,16 +222,16 @@ def smooth_contact_response(
         change[k] = 0.0
     contact = item + i[ITEM.OWN]
     p, g = at(reals, model[contact + ITEM.NUMBERS]), at(model, contact + ITEM.OWN)
-    place = at(p, SMOOTH)
+    geometry = at(p, SMOOTH)
     n, center = (
-        direction(model, data, g[0], vector(place, 3)),
-        station(model, data, g[1], vector(place, 6)),
+        direction(model, data, g[0], vector(geometry, 3)),
+        station(model, data, g[1], vector(geometry, 6)),
     )
-    d = place[9] - dot(minus(center, station(model, data, g[0], vector(place, 0))), n)
+    d = geometry[9] - dot(minus(center, station(model, data, g[0], vector(geometry, 0))), n)
     # The force acts midway between the two surfaces.
-    point = add_scaled(center, 0.5 * d - place[9], n)
+    point = add_scaled(center, 0.5 * d - geometry[9], n)
     v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
-    constants = SmoothContact(place[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
+    constants = SmoothContact(geometry[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
     pressed, damped, dragged, growth = smooth_contact_derivatives(constants, d, n, v)
     if growth != 0.0:
         touching = PushedContact(g[0], g[1], point, center, n, v, 0.5)
@@ -275,27 +282,33 @@ def write_response(
         growth: relative derivative of the force by the depth (1/m).
     """
     change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
-    one, two, point, n, v = contact.one, contact.two, contact.point, contact.n, contact.v
-    way, by_depth = n, 0.0
+    first_link, second_link, point, n, v = (
+        contact.one,
+        contact.two,
+        contact.point,
+        contact.n,
+        contact.v,
+    )
+    push_direction, by_depth = n, 0.0
     if axis > 0:
         # Any two directions perpendicular to the normal and each other serve.
         nx, ny, nz = n
-        way = divide(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
+        push_direction = divide(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
         if abs(nx) > 0.7:
-            way = divide(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
+            push_direction = divide(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
         if axis > 1:
-            way = cross(n, way)
+            push_direction = cross(n, push_direction)
         # Friction resists slip like a damper, whose constant grows with the depth.
-        change[1], by_depth = -dragged, -growth * dragged * dot(v, way)
+        change[1], by_depth = -dragged, -growth * dragged * dot(v, push_direction)
     else:
         # Depth and approach increase the force, so that it resists both.
         change[0], change[1] = -pressed, -damped
-    apply_force(model, data, two, point, way)
-    apply_force(model, data, one, point, times(-1.0, way))
-    factors = PointFactors(times(by_depth, n), times(change[1], way))
-    add_rotation_terms(model, data, y, f, two, contact, contact.center, factors)
-    factors = PointFactors(times(-by_depth, n), times(-change[1], way))
-    add_rotation_terms(model, data, y, f, one, contact, point, factors)
+    apply_force(model, data, second_link, point, push_direction)
+    apply_force(model, data, first_link, point, times(-1.0, push_direction))
+    factors = PointFactors(times(by_depth, n), times(change[1], push_direction))
+    add_rotation_terms(model, data, y, f, second_link, contact, contact.center, factors)
+    factors = PointFactors(times(-by_depth, n), times(-change[1], push_direction))
+    add_rotation_terms(model, data, y, f, first_link, contact, point, factors)
 
 
 def add_rotation_terms(
@@ -324,8 +337,8 @@ def add_rotation_terms(
     """
     if link < 0:
         return
-    here = link_work(model, data, link)
-    origin, spin = vector(here, LINK_WORK.ORIGIN), vector(here, LINK_WORK.VELOCITY)
+    link_record = link_work(model, data, link)
+    origin, spin = vector(link_record, LINK_WORK.ORIGIN), vector(link_record, LINK_WORK.VELOCITY)
     # From the link to ground: `turning` and `shifting` are the velocity of the operations passed so
     # far, which the current one carries along.
     arm, turning, shifting = minus(contact.point, origin), ZERO, ZERO
@@ -340,8 +353,8 @@ def add_rotation_terms(
             rate = a[OPERATION_WORK.RATE]
             if j[OPERATION.DOF] >= 0:
                 # The point of application follows the centre of surface 2, except along the normal.
-                moved = plus(shift, cross(turn, minus(center, origin)))
-                moved = minus(moved, times(dot(n, moved), sinks))
+                center_change = plus(shift, cross(turn, minus(center, origin)))
+                center_change = minus(center_change, times(dot(n, center_change), sinks))
                 # Derivative of the velocity at a fixed point by the coordinate of this operation.
                 swept = plus(
                     plus(cross(turn, shifting), cross(shift, turning)),
@@ -349,7 +362,7 @@ def add_rotation_terms(
                 )
                 placed = dot(factors.by_place, plus(shift, cross(turn, arm)))
                 row[j[OPERATION.DOF]] += placed + dot(
-                    factors.by_motion, plus(swept, cross(spin, moved))
+                    factors.by_motion, plus(swept, cross(spin, center_change))
                 )
                 rate = y[model[MODEL.DOFS] + j[OPERATION.DOF]]
             turning, shifting = add_scaled(turning, rate, turn), add_scaled(shifting, rate, shift)
@@ -379,27 +392,27 @@ def apply_contact_force(
         point: point of application (m).
     """
     i = at(model, item)
-    one, two, p, result = (
+    first_link, second_link, p, result = (
         i[ITEM.OWN],
         i[ITEM.OWN + 1],
         at(reals, i[ITEM.NUMBERS]),
         at(data, i[ITEM.RECORD]),
     )
     # Relative velocity at the point of application, of surface 1 relative to surface 2.
-    v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
+    v = minus(velocity(model, data, first_link, point), velocity(model, data, second_link, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
     store_vector(result, 0, force)
     store_vector(result, 3, point)
     result[6], result[7] = d, radius
-    apply_force(model, data, two, point, force)
-    apply_force(model, data, one, point, times(-1.0, force))
+    apply_force(model, data, second_link, point, force)
+    apply_force(model, data, first_link, point, times(-1.0, force))
 
 
 def contact_places(
     model: Ints,
     vectors: Floats,
     data: Floats,
-    each: int,
+    number_count: int,
     rows: Ints,
     states: Floats,
     rates: Floats,
@@ -412,7 +425,7 @@ def contact_places(
         model: integers of the model.
         vectors: its numbers, in one row or several.
         data: workspace of an evaluation.
-        each: length of a row of numbers.
+        number_count: length of a row of numbers.
         rows: number of the row of each state (k,).
         states: states (k, y).
         rates: workspace of a derivative (y,).
@@ -425,15 +438,15 @@ def contact_places(
     """
     pairs, size = model[MODEL.CONTACTS], model[MODEL.STATE_SIZE]
     for k in range(count):
-        x = at(vectors, each * rows[k])
+        x = at(vectors, number_count * rows[k])
         call(model[MODEL.LAWS], model, x, data, at(states, size * k), rates, STAGE.POSITION)
         for pair in range(pairs):
-            i, to = (
+            i, result_row = (
                 at(model, model[model[MODEL.CONTACT_AT] + pair]),
                 at(positions, 9 * (pairs * k + pair)),
             )
-            a, one, two = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
-            store_vector(to, 0, station(model, data, one, vector(a, 0)))
-            store_vector(to, 3, direction(model, data, one, vector(a, 3)))
-            store_vector(to, 6, station(model, data, two, vector(a, 7)))
+            a, first_link, second_link = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
+            store_vector(result_row, 0, station(model, data, first_link, vector(a, 0)))
+            store_vector(result_row, 3, direction(model, data, first_link, vector(a, 3)))
+            store_vector(result_row, 6, station(model, data, second_link, vector(a, 7)))
     return OUTCOME.OK

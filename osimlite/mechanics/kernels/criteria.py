@@ -128,18 +128,18 @@ class JUMP_WORK(metaclass=Record):
     START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)
 
 
-def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
+def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
     """Start all criteria with a sensor row.
 
     Args:
         senses: plan of the sensor row.
         i: integers of the criteria.
         row: sensor row.
-        room: workspace of the criteria; filled.
+        work: workspace of the criteria; filled.
     """
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        noted, centre = at(room, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
+        noted, centre = at(work, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
             noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = walked_distance(senses, row)
             noted[GAIT_WORK.HEIGHT] = row[centre + 1]
@@ -158,19 +158,26 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
 
 
 def update_criteria(
-    senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats
+    senses: Ints,
+    sensor_numbers: Floats,
+    i: Ints,
+    p: Floats,
+    t: float,
+    row: Floats,
+    u: Floats,
+    work: Floats,
 ) -> bool:
     """Update all criteria after a control step.
 
     Args:
         senses: plan of the sensor row.
-        known: numbers of the sensor row.
+        sensor_numbers: numbers of the sensor row.
         i: integers of the criteria.
         p: numbers of the criteria.
         t: time (s).
         row: sensor row.
         u: excitations during the control step.
-        room: workspace of the criteria.
+        work: workspace of the criteria.
 
     Returns:
         Whether the walker has fallen, or its jump has ended.
@@ -178,7 +185,7 @@ def update_criteria(
     has_fallen = False
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        numbers, noted = at(p, criterion[CRITERION.NUMBERS]), at(room, criterion[CRITERION.ROOM])
+        numbers, noted = at(p, criterion[CRITERION.NUMBERS]), at(work, criterion[CRITERION.ROOM])
         # SCONE's measures see only what happens within their times.
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
@@ -191,10 +198,10 @@ def update_criteria(
             has_fallen = has_fallen or noted[JUMP_WORK.ENDED] > 0.0
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.WANG:
-            value = metabolic_power(senses, known, numbers, row, u)
+            value = metabolic_power(senses, sensor_numbers, numbers, row, u)
         elif criterion[CRITERION.KIND] >= CRITERION_TYPE.POWERS:
             value = muscle_effort(
-                senses, known, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], row
+                senses, sensor_numbers, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], row
             )
         else:
             value = range_penalty(
@@ -234,15 +241,15 @@ def walked_distance(senses: Ints, row: Floats) -> float:
         senses: plan of the sensor row.
         row: sensor row.
     """
-    centre, one, two = (
+    centre, first_foot, second_foot = (
         row[senses[SENSES.CENTRE]],
         foot_position(senses, row, 0),
         foot_position(senses, row, 1),
     )
     # SCONE takes the two smallest of three, so that a trunk that falls forwards adds little.
-    if centre >= one and centre >= two:
-        return 0.5 * (one + two)
-    return 0.5 * (centre + min(one, two))
+    if centre >= first_foot and centre >= second_foot:
+        return 0.5 * (first_foot + second_foot)
+    return 0.5 * (centre + min(first_foot, second_foot))
 
 
 def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
@@ -268,11 +275,11 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         noted[GAIT_WORK.TOUCHES + leg] = touches
     count = int(noted[GAIT_WORK.COUNT])
     # A step takes two numbers, its time and its length; the first one starts at time 0.
-    last = noted[GAIT_WORK.STEPS + 2 * (count - 1)] if count > 0 else 0.0
+    last_step_time = noted[GAIT_WORK.STEPS + 2 * (count - 1)] if count > 0 else 0.0
     if (
         has_touched
         and noted[GAIT_WORK.FALLEN] == 0.0
-        and t - last > numbers[CRITERION_NUMBERS.SHORTEST]
+        and t - last_step_time > numbers[CRITERION_NUMBERS.SHORTEST]
     ):
         step = at(noted, GAIT_WORK.STEPS + 2 * count)
         step[0], step[1] = t, noted[GAIT_WORK.HERE] - noted[GAIT_WORK.BEFORE]
@@ -314,57 +321,65 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         )
 
 
-def range_penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:
+def range_penalty(
+    senses: Ints, criterion_type: int, offset: int, numbers: Floats, row: Floats
+) -> float:
     """Return the penalty of a number beyond its range.
 
     It is linear off + squared off^2, where off is the distance from the range.
 
     Args:
         senses: plan of the sensor row.
-        kind: NUMBER, LARGEST_LOAD or WHOLE_LOAD of `CRITERION_TYPE`.
-        place: index of the number in the row.
+        criterion_type: NUMBER, LARGEST_LOAD or WHOLE_LOAD of `CRITERION_TYPE`.
+        offset: index of the number in the row.
         numbers: numbers of the criterion.
         row: sensor row.
     """
-    one, two = row[place], 0.0
-    if kind != CRITERION_TYPE.NUMBER:
-        one, two = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
-        one, two = (max(one, two), 0.0) if kind == CRITERION_TYPE.LARGEST_LOAD else (one, two)
-    value = numbers[CRITERION_NUMBERS.FACTOR] * (one + two)
-    off = max(numbers[CRITERION_NUMBERS.LOW] - value, 0.0) + max(
+    first_value, second_value = row[offset], 0.0
+    if criterion_type != CRITERION_TYPE.NUMBER:
+        first_value, second_value = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
+        first_value, second_value = (
+            (max(first_value, second_value), 0.0)
+            if criterion_type == CRITERION_TYPE.LARGEST_LOAD
+            else (first_value, second_value)
+        )
+    value = numbers[CRITERION_NUMBERS.FACTOR] * (first_value + second_value)
+    violation = max(numbers[CRITERION_NUMBERS.LOW] - value, 0.0) + max(
         value - numbers[CRITERION_NUMBERS.HIGH], 0.0
     )
-    return numbers[CRITERION_NUMBERS.LINEAR] * off + numbers[CRITERION_NUMBERS.SQUARED] * (
-        off * off
+    return numbers[CRITERION_NUMBERS.LINEAR] * violation + numbers[CRITERION_NUMBERS.SQUARED] * (
+        violation * violation
     )
 
 
-def muscle_effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
+def muscle_effort(
+    senses: Ints, sensor_numbers: Floats, criterion_type: int, power: int, row: Floats
+) -> float:
     """Return the sum of the activations to a power, or 1 plus the sum of the tensions (N).
 
     Args:
         senses: plan of the sensor row.
-        known: numbers of the sensor row.
-        kind: POWERS or TENSIONS of `CRITERION_TYPE`.
+        sensor_numbers: numbers of the sensor row.
+        criterion_type: POWERS or TENSIONS of `CRITERION_TYPE`.
         power: exponent of the activations.
         row: sensor row.
     """
-    count, total = senses[SENSES.MUSCLES], 1.0 if kind == CRITERION_TYPE.TENSIONS else 0.0
-    strengths = at(known, SENSOR_NUMBERS.HEAD + count)
+    count, total = senses[SENSES.MUSCLES], 1.0 if criterion_type == CRITERION_TYPE.TENSIONS else 0.0
+    strengths = at(sensor_numbers, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
-        each = 1.0
-        if kind == CRITERION_TYPE.TENSIONS:
-            each = row[senses[SENSES.FORCES] + k] * strengths[k]
+        contribution = 1.0
+        if criterion_type == CRITERION_TYPE.TENSIONS:
+            contribution = row[senses[SENSES.FORCES] + k] * strengths[k]
         else:
             # The exponent is an integer.
             for _ in range(power):
-                each *= row[senses[SENSES.ACTIVATIONS] + k]
-        total += each
+                contribution *= row[senses[SENSES.ACTIVATIONS] + k]
+        total += contribution
     return total
 
 
 def metabolic_power(
-    senses: Ints, known: Floats, numbers: Floats, row: Floats, excitations: Floats
+    senses: Ints, sensor_numbers: Floats, numbers: Floats, row: Floats, excitations: Floats
 ) -> float:
     """Return the metabolic power of all muscles (W).
 
@@ -377,13 +392,16 @@ def metabolic_power(
 
     Args:
         senses: plan of the sensor row.
-        known: numbers of the sensor row.
+        sensor_numbers: numbers of the sensor row.
         numbers: numbers of the criterion.
         row: sensor row.
         excitations: excitations of the muscles.
     """
     count, slow, total = senses[SENSES.MUSCLES], numbers[CRITERION_NUMBERS.SLOW], 0.0
-    optimal, strengths = at(known, SENSOR_NUMBERS.HEAD), at(known, SENSOR_NUMBERS.HEAD + count)
+    optimal, strengths = (
+        at(sensor_numbers, SENSOR_NUMBERS.HEAD),
+        at(sensor_numbers, SENSOR_NUMBERS.HEAD + count),
+    )
     for k in range(count):
         u, a = QUARTER * excitations[k], QUARTER * row[senses[SENSES.ACTIVATIONS] + k]
         n = row[senses[SENSES.LENGTHS] + k]
@@ -402,4 +420,4 @@ def metabolic_power(
             + heat
             + work
         )
-    return AT_REST * known[SENSOR_NUMBERS.MASS] + total
+    return AT_REST * sensor_numbers[SENSOR_NUMBERS.MASS] + total

@@ -208,40 +208,54 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         data: results with poses, velocities and accelerations; filled with inertias and wrenches.
     """
     for link in range(model[MODEL.LINKS]):
-        b, here = at(reals, REALS.INERTIA + INERTIA.SIZE * link), link_work(model, data, link)
-        r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
+        b, link_record = (
+            at(reals, REALS.INERTIA + INERTIA.SIZE * link),
+            link_work(model, data, link),
+        )
+        r, i, m = (
+            at(link_record, LINK_WORK.ROTATION),
+            at(link_record, LINK_WORK.INERTIA),
+            b[INERTIA.MASS],
+        )
         center = plus(
-            minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)),
+            minus(vector(link_record, LINK_WORK.POSITION), vector(link_record, LINK_WORK.ORIGIN)),
             rotate(r, vector(b, INERTIA.CENTER)),
         )
         cx, cy, cz = center
         mx, my, mz = times(m, center)
         # Rows of the rotation, since I in ground is R I Rᵀ.
-        one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
+        x_row, y_row, z_row = vector(r, 0), vector(r, 3), vector(r, 6)
         # Rows of R I, where I is the inertia in the link.
         first, second = (
-            multiply_symmetric(at(b, INERTIA.MOMENTS), one),
-            multiply_symmetric(at(b, INERTIA.MOMENTS), two),
+            multiply_symmetric(at(b, INERTIA.MOMENTS), x_row),
+            multiply_symmetric(at(b, INERTIA.MOMENTS), y_row),
         )
-        third = multiply_symmetric(at(b, INERTIA.MOMENTS), three)
+        third = multiply_symmetric(at(b, INERTIA.MOMENTS), z_row)
         i[0], i[1], i[2], i[3] = m, mx, my, mz
         # Inertia about the origin: R I Rᵀ plus the parallel axis terms.
-        i[4] = dot(first, one) + my * cy + mz * cz
-        i[5] = dot(second, two) + mx * cx + mz * cz
-        i[6] = dot(third, three) + mx * cx + my * cy
-        i[7] = dot(first, two) - mx * cy
-        i[8] = dot(first, three) - mx * cz
-        i[9] = dot(second, three) - my * cz
-        spin, velocity = vector(here, LINK_WORK.VELOCITY), vector(here, LINK_WORK.VELOCITY + 3)
+        i[4] = dot(first, x_row) + my * cy + mz * cz
+        i[5] = dot(second, y_row) + mx * cx + mz * cz
+        i[6] = dot(third, z_row) + mx * cx + my * cy
+        i[7] = dot(first, y_row) - mx * cy
+        i[8] = dot(first, z_row) - mx * cz
+        i[9] = dot(second, z_row) - my * cz
+        spin, velocity = (
+            vector(link_record, LINK_WORK.VELOCITY),
+            vector(link_record, LINK_WORK.VELOCITY + 3),
+        )
         # Newton-Euler equation: wrench = I a + v x* (I v).
         angular, linear = spatial_momentum(i, spin, velocity)
         torque, force = spatial_momentum(
-            i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3)
+            i,
+            vector(link_record, LINK_WORK.ACCELERATION),
+            vector(link_record, LINK_WORK.ACCELERATION + 3),
         )
         torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
         # The sign makes inertia a load like any other: M udot = sum of loads.
-        store_vector(here, LINK_WORK.WRENCH, times(-1.0, torque))
-        store_vector(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
+        store_vector(link_record, LINK_WORK.WRENCH, times(-1.0, torque))
+        store_vector(
+            link_record, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear)))
+        )
 
 
 def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
@@ -254,23 +268,29 @@ def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
     """
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS]):
-        j, here = link_ints(model, link), link_work(model, data, link)
+        j, link_record = link_ints(model, link), link_work(model, data, link)
         # The wrench is not needed yet: its entries hold the accelerations that parents contribute.
         turn, shift = ZERO, ZERO
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
-            turn, shift = vector(above, 0), vector(above, 3)
+            parent_change = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
+            turn, shift = vector(parent_change, 0), vector(parent_change, 3)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             turn, shift = (
                 add_scaled(turn, udot[freedom], vector(c, 0)),
                 add_scaled(shift, udot[freedom], vector(c, 3)),
             )
-        store_vector(here, LINK_WORK.WRENCH, turn)
-        store_vector(here, LINK_WORK.WRENCH + 3, shift)
-        store_vector(here, LINK_WORK.ACCELERATION, plus(vector(here, LINK_WORK.ACCELERATION), turn))
+        store_vector(link_record, LINK_WORK.WRENCH, turn)
+        store_vector(link_record, LINK_WORK.WRENCH + 3, shift)
         store_vector(
-            here, LINK_WORK.ACCELERATION + 3, plus(vector(here, LINK_WORK.ACCELERATION + 3), shift)
+            link_record,
+            LINK_WORK.ACCELERATION,
+            plus(vector(link_record, LINK_WORK.ACCELERATION), turn),
+        )
+        store_vector(
+            link_record,
+            LINK_WORK.ACCELERATION + 3,
+            plus(vector(link_record, LINK_WORK.ACCELERATION + 3), shift),
         )
 
 
@@ -347,9 +367,9 @@ def add_generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
             for k in range(6):
                 right[freedom] += c[k] * load[k]
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
+            parent_load = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
             for k in range(6):
-                above[k] += load[k]
+                parent_load[k] += load[k]
 
 
 def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
@@ -362,8 +382,8 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
     """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        j, here = link_ints(model, link), link_work(model, data, link)
-        i, load = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH)
+        j, link_record = link_ints(model, link), link_work(model, data, link)
+        i, load = at(link_record, LINK_WORK.INERTIA), at(link_record, LINK_WORK.WRENCH)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             turn, shift = vector(c, 0), vector(c, 3)
@@ -378,10 +398,10 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
                 k = freedoms[DOF.SIZE * k + DOF.ABOVE]
                 column += 1
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
+            parent_inertia = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # Inertia (10) and wrench (6) are adjacent, and both are summed.
             for k in range(16):
-                above[k] += i[k]
+                parent_inertia[k] += i[k]
 
 
 def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:

@@ -156,15 +156,15 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
     m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     rhs = at(columns, m * n)
     # Zeros first: a tiny entry that remains would make its equation look solvable.
-    most = 0.0
+    largest_entry = 0.0
     for j in range(m * n):
-        most = max(most, abs(columns[j]))
+        largest_entry = max(largest_entry, abs(columns[j]))
     for j in range(n):
         column, largest = at(columns, m * j), 0.0
         for k in range(m):
             largest = max(largest, abs(column[k]))
         for k in range(m):
-            if abs(column[k]) <= max(ROUNDING * largest, LEAST * most):
+            if abs(column[k]) <= max(ROUNDING * largest, LEAST * largest_entry):
                 column[k] = 0.0
     for k in range(m):
         square = 0.0
@@ -237,18 +237,18 @@ def minimize_powers(
         ):
             break
         # The sum must decrease; halve the step until it does.
-        before, step_length = sum_powers(n, power, unit, x, tried, 0.0), 1.0
-        after = sum_powers(n, power, unit, x, tried, step_length)
+        previous_cost, step_length = sum_powers(n, power, unit, x, tried, 0.0), 1.0
+        trial_cost = sum_powers(n, power, unit, x, tried, step_length)
         for _ in range(HALVINGS):
-            if after < before:
+            if trial_cost < previous_cost:
                 break
             step_length *= 0.5
-            after = sum_powers(n, power, unit, x, tried, step_length)
-        if not after < before:
+            trial_cost = sum_powers(n, power, unit, x, tried, step_length)
+        if not trial_cost < previous_cost:
             break
         for j in range(n):
             x[j] += step_length * (tried[j] - x[j])
-        if before - after <= LEAST_GAIN * before:
+        if previous_cost - trial_cost <= LEAST_GAIN * previous_cost:
             break
     compute_residual(sizes, columns, x, at(x, n), terms)
 

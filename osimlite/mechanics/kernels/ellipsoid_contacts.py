@@ -32,11 +32,14 @@ def touch_ellipsoid(
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
-    o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
-    center = station(model, data, two, vector(p, 7))
+    first_link, second_link, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    o, n = (
+        station(model, data, first_link, vector(p, 0)),
+        direction(model, data, first_link, vector(p, 3)),
+    )
+    center = station(model, data, second_link, vector(p, 7))
     d, radius, point = half_space_ellipsoid(
-        o, n, center, ellipsoid_axes(model, data, two, at(p, 18)), vector(p, 27), p[12]
+        o, n, center, ellipsoid_axes(model, data, second_link, at(p, 18)), vector(p, 27), p[12]
     )
     if d > 0.0:
         apply_contact_force(model, reals, data, item, d, radius, n, point)
@@ -62,15 +65,18 @@ def touch_ellipsoids(
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
-    a, b = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
-    way = minus(b, a)
+    first_link, second_link, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    a, b = (
+        station(model, data, first_link, vector(p, 0)),
+        station(model, data, second_link, vector(p, 7)),
+    )
+    centre_line = minus(b, a)
     # Bounding spheres: their radii are stored where a pair of spheres has its radii.
-    if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
+    if dot(centre_line, centre_line) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
     axes1, axes2 = (
-        ellipsoid_axes(model, data, one, at(p, 18)),
-        ellipsoid_axes(model, data, two, at(p, 30)),
+        ellipsoid_axes(model, data, first_link, at(p, 18)),
+        ellipsoid_axes(model, data, second_link, at(p, 30)),
     )
     d, radius, n, point = ellipsoid_ellipsoid(
         a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12]
@@ -92,11 +98,11 @@ def ellipsoid_axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
     Returns:
         Three unit vectors.
     """
-    one, two = (
+    x_axis, y_axis = (
         direction(model, data, link, vector(p, 0)),
         direction(model, data, link, vector(p, 3)),
     )
-    return one, two, direction(model, data, link, vector(p, 6))
+    return x_axis, y_axis, direction(model, data, link, vector(p, 6))
 
 
 def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -119,14 +125,14 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    count, pairs, links, p, room = (
+    count, pairs, links, p, work = (
         i[ITEM.OWN],
         i[ITEM.OWN + 1],
         at(i, ITEM.OWN + 2),
         at(reals, i[ITEM.NUMBERS]),
         at(data, i[ITEM.RECORD]),
     )
-    centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
+    centers, start, order = work, at(work, 3 * count), at(work, 4 * count)
     for k in range(count):
         store_vector(centers, 3 * k, station(model, data, links[k], vector(p, 4 * k)))
     axis = 0
@@ -144,20 +150,25 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     # Insertion sort by the lower end of each surface along the axis.
     for k in range(count):
         start[k] = centers[3 * k + axis] - p[4 * k + 3]
-        place = k
-        while place > 0 and start[int(order[place - 1])] > start[k]:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = k
+        rank = k
+        while rank > 0 and start[int(order[rank - 1])] > start[k]:
+            order[rank] = order[rank - 1]
+            rank -= 1
+        order[rank] = k
     for position in range(count):
-        one = int(order[position])
+        first_surface = int(order[position])
         for later in range(position + 1, count):
-            two = int(order[later])
+            second_surface = int(order[later])
             # All later surfaces begin beyond the end of this one.
-            if start[two] > centers[3 * one + axis] + p[4 * one + 3]:
+            if start[second_surface] > centers[3 * first_surface + axis] + p[4 * first_surface + 3]:
                 break
-            if are_near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
-                pair = find_pair(at(links, count), pairs, one, two)
+            if are_near(
+                at(centers, 3 * first_surface),
+                at(centers, 3 * second_surface),
+                p[4 * first_surface + 3],
+                p[4 * second_surface + 3],
+            ):
+                pair = find_pair(at(links, count), pairs, first_surface, second_surface)
                 if pair >= 0 and is_separating(
                     model,
                     reals,
@@ -170,7 +181,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     return OUTCOME.OK
 
 
-def are_near(a: Floats, b: Floats, one: float, two: float) -> bool:
+def are_near(a: Floats, b: Floats, first_radius: float, second_radius: float) -> bool:
     """Return whether the bounding spheres of two surfaces overlap.
 
     Two half spaces are never a pair.
@@ -178,33 +189,37 @@ def are_near(a: Floats, b: Floats, one: float, two: float) -> bool:
     Args:
         a: centre of the first surface (m).
         b: centre of the second surface (m).
-        one: radius of the first surface (m), infinite for a half space.
-        two: radius of the second surface (m).
+        first_radius: radius of the first surface (m), infinite for a half space.
+        second_radius: radius of the second surface (m).
     """
-    if one == inf and two == inf:
+    if first_radius == inf and second_radius == inf:
         return False
-    way = minus(vector(a, 0), vector(b, 0))
-    return dot(way, way) <= (one + two) * (one + two)
+    centre_line = minus(vector(a, 0), vector(b, 0))
+    return dot(centre_line, centre_line) <= (first_radius + second_radius) * (
+        first_radius + second_radius
+    )
 
 
-def find_pair(surfaces: Ints, pairs: int, one: int, two: int) -> int:
+def find_pair(surfaces: Ints, pairs: int, first_surface: int, second_surface: int) -> int:
     """Return the number of the pair of two surfaces, or -1.
 
     Args:
         surfaces: numbers of the surfaces of each pair.
         pairs: number of pairs.
-        one: number of the first surface.
-        two: number of the second surface.
+        first_surface: number of the first surface.
+        second_surface: number of the second surface.
     """
     for pair in range(pairs):
         a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
-        if (a == one and b == two) or (a == two and b == one):
+        if (a == first_surface and b == second_surface) or (
+            a == second_surface and b == first_surface
+        ):
             return pair
     return -1
 
 
 def is_separating(
-    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, pair_item: int
 ) -> bool:
     """Compute one contact, and tell whether it touches without a force.
 
@@ -214,13 +229,13 @@ def is_separating(
         data: results; the record of the contact and wrenches are changed.
         y: state.
         f: rates of the coordinates.
-        part: offset of the contact's item.
+        pair_item: offset of the contact's item.
 
     Returns:
         Whether the surfaces overlap, but separate too fast for a force.
     """
-    call(model[part + ITEM.LAW], model, reals, data, y, f, part)
-    result = at(data, model[part + ITEM.RECORD])
+    call(model[pair_item + ITEM.LAW], model, reals, data, y, f, pair_item)
+    result = at(data, model[pair_item + ITEM.RECORD])
     return bool(
         result[CONTACT_WORK.DEPTH] > 0.0
         and result[0] == 0.0

@@ -95,11 +95,11 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
     if not isfinite(error):
         return 0.1 * h
     if error > accuracy:
-        wanted: float = 0.9 * h * (accuracy / error) ** (1.0 / order)
-        return max(min(wanted, 0.9 * h), 0.1 * h)
-    wanted = 0.9 * h * (accuracy / error) ** (1.0 / order) if error > 0.0 else inf
+        proposed_step: float = 0.9 * h * (accuracy / error) ** (1.0 / order)
+        return max(min(proposed_step, 0.9 * h), 0.1 * h)
+    proposed_step = 0.9 * h * (accuracy / error) ** (1.0 / order) if error > 0.0 else inf
     # Keep the step unless it may grow by a fifth, as changes cost implicit methods a factorization.
-    return h if cut or wanted < 1.2 * h else min(wanted, 5.0 * h)
+    return h if cut or proposed_step < 1.2 * h else min(proposed_step, 5.0 * h)
 
 
 def step_end(h: Floats) -> float:

@@ -31,7 +31,7 @@ ORDER = 2.0
 """Order of the error."""
 
 
-def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, offset: int) -> int:
     """Try one step from y0, which is followed by its derivative, to y1.
 
     Args:
@@ -40,21 +40,24 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
-        place: offset of the method's record in data.
+        offset: offset of the method's record in data.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
-    h = at(data, place)
+    h = at(data, offset)
     size = model[MODEL.STATE_SIZE]
-    errors, whole = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
+    errors, full_step_end = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
     # Constraints hold to a tenth of the accuracy, as in Simbody.
     t0, t1, tolerance = h[METHOD_WORK.REACHED], step_end(h), h[METHOD_WORK.ACCEPTED] / 10.0
     h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 1.0, 0.0
     error = inf
-    if take_half_steps(model, reals, data, t0, t1, y0, y1, whole, at(whole, size)) == OUTCOME.OK:
+    if (
+        take_half_steps(model, reals, data, t0, t1, y0, y1, full_step_end, at(full_step_end, size))
+        == OUTCOME.OK
+    ):
         for k in range(size):
-            errors[k] = y1[k] - whole[k]
+            errors[k] = y1[k] - full_step_end[k]
         # As in Simbody, project whatever the error is, and keep the error unchanged.
         if model[MODEL.CONSTRAINED] == 0 or project_by_law(
             model, reals, data, t1, y1, errors, 0, tolerance, max(2.0 * tolerance, sqrt(tolerance))
@@ -72,7 +75,7 @@ def take_half_steps(
     t1: float,
     y0: Floats,
     y1: Floats,
-    whole: Floats,
+    full_step_end: Floats,
     middle: Floats,
 ) -> int:
     """Compute the end of one full step and of two half steps.
@@ -85,7 +88,7 @@ def take_half_steps(
         t1: time at the end (s).
         y0: state at the start, then its derivative.
         y1: filled with the end of the two half steps.
-        whole: filled with the end of the full step.
+        full_step_end: filled with the end of the full step.
         middle: workspace of two states.
 
     Returns:
@@ -95,7 +98,7 @@ def take_half_steps(
     f, half = at(middle, size), 0.5 * (t1 - t0)
     f0 = at(y0, size)
     # Both first evaluations share the derivative at the start, so that a step costs one evaluation.
-    status = advance_state(model, reals, data, t1, t1 - t0, y0, f0, whole, f)
+    status = advance_state(model, reals, data, t1, t1 - t0, y0, f0, full_step_end, f)
     if status == OUTCOME.OK:
         status = advance_state(model, reals, data, t0 + half, half, y0, f0, middle, f)
     if status == OUTCOME.OK:

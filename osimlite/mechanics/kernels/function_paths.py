@@ -157,9 +157,9 @@ def function_of_one(
         at(reals, model[item + ITEM.NUMBERS]),
         at(data, model[item + ITEM.RECORD]),
     )
-    place = i[FUNCTION.ARGUMENTS]
+    freedom = i[FUNCTION.ARGUMENTS]
     result[0], result[FUNCTION_WORK.DERIVATIVES], _ = evaluate_function(
-        at(p, 1), y[place] if place >= 0 else p[0]
+        at(p, 1), y[freedom] if freedom >= 0 else p[0]
     )
     return OUTCOME.OK
 
@@ -191,9 +191,9 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     powers = at(result, FUNCTION_WORK.DERIVATIVES + size)
     exponents, factors = at(powers, size * width), at(powers, size * width + size)
     for k in range(size):
-        place = i[FUNCTION.ARGUMENTS + k]
+        freedom = i[FUNCTION.ARGUMENTS + k]
         # Powers once per argument, since many terms share them.
-        argument = y[place] if place >= 0 else p[k]
+        argument = y[freedom] if freedom >= 0 else p[k]
         powers[k * width] = 1.0
         for power in range(1, width):
             powers[k * width + power] = powers[k * width + power - 1] * argument
@@ -205,16 +205,16 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
             factors[k] = product
             product *= powers[k * width + int(exponents[k])]
         value += product
-        after = 1.0
+        later_product = 1.0
         # Derivatives by the product before the argument, that of its power, and the product after
         # it: no division.
         for k in range(size - 1, -1, -1):
             power = int(exponents[k])
             if power > 0:
                 result[FUNCTION_WORK.DERIVATIVES + k] += (
-                    factors[k] * (power * powers[k * width + power - 1]) * after
+                    factors[k] * (power * powers[k * width + power - 1]) * later_product
                 )
-            after *= powers[k * width + power]
+            later_product *= powers[k * width + power]
         # Count exponents up like digits, as long as their sum does not exceed the order.
         k = size - 1
         while k > 0 and total == i[FUNCTION.ORDER]:
@@ -259,8 +259,8 @@ def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item
     )
     for number in range(i[FUNCTION.ORDER]):
         for k in range(size):
-            place = i[FUNCTION.ARGUMENTS + k]
-            registers[k] = y[place] if place >= 0 else p[k]
+            freedom = i[FUNCTION.ARGUMENTS + k]
+            registers[k] = y[freedom] if freedom >= 0 else p[k]
         result[number] = run_program(at(program, 2), program[0], at(p, program[1]), registers, size)
         program = at(program, 2 + 3 * program[0])
     return OUTCOME.OK

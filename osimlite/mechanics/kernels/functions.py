@@ -54,14 +54,14 @@ def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
     Returns:
         Value, first and second derivative.
     """
-    kind, factor = int(table[0]), table[1]
+    function_type, factor = int(table[0]), table[1]
     value = slope = curvature = 0.0
-    if kind == FUNCTION_TYPE.SINE:
+    if function_type == FUNCTION_TYPE.SINE:
         angle = table[3] * z + table[4]
         value = table[2] * sin(angle) + table[5]
         slope = table[2] * table[3] * cos(angle)
         curvature = -table[2] * table[3] * table[3] * sin(angle)
-    elif kind == FUNCTION_TYPE.STEP:
+    elif function_type == FUNCTION_TYPE.STEP:
         # Quintic step: S(t) = 10 t^3 - 15 t^4 + 6 t^5 between both ends, constant outside.
         rate = 1.0 / (table[3] - table[2])
         t, rise = (z - table[2]) * rate, table[5] - table[4]
@@ -71,17 +71,17 @@ def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
         t = min(max(t, 0.0), 1.0)
         value = table[4] + rise * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
     else:
-        value, slope, curvature = evaluate_piecewise(table, z, kind)
+        value, slope, curvature = evaluate_piecewise(table, z, function_type)
     return factor * value, factor * slope, factor * curvature
 
 
-def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
+def evaluate_piecewise(table: Floats, z: float, function_type: int) -> tuple[float, float, float]:
     """Evaluate a function that consists of polynomials between knots.
 
     Args:
         table: table of the function.
         z: argument.
-        kind: PIECES or PIECES_OF_OPENSIM of `FUNCTION_TYPE`.
+        function_type: PIECES or PIECES_OF_OPENSIM of `FUNCTION_TYPE`.
 
     Returns:
         Value, first and second derivative.
@@ -103,7 +103,11 @@ def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float
         slope = slope * t + value
         value = value * t + piece[k]
     # OpenSim 4.6 returns the first derivative as the second one for some piecewise functions.
-    return value, slope, slope if kind == FUNCTION_TYPE.PIECES_OF_OPENSIM else 2.0 * curvature
+    return (
+        value,
+        slope,
+        slope if function_type == FUNCTION_TYPE.PIECES_OF_OPENSIM else 2.0 * curvature,
+    )
 
 
 def amount_by_one(
@@ -198,30 +202,36 @@ def evaluate_monomials(
         # Each derivative is a product of powers of its own: dividing the value by an argument would
         # fail at 0.
         value += coefficient * multiply_powers(size, arguments, constants, y, powers, -1, -1)
-        for one in range(size):
-            if powers[one] == 0.0:
+        for first_argument in range(size):
+            if powers[first_argument] == 0.0:
                 continue
             first = (
                 coefficient
-                * powers[one]
-                * multiply_powers(size, arguments, constants, y, powers, one, -1)
+                * powers[first_argument]
+                * multiply_powers(size, arguments, constants, y, powers, first_argument, -1)
             )
-            gradient[one] += first
+            gradient[first_argument] += first
             # Constant arguments have a gradient, which workspace expects, but no rate.
-            if arguments[one] < 0:
+            if arguments[first_argument] < 0:
                 continue
-            rate += first * rates[arguments[one]]
-            for two in range(size):
-                power = powers[two] - (1.0 if one == two else 0.0)
-                if power == 0.0 or arguments[two] < 0:
+            rate += first * rates[arguments[first_argument]]
+            for second_argument in range(size):
+                power = powers[second_argument] - (
+                    1.0 if first_argument == second_argument else 0.0
+                )
+                if power == 0.0 or arguments[second_argument] < 0:
                     continue
                 second = (
                     coefficient
-                    * powers[one]
+                    * powers[first_argument]
                     * power
-                    * multiply_powers(size, arguments, constants, y, powers, one, two)
+                    * multiply_powers(
+                        size, arguments, constants, y, powers, first_argument, second_argument
+                    )
                 )
-                curvature += second * rates[arguments[one]] * rates[arguments[two]]
+                curvature += (
+                    second * rates[arguments[first_argument]] * rates[arguments[second_argument]]
+                )
     # OpenSim's error: the gradient stands in place of each row of the second derivatives.
     if int(table[0]) == FUNCTION_TYPE.MONOMIALS_OF_OPENSIM:
         total = 0.0
@@ -232,7 +242,13 @@ def evaluate_monomials(
 
 
 def multiply_powers(
-    size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int
+    size: int,
+    arguments: Ints,
+    constants: Floats,
+    y: Floats,
+    powers: Floats,
+    first_argument: int,
+    second_argument: int,
 ) -> float:
     """Return the product of powers of all arguments.
 
@@ -242,13 +258,17 @@ def multiply_powers(
         constants: values of constant arguments (size,).
         y: values of the degrees of freedom.
         powers: powers (size,).
-        one: argument whose power is reduced by 1, -1 for none.
-        two: argument whose power is reduced by 1 (once more), -1 for none.
+        first_argument: argument whose power is reduced by 1, -1 for none.
+        second_argument: argument whose power is reduced by 1 (once more), -1 for none.
     """
     total = 1.0
     for index in range(size):
         # Powers are integers, so that negative arguments have defined results.
-        power = int(powers[index]) - (1 if index == one else 0) - (1 if index == two else 0)
+        power = (
+            int(powers[index])
+            - (1 if index == first_argument else 0)
+            - (1 if index == second_argument else 0)
+        )
         total *= (y[arguments[index]] if arguments[index] >= 0 else constants[index]) ** power
     return total
 
@@ -273,31 +293,31 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     i = at(model, item)
     count, numbers, values = i[ITEM.OWN], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
     ends, tables = at(i, ITEM.OWN + 1), at(i, ITEM.OWN + 1 + count)
-    place = 0
+    function_number = 0
     for control in range(count):
         total = 0.0
-        while place < ends[control]:
-            value, _, _ = evaluate_function(at(numbers, tables[place]), data[WORK.TIME])
+        while function_number < ends[control]:
+            value, _, _ = evaluate_function(at(numbers, tables[function_number]), data[WORK.TIME])
             total += value
-            place += 1
+            function_number += 1
         values[control] = total
     return OUTCOME.OK
 
 
-def add_reflex(data: Floats, place: int, gain: float, rate: float) -> float:
+def add_reflex(data: Floats, offset: int, gain: float, rate: float) -> float:
     """Add a stretch reflex to a control.
 
     The reflex is gain max(v, 0): a muscle that shortens causes none.
 
     Args:
         data: results with the controls.
-        place: offset of the control in data.
+        offset: offset of the control in data.
         gain: gain (s/m).
         rate: lengthening speed v of the muscle (m/s).
 
     Returns:
         The control.
     """
-    total: float = data[place] + gain * max(rate, 0.0)
-    data[place] = total
+    total: float = data[offset] + gain * max(rate, 0.0)
+    data[offset] = total
     return total

@@ -50,15 +50,15 @@ def trace_geodesics(
         at(result, PATH_WORK.ORDER + points + 2 * i[PATH.WRAPS]),
     )
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
-    geodesic, room = (
+    geodesic, work_vector = (
         at(result, slots[GEODESIC_PATH.CHAIN] + OBSTACLE_WORK.CURVE),
         at(result, slots[GEODESIC_PATH.SEARCH]),
     )
     count = 0
     for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
-        here = at(work, NODE_WORK.SIZE * number)
-        store_vector(f, 3 * count, vector(here, NODE_WORK.PLACE))
+        node_record = at(work, NODE_WORK.SIZE * number)
+        store_vector(f, 3 * count, vector(node_record, NODE_WORK.PLACE))
         count += 1
         wrap = (number - points) // 2
         # Of the two nodes of a wrap, the first is that where the geodesic begins.
@@ -70,14 +70,21 @@ def trace_geodesics(
                 ),
                 at(result, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * wrap),
             )
-            point = point_in_surface(pose, vector(here, NODE_WORK.PLACE))
+            point = point_in_surface(pose, vector(node_record, NODE_WORK.PLACE))
             # The geodesic starts in the direction of the line before it.
-            way = rotate_back(
+            start_direction = rotate_back(
                 pose, vector(work, NODE_WORK.SIZE * int(order[k - 1]) + NODE_WORK.ALONG)
             )
-            length = here[NODE_WORK.SIZE + NODE_WORK.SURFACE]
+            length = node_record[NODE_WORK.SIZE + NODE_WORK.SURFACE]
             count += trace_geodesic(
-                surface, pose, point, way, length, geodesic, room, at(f, 3 * count)
+                surface,
+                pose,
+                point,
+                start_direction,
+                length,
+                geodesic,
+                work_vector,
+                at(f, 3 * count),
             )
     return count
 
@@ -104,27 +111,38 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     count = 0
     for k in range(i[CABLE.COUNT]):
         element = at(i, CABLE.ELEMENTS + ELEMENT.SIZE * k)
-        part = at(result, element[ELEMENT.KEPT])
+        element_record = at(result, element[ELEMENT.KEPT])
         if element[ELEMENT.IS_OBSTACLE] == 0:
-            store_vector(f, 3 * count, vector(part, 0))
+            store_vector(f, 3 * count, vector(element_record, 0))
             count += 1
-        elif part[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            geodesic = at(part, OBSTACLE_WORK.CURVE)
-            point, way = (
+        elif element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
+            geodesic = at(element_record, OBSTACLE_WORK.CURVE)
+            point, start_direction = (
                 vector(geodesic, GEODESIC.START + END_NUMBERS.POINT),
                 vector(geodesic, GEODESIC.START + END_NUMBERS.ALONG),
             )
             surface, pose, work = (
                 at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE),
-                at(part, OBSTACLE_WORK.IN_GROUND),
+                at(element_record, OBSTACLE_WORK.IN_GROUND),
                 at(result, i[CABLE.SOLVER]),
             )
-            store_vector(f, 3 * count, vector(part, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT))
+            store_vector(
+                f, 3 * count, vector(element_record, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT)
+            )
             count += 1
             count += trace_geodesic(
-                surface, pose, point, way, geodesic[GEODESIC.ARC], geodesic, work, at(f, 3 * count)
+                surface,
+                pose,
+                point,
+                start_direction,
+                geodesic[GEODESIC.ARC],
+                geodesic,
+                work,
+                at(f, 3 * count),
             )
-            store_vector(f, 3 * count, vector(part, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT))
+            store_vector(
+                f, 3 * count, vector(element_record, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
+            )
             count += 1
     return count
 
@@ -133,7 +151,7 @@ def trace_geodesic(
     surface: Floats,
     pose: Floats,
     point: Vector,
-    way: Vector,
+    start_direction: Vector,
     length: float,
     geodesic: Floats,
     work: Floats,
@@ -145,7 +163,7 @@ def trace_geodesic(
         surface: numbers of the surface.
         pose: pose of the surface in ground.
         point: start in the frame of the surface (m).
-        way: direction at the start.
+        start_direction: direction at the start.
         length: length of the geodesic (m).
         geodesic: workspace of a geodesic.
         work: workspace of an integration.
@@ -157,7 +175,10 @@ def trace_geodesic(
     # Without a first step the geodesic is integrated by extrapolation, which is exact at any
     # length.
     geodesic[GEODESIC.STEP] = 0.0
-    if not (dot(way, way) > 0.0 and shoot_geodesic(surface, point, way, length, geodesic, work)):
+    if not (
+        dot(start_direction, start_direction) > 0.0
+        and shoot_geodesic(surface, point, start_direction, length, geodesic, work)
+    ):
         return 0
     bends = max(
         abs(geodesic[GEODESIC.START + END_NUMBERS.ALONG_BENDS]),
@@ -165,7 +186,7 @@ def trace_geodesic(
     )
     count = count_segments(bends * length)
     for k in range(1, count):
-        shoot_geodesic(surface, point, way, length * k / count, geodesic, work)
+        shoot_geodesic(surface, point, start_direction, length * k / count, geodesic, work)
         store_vector(
             f,
             3 * (k - 1),

@@ -131,20 +131,20 @@ TURNS = 16
 """Largest number of changes of the list of surfaces in a search."""
 
 
-def layout_slots(most: int, wraps: int, work: int) -> tuple[list[int], int]:
+def layout_slots(slot_count: int, wraps: int, work: int) -> tuple[list[int], int]:
     """Return the integers after the wraps, and the length of the record.
 
     Args:
-        most: largest number of surfaces that bend one segment.
+        slot_count: largest number of surfaces that bend one segment.
         wraps: number of wraps.
         work: length of the record without slots.
 
     Returns:
         The integers CHAIN, BEST, SEARCH and POSES of `GEODESIC_PATH`, and the length of the record.
     """
-    best = work + SLOT.SIZE * (most + 2)
-    search = best + SLOT.SIZE * (most + 2)
-    poses = search + search_size(most)
+    best = work + SLOT.SIZE * (slot_count + 2)
+    search = best + SLOT.SIZE * (slot_count + 2)
+    poses = search + search_size(slot_count)
     return [work, best, search, poses], poses + SURFACE_POSE.SIZE * wraps
 
 
@@ -178,25 +178,32 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     for k in range(int(result[PATH_WORK.COUNT]) - 2, -1, -1):
         count = bend_segment(i, p, result, int(order[k]), int(order[k + 1]))
         if count > 0:
-            for other in range(int(result[PATH_WORK.COUNT]) - 1, k, -1):
-                order[other + 2 * count] = order[other]
+            for position in range(int(result[PATH_WORK.COUNT]) - 1, k, -1):
+                order[position + 2 * count] = order[position]
             result[PATH_WORK.COUNT] += 2.0 * count
         for number in range(count):
             slot = at(result, slots[GEODESIC_PATH.BEST] + SLOT.SIZE * (number + 1))
             node = points + 2 * int(slot[SLOT.OWNER])
-            one, two = at(work, NODE_WORK.SIZE * node), at(work, NODE_WORK.SIZE * (node + 1))
-            store_vector(
-                one, NODE_WORK.PLACE, vector(slot, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT)
+            first_node, second_node = (
+                at(work, NODE_WORK.SIZE * node),
+                at(work, NODE_WORK.SIZE * (node + 1)),
             )
             store_vector(
-                two, NODE_WORK.PLACE, vector(slot, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT)
+                first_node,
+                NODE_WORK.PLACE,
+                vector(slot, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT),
+            )
+            store_vector(
+                second_node,
+                NODE_WORK.PLACE,
+                vector(slot, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT),
             )
             # The second tangent point carries the length on the surface before it.
-            one[NODE_WORK.SURFACE], two[NODE_WORK.SURFACE] = (
+            first_node[NODE_WORK.SURFACE], second_node[NODE_WORK.SURFACE] = (
                 0.0,
                 slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC],
             )
-            one[NODE_WORK.IS_KEPT] = two[NODE_WORK.IS_KEPT] = 0.0
+            first_node[NODE_WORK.IS_KEPT] = second_node[NODE_WORK.IS_KEPT] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
     measure_points(model, data, y, item)
     return OUTCOME.OK
@@ -239,20 +246,20 @@ def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
         pose[SURFACE_POSE.HOW] = BENDING.NOT
 
 
-def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
+def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_node: int) -> int:
     """Bend the segment between two points around its surfaces, in the shortest of all combinations.
 
     Args:
         i: integers of the path.
         p: numbers of the path.
         record: record of the path.
-        one: first point.
-        two: second point.
+        first_node: first point.
+        second_node: second point.
 
     Returns:
         The number of surfaces, which are in the slots of the shortest path.
     """
-    size, near = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0
+    size, near_count = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0
     wraps, work = at(i, PATH.NODES_AT + NODE.SIZE * size), at(record, PATH_WORK.ORDER + size)
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
     chain, best, poses = (
@@ -262,27 +269,29 @@ def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
     )
     for number in range(i[PATH.WRAPS]):
         if (
-            wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.FIRST] == one
+            wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.FIRST] == first_node
             and poses[SURFACE_POSE.SIZE * number + SURFACE_POSE.HOW] != BENDING.NOT
         ):
-            near += 1
-    store_vector(chain, 0, vector(work, NODE_WORK.SIZE * one + NODE_WORK.PLACE))
-    # `way` counts combinations of directions past open surfaces, as digits of a mixed radix.
-    most, least, way, stage = 0, inf, 0, SEARCH_STAGE.MEANT
-    while way < WAYS and near > 0:
-        store_vector(chain, SLOT.SIZE, vector(work, NODE_WORK.SIZE * two + NODE_WORK.PLACE))
-        count, step = fill_slots(i, p, record, one, two, near, way, stage, least)
+            near_count += 1
+    store_vector(chain, 0, vector(work, NODE_WORK.SIZE * first_node + NODE_WORK.PLACE))
+    # `combination` counts combinations of directions past open surfaces, as digits of a mixed radix.
+    best_count, least, combination, stage = 0, inf, 0, SEARCH_STAGE.MEANT
+    while combination < WAYS and near_count > 0:
+        store_vector(chain, SLOT.SIZE, vector(work, NODE_WORK.SIZE * second_node + NODE_WORK.PLACE))
+        count, step = fill_slots(
+            i, p, record, first_node, second_node, near_count, combination, stage, least
+        )
         length = chain_length(chain, count) if count >= 0 else inf
         if length < least:
-            most, least = count, length
+            best_count, least = count, length
             for k in range(SLOT.SIZE * (count + 1)):
                 best[k] = chain[k]
-        way += step
+        combination += step
         # On an ellipsoid there may be no geodesic near the start, but a shortest one exists; where
         # surfaces intersect, no smooth path may exist, and one surface alone must do.
-        if way == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
-            way, stage = 0, stage + 1
-    return most
+        if combination == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
+            combination, stage = 0, stage + 1
+    return best_count
 
 
 def chain_length(chain: Floats, count: int) -> float:
@@ -303,10 +312,10 @@ def fill_slots(
     i: Ints,
     p: Floats,
     record: Floats,
-    one: int,
-    two: int,
-    near: int,
-    way: int,
+    first_node: int,
+    second_node: int,
+    near_count: int,
+    combination: int,
     stage: int,
     least: float,
 ) -> tuple[int, int]:
@@ -316,10 +325,10 @@ def fill_slots(
         i: integers of the path.
         p: numbers of the path.
         record: record of the path.
-        one: first point.
-        two: second point.
-        near: number of surfaces that may bend the segment.
-        way: number of the combination of directions.
+        first_node: first point.
+        second_node: second point.
+        near_count: number of surfaces that may bend the segment.
+        combination: number of the combination of directions.
         stage: MEANT, STRING or ALONE of `SEARCH_STAGE`.
         least: length of the shortest path so far (m).
 
@@ -330,7 +339,7 @@ def fill_slots(
     size, count, step = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0, WAYS
     work, wraps = at(record, PATH_WORK.ORDER + size), at(i, PATH.NODES_AT + NODE.SIZE * size)
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
-    chain, room, poses = (
+    chain, search_work, poses = (
         at(record, slots[GEODESIC_PATH.CHAIN]),
         at(record, slots[GEODESIC_PATH.SEARCH]),
         at(record, slots[GEODESIC_PATH.POSES]),
@@ -341,19 +350,21 @@ def fill_slots(
     # smoothed.
     waits = False
     for _ in range(TURNS):
-        before = count
+        previous_count = count
         # A geodesic that has shrunk to nothing does not touch.
         for k in range(count, 0, -1):
             if not chain[SLOT.SIZE * k + OBSTACLE_WORK.CURVE + GEODESIC.ARC] > 0.0:
                 remove_slot(chain, count, k)
                 count -= 1
         # A surface that was removed may be inserted again once the rest is smooth.
-        if count == before:
-            number, place, axis = find_largest_turn(i, p, wraps, poses, one, chain, count, room)
-            if (place == 0 and not waits) or (count > 0 and stage == SEARCH_STAGE.ALONE):
+        if count == previous_count:
+            number, slot_index, axis = find_largest_turn(
+                i, p, wraps, poses, first_node, chain, count, search_work
+            )
+            if (slot_index == 0 and not waits) or (count > 0 and stage == SEARCH_STAGE.ALONE):
                 return count, step
             waits = False
-            if place > 0:
+            if slot_index > 0:
                 numbers, pose = (
                     at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.PLACES]),
                     at(poses, SURFACE_POSE.SIZE * number),
@@ -366,11 +377,16 @@ def fill_slots(
                 if is_open and norm(vector(pose, SURFACE_POSE.ABOUT)) == 0.0:
                     # The direction past an open surface is chosen when it is first touched, and
                     # kept from then on.
-                    a, b = node_in_surface(pose, work, one), node_in_surface(pose, work, two)
-                    ways = min(count_ways(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near == 1), step)
+                    a, b = (
+                        node_in_surface(pose, work, first_node),
+                        node_in_surface(pose, work, second_node),
+                    )
+                    ways = min(
+                        count_ways(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near_count == 1), step
+                    )
                     if ways > 1:
                         step //= ways
-                        which = way // step % ways
+                        which = combination // step % ways
                         # Directions 2 and 3 are perpendicular to 0 and 1; odd ones are opposite to
                         # even ones.
                         if which > 1:
@@ -381,9 +397,9 @@ def fill_slots(
                         # In other directions than the first, wait for further surfaces: alone, the
                         # segment might slide back.
                         waits = which > 0 and stage < SEARCH_STAGE.ALONE
-                insert_slot(numbers, pose, chain, count, place, number)
-                if not lay_chain(numbers, pose, chain, count + 1, place, stage, room):
-                    remove_slot(chain, count + 1, place)
+                insert_slot(numbers, pose, chain, count, slot_index, number)
+                if not lay_chain(numbers, pose, chain, count + 1, slot_index, stage, search_work):
+                    remove_slot(chain, count + 1, slot_index)
                     continue
                 count += 1
                 if waits:
@@ -391,12 +407,16 @@ def fill_slots(
         elif count == 0:
             break
         # A chain that is clearly longer than the best one need not be smoothed.
-        if NEARLY * chain_length(chain, count) > least or not smooth_chain(chain, count, room):
+        if NEARLY * chain_length(chain, count) > least or not smooth_chain(
+            chain, count, search_work
+        ):
             break
     return -1, step
 
 
-def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: int) -> None:
+def mark_near_wraps(
+    i: Ints, p: Floats, record: Floats, slots: Ints, first_node: int, second_node: int
+) -> None:
     """Mark the wraps that may bend the segment between two points outside of them, and how.
 
     Args:
@@ -404,8 +424,8 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
         p: numbers of the path.
         record: record of the path with the poses of the surfaces; HOW is filled.
         slots: integers after the wraps.
-        one: first point.
-        two: second point.
+        first_node: first point.
+        second_node: second point.
     """
     size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
     wraps, work = at(i, PATH.NODES_AT + NODE.SIZE * size), at(record, PATH_WORK.ORDER + size)
@@ -414,19 +434,19 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
             at(wraps, GEODESIC_WRAP.SIZE * number),
             at(record, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * number),
         )
-        if wrap_ints[GEODESIC_WRAP.FIRST] == one:
+        if wrap_ints[GEODESIC_WRAP.FIRST] == first_node:
             numbers = at(p, wrap_ints[GEODESIC_WRAP.PLACES])
             surface = at(numbers, WRAP_NUMBERS.SURFACE)
             # An end inside the surface makes OpenSim ignore it.
-            inside, a, b = (
+            largest_value, a, b = (
                 INSIDE * surface[SURFACE.SQUARE],
-                node_in_surface(pose, work, one),
-                node_in_surface(pose, work, two),
+                node_in_surface(pose, work, first_node),
+                node_in_surface(pose, work, second_node),
             )
             is_near = (
-                two <= wrap_ints[GEODESIC_WRAP.LAST]
-                and surface_value(surface, a) <= inside
-                and surface_value(surface, b) <= inside
+                second_node <= wrap_ints[GEODESIC_WRAP.LAST]
+                and surface_value(surface, a) <= largest_value
+                and surface_value(surface, b) <= largest_value
             )
             pose[SURFACE_POSE.HOW] = BENDING.AS_MEANT if is_near else BENDING.NOT
             # Of several segments around one cylinder or torus, only the deepest must obey its side.
@@ -439,20 +459,20 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
             ):
                 deepest = squared_depth(surface, a, b)
                 for k in range(1, int(record[PATH_WORK.COUNT])):
-                    before, after = (
+                    previous_node, next_node = (
                         int(record[PATH_WORK.ORDER + k - 1]),
                         int(record[PATH_WORK.ORDER + k]),
                     )
-                    others = (
-                        wrap_ints[GEODESIC_WRAP.RANGE] <= before != one
-                        and after <= wrap_ints[GEODESIC_WRAP.LAST]
+                    is_other_segment = (
+                        wrap_ints[GEODESIC_WRAP.RANGE] <= previous_node != first_node
+                        and next_node <= wrap_ints[GEODESIC_WRAP.LAST]
                     )
                     if (
-                        others
+                        is_other_segment
                         and squared_depth(
                             surface,
-                            node_in_surface(pose, work, before),
-                            node_in_surface(pose, work, after),
+                            node_in_surface(pose, work, previous_node),
+                            node_in_surface(pose, work, next_node),
                         )
                         < deepest
                     ):
@@ -484,15 +504,15 @@ def find_slot(chain: Floats, count: int, number: int) -> int:
     return 0
 
 
-def remove_slot(chain: Floats, count: int, place: int) -> None:
+def remove_slot(chain: Floats, count: int, slot_index: int) -> None:
     """Remove a slot from the chain, and move those after it.
 
     Args:
         chain: slots; changed.
         count: number of slots in use.
-        place: slot to remove.
+        slot_index: slot to remove.
     """
-    for k in range(SLOT.SIZE * place, SLOT.SIZE * (count + 1)):
+    for k in range(SLOT.SIZE * slot_index, SLOT.SIZE * (count + 1)):
         chain[k] = chain[k + SLOT.SIZE]
 
 
@@ -501,7 +521,7 @@ def find_largest_turn(
     p: Floats,
     wraps: Ints,
     poses: Floats,
-    one: int,
+    first_node: int,
     chain: Floats,
     count: int,
     work: Floats,
@@ -515,7 +535,7 @@ def find_largest_turn(
         p: numbers of the path.
         wraps: integers of the wraps.
         poses: poses of the surfaces.
-        one: first point of the segment.
+        first_node: first point of the segment.
         chain: slots.
         count: number of slots in use.
         work: workspace of a search.
@@ -523,14 +543,14 @@ def find_largest_turn(
     Returns:
         The wrap, the slot after the line (0 if no wrap turns a line), and the axis of the turn.
     """
-    result, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
+    result, slot_index, largest_turn_angle, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
     for number in range(i[PATH.WRAPS]):
         wrap_ints, pose = (
             at(wraps, GEODESIC_WRAP.SIZE * number),
             at(poses, SURFACE_POSE.SIZE * number),
         )
         if (
-            wrap_ints[GEODESIC_WRAP.FIRST] == one
+            wrap_ints[GEODESIC_WRAP.FIRST] == first_node
             and pose[SURFACE_POSE.HOW] != BENDING.NOT
             and find_slot(chain, count, number) == 0
         ):
@@ -538,35 +558,43 @@ def find_largest_turn(
                 at(p, wrap_ints[GEODESIC_WRAP.PLACES]),
                 vector(pose, SURFACE_POSE.ABOUT),
             )
-            surface, before = (
+            surface, priority = (
                 at(numbers, WRAP_NUMBERS.SURFACE),
                 WHOLE if numbers[WRAP_NUMBERS.SIDE] != 0.0 else 0.0,
             )
-            inside = INSIDE * surface[SURFACE.SQUARE]
+            largest_value = INSIDE * surface[SURFACE.SQUARE]
             for k in range(count + 1):
                 a, b = (
                     point_in_surface(pose, line_start(chain, k + 1)),
                     point_in_surface(pose, line_end(chain, k, count)),
                 )
-                if surface_value(surface, a) <= inside and surface_value(surface, b) <= inside:
-                    turn, point, way, _ = start_on_surface(
+                if (
+                    surface_value(surface, a) <= largest_value
+                    and surface_value(surface, b) <= largest_value
+                ):
+                    turn, point, start_direction, _ = start_on_surface(
                         numbers, a, b, pose[SURFACE_POSE.HOW], (0.0, 0.0, 0.0), work
                     )
                     # The shorter way decides which line meets the surface, even if there is no
                     # other way.
                     if turn > TOUCH and norm(about) > 0.0:
-                        other, there, onwards, _ = start_on_surface(
+                        turn_about, point_about, direction_about, _ = start_on_surface(
                             numbers, a, b, pose[SURFACE_POSE.HOW], about, work
                         )
-                        if other > TOUCH:
-                            turn, point, way = other, there, onwards
-                    if turn > TOUCH and turn + before > most:
-                        result, place, most, axis = number, k + 1, turn + before, cross(point, way)
-    return result, place, axis
+                        if turn_about > TOUCH:
+                            turn, point, start_direction = turn_about, point_about, direction_about
+                    if turn > TOUCH and turn + priority > largest_turn_angle:
+                        result, slot_index, largest_turn_angle, axis = (
+                            number,
+                            k + 1,
+                            turn + priority,
+                            cross(point, start_direction),
+                        )
+    return result, slot_index, axis
 
 
 def insert_slot(
-    p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int
+    p: Floats, pose: Floats, chain: Floats, count: int, slot_index: int, number: int
 ) -> None:
     """Insert a surface into a slot of the chain.
 
@@ -575,12 +603,12 @@ def insert_slot(
         pose: pose of the surface in ground.
         chain: slots; changed.
         count: number of slots in use.
-        place: slot of the surface; those from there on move by one.
+        slot_index: slot of the surface; those from there on move by one.
         number: number of the wrap.
     """
-    for k in range(SLOT.SIZE * (count + 3) - 1, SLOT.SIZE * (place + 1) - 1, -1):
+    for k in range(SLOT.SIZE * (count + 3) - 1, SLOT.SIZE * (slot_index + 1) - 1, -1):
         chain[k] = chain[k - SLOT.SIZE]
-    slot = at(chain, SLOT.SIZE * place)
+    slot = at(chain, SLOT.SIZE * slot_index)
     # GEODESIC.STEP 0 selects the exact integration of geodesics.
     slot[SLOT.OWNER], slot[OBSTACLE_WORK.CURVE + GEODESIC.STEP] = number, 0.0
     for k in range(SURFACE_POSE.HOW):
@@ -611,7 +639,7 @@ def lay_chain(
         point_in_surface(pose, line_end(chain, k, count)),
     )
     about, slot = vector(pose, SURFACE_POSE.ABOUT), at(chain, SLOT.SIZE * k)
-    turn, point, way, arc = start_on_surface(
+    turn, point, start_direction, arc = start_on_surface(
         p,
         first,
         second,
@@ -622,12 +650,17 @@ def lay_chain(
     if not (
         turn > TOUCH
         and shoot_geodesic(
-            at(slot, OBSTACLE_WORK.SIZE), point, way, arc, at(slot, OBSTACLE_WORK.CURVE), work
+            at(slot, OBSTACLE_WORK.SIZE),
+            point,
+            start_direction,
+            arc,
+            at(slot, OBSTACLE_WORK.CURVE),
+            work,
         )
     ):
         return False
     # The axis follows the geodesic, so that later calls keep to this side of the surface.
     if norm(about) > 0.0:
-        store_vector(pose, SURFACE_POSE.ABOUT, cross(point, way))
+        store_vector(pose, SURFACE_POSE.ABOUT, cross(point, start_direction))
     ends_to_ground(slot)
     return True

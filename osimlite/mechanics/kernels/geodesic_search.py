@@ -130,12 +130,12 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
     values = at(work, GEODESIC_ROOM)
     corrections = at(values, 2 * size)
     a = at(corrections, size)
-    before, stiff = inf, 0.0
+    previous_kink, stiff = inf, 0.0
     for _ in range(ROUNDS):
         rough = fill_equations(chain, count, values, a, stiff)
-        if rough <= SMOOTH or before <= rough < STALLED:
+        if rough <= SMOOTH or previous_kink <= rough < STALLED:
             return True
-        before = rough
+        previous_kink = rough
         rank = factorise_equations(size, size, a, 0.0)
         # A negative determinant marks a saddle of the length: stiffen the springs and try again
         # from here.
@@ -183,14 +183,14 @@ def accepted_part(slot: Floats, corrections: Floats) -> float:
         abs(corrections[2]),
         bends * max(abs(corrections[0]), abs(corrections[1]), abs(corrections[3])),
     )
-    part = MOST_TURN / turn if turn > MOST_TURN else 1.0
+    fraction = MOST_TURN / turn if turn > MOST_TURN else 1.0
     # Keep a part of the length, unless the geodesic is so short already that it may vanish.
-    if not arc + part * corrections[3] > LEAST_PART * arc:
+    if not arc + fraction * corrections[3] > LEAST_PART * arc:
         if arc + corrections[3] <= 0.0 and arc * abs(start[END_NUMBERS.ALONG_BENDS]) < SHORT:
-            slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC] = part = 0.0
+            slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC] = fraction = 0.0
         else:
             corrections[3] = (LEAST_PART - 1.0) * arc
-    return part
+    return fraction
 
 
 def determinant_sign(size: int, a: Floats) -> float:
@@ -225,22 +225,22 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
     Returns:
         The largest kink (rad).
     """
-    size, most = UNKNOWNS * count, 0.0
+    size, largest_kink = UNKNOWNS * count, 0.0
     for k in range(size * size):
         a[k] = 0.0
     for k in range(1, count + 1):
         slot = at(chain, SLOT.SIZE * k)
         for side in range(2):
-            end, sign, other = (
+            end, sign, neighbour = (
                 (OBSTACLE_WORK.GROUND_START, 1.0, k - 1)
                 if side == 0
                 else (OBSTACLE_WORK.GROUND_END, -1.0, k + 1)
             )
-            here = vector(slot, end + END_NUMBERS.POINT)
+            end_point = vector(slot, end + END_NUMBERS.POINT)
             line = (
-                minus(here, line_start(chain, k))
+                minus(end_point, line_start(chain, k))
                 if side == 0
-                else minus(line_end(chain, k, count), here)
+                else minus(line_end(chain, k, count), end_point)
             )
             # A kink is the component across over the length; very short lines are not divided by.
             distance = max(norm(line), NEAR)
@@ -250,7 +250,7 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 )
                 row = UNKNOWNS * (k - 1) + 2 * side + across
                 values[row] = -dot(line, axis)
-                most = max(most, abs(values[row]) / distance)
+                largest_kink = max(largest_kink, abs(values[row]) / distance)
                 differentiate_end(
                     slot,
                     # A spring at each end adds to the derivative by its displacement; it does not
@@ -262,12 +262,16 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 )
                 # The other end of the line is on a neighbouring geodesic: its displacement has the
                 # opposite effect.
-                if 0 < other <= count:
-                    far, of = (
+                if 0 < neighbour <= count:
+                    neighbour_end, neighbour_row = (
                         OBSTACLE_WORK.GROUND_END if side == 0 else OBSTACLE_WORK.GROUND_START,
-                        at(a, size * row + UNKNOWNS * (other - 1)),
+                        at(a, size * row + UNKNOWNS * (neighbour - 1)),
                     )
                     differentiate_end(
-                        at(chain, SLOT.SIZE * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of
+                        at(chain, SLOT.SIZE * neighbour),
+                        neighbour_end,
+                        times(-sign, axis),
+                        (0.0, 0.0, 0.0),
+                        neighbour_row,
                     )
-    return most
+    return largest_kink

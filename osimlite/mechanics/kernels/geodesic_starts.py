@@ -160,15 +160,18 @@ def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
         )
     if p[SURFACE.KIND] != SURFACE_TYPE.ELLIPSOID:
         return 1
-    way, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
-    part = -dot(multiply_elementwise(weights, first), way) / max(
-        dot(multiply_elementwise(weights, way), way), LEAST
+    chord, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
+    fraction = -dot(multiply_elementwise(weights, first), chord) / max(
+        dot(multiply_elementwise(weights, chord), chord), LEAST
     )
     x, y, z = weights
-    out = way_out(
-        (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), add_scaled(first, part, way), way, WORTHWHILE
+    second_way_out = way_out(
+        (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)),
+        add_scaled(first, fraction, chord),
+        chord,
+        WORTHWHILE,
     )
-    return 2 if dot(out, out) > 0.0 else 1
+    return 2 if dot(second_way_out, second_way_out) > 0.0 else 1
 
 
 def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
@@ -186,11 +189,13 @@ def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
         return distance_from_ring(
             nearest_to_ring(p[SURFACE.RADIUS], first, second), p[SURFACE.RADIUS]
         )
-    way, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
-    square = dot(multiply_elementwise(weights, way), way)
+    chord, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
+    square = dot(multiply_elementwise(weights, chord), chord)
     # In scaled coordinates the surface is a unit sphere, and the nearest point is a projection.
-    part = min(max(-dot(multiply_elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
-    middle = add_scaled(first, part, way)
+    fraction = min(
+        max(-dot(multiply_elementwise(weights, first), chord) / max(square, LEAST), 0.0), 1.0
+    )
+    middle = add_scaled(first, fraction, chord)
     return dot(multiply_elementwise(weights, middle), middle) / (
         p[SURFACE.SQUARE] if p[SURFACE.KIND] != SURFACE_TYPE.CYLINDER else 1.0
     )
@@ -232,7 +237,7 @@ def start_on_cylinder(
     # Angles are measured from the middle of the active side, or from the first end.
     if is_open:
         ux, uy = px, py
-    one, two = (
+    first_angle, second_angle = (
         atan2(ux * py - uy * px, ux * px + uy * py),
         atan2(ux * qy - uy * qx, ux * qx + uy * qy),
     )
@@ -243,14 +248,31 @@ def start_on_cylinder(
         sqrt(max(far2 * far2 - radius * radius, 0.0)),
     )
     # Angles between the ends and their tangent points, seen from the axis.
-    before, after = atan2(line1, radius), atan2(line2, radius)
-    sweep = (two - one) % (2.0 * pi)
-    way = 1.0 if (sweep <= pi if is_open else turns_left(one, before, two, after, sweep)) else -1.0
+    first_tangent_angle, second_tangent_angle = atan2(line1, radius), atan2(line2, radius)
+    sweep = (second_angle - first_angle) % (2.0 * pi)
+    rotation_sense = (
+        1.0
+        if (
+            sweep <= pi
+            if is_open
+            else turns_left(
+                first_angle, first_tangent_angle, second_angle, second_tangent_angle, sweep
+            )
+        )
+        else -1.0
+    )
     if about != 0.0:
-        way = 1.0 if about > 0.0 else -1.0
-    turn = (sweep if way > 0.0 else 2.0 * pi - sweep) - before - after
+        rotation_sense = 1.0 if about > 0.0 else -1.0
+    turn = (
+        (sweep if rotation_sense > 0.0 else 2.0 * pi - sweep)
+        - first_tangent_angle
+        - second_tangent_angle
+    )
     size = sqrt(ux * ux + uy * uy)
-    c, s = cos(one + way * before) / size, sin(one + way * before) / size
+    c, s = (
+        cos(first_angle + rotation_sense * first_tangent_angle) / size,
+        sin(first_angle + rotation_sense * first_tangent_angle) / size,
+    )
     nx, ny = c * ux - s * uy, c * uy + s * ux
     # On the unrolled cylinder the path is a straight line of constant slope.
     slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, LEAST)
@@ -261,12 +283,18 @@ def start_on_cylinder(
     return (
         turn,
         (radius * nx, radius * ny, z),
-        (-way * ny, way * nx, slope),
+        (-rotation_sense * ny, rotation_sense * nx, slope),
         radius * turn * sqrt(1.0 + slope * slope),
     )
 
 
-def turns_left(one: float, before: float, two: float, after: float, sweep: float) -> bool:
+def turns_left(
+    first_angle: float,
+    first_tangent_angle: float,
+    second_angle: float,
+    second_tangent_angle: float,
+    sweep: float,
+) -> bool:
     """Return whether a path turns to the left around a cylinder.
 
     The path is to stay on the active side, as in OpenSim.
@@ -276,14 +304,20 @@ def turns_left(one: float, before: float, two: float, after: float, sweep: float
     behind.
 
     Args:
-        one: angle of the first end from the middle of the active side (rad).
-        before: angle from there to its tangents (rad).
-        two: angle of the second end (rad).
-        after: angle from there to its tangents (rad).
+        first_angle: angle of the first end from the middle of the active side (rad).
+        first_tangent_angle: angle from there to its tangents (rad).
+        second_angle: angle of the second end (rad).
+        second_tangent_angle: angle from there to its tangents (rad).
         sweep: angle from end to end to the left, not negative (rad).
     """
-    left1, right1 = cos(one + before) >= 0.0, cos(one - before) >= 0.0
-    left2, right2 = cos(two - after) >= 0.0, cos(two + after) >= 0.0
+    left1, right1 = (
+        cos(first_angle + first_tangent_angle) >= 0.0,
+        cos(first_angle - first_tangent_angle) >= 0.0,
+    )
+    left2, right2 = (
+        cos(second_angle - second_tangent_angle) >= 0.0,
+        cos(second_angle + second_tangent_angle) >= 0.0,
+    )
     if left1 != right1:
         return left1
     if left2 != right2:
@@ -319,81 +353,107 @@ def start_on_ellipsoid(
     wx, wy, wz = times(1.0 / p[SURFACE.SQUARE], weights)
     scale = sx, sy, sz = sqrt(wx), sqrt(wy), sqrt(wz)
     radii = 1.0 / sx, 1.0 / sy, 1.0 / sz
-    one, two = multiply_elementwise(scale, first), multiply_elementwise(scale, second)
-    way = minus(two, one)
-    part = min(max(-dot(one, way) / max(dot(way, way), LEAST), 0.0), 1.0)
-    middle = add_scaled(one, part, way)
+    scaled_first, scaled_second = (
+        multiply_elementwise(scale, first),
+        multiply_elementwise(scale, second),
+    )
+    scaled_chord = minus(scaled_second, scaled_first)
+    fraction = min(
+        max(-dot(scaled_first, scaled_chord) / max(dot(scaled_chord, scaled_chord), LEAST), 0.0),
+        1.0,
+    )
+    middle = add_scaled(scaled_first, fraction, scaled_chord)
     # The line passes outside of the unit sphere.
     if not dot(middle, middle) < 1.0:
-        return 0.0, first, way, 0.0
-    out = middle
+        return 0.0, first, scaled_chord, 0.0
+    outwards = middle
     # On a sphere the nearest point of the line points out of it; on an ellipsoid the least deep
     # direction must be searched.
-    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID or norm(cross(middle, way)) < LEAST:
+    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID or norm(cross(middle, scaled_chord)) < LEAST:
         # Of two opposite directions both start at the narrow side.
-        out = way_out(
+        outwards = way_out(
             radii,
             times(0.0 if norm(about) > 0.0 else 1.0, multiply_elementwise(radii, middle)),
-            multiply_elementwise(radii, way),
+            multiply_elementwise(radii, scaled_chord),
             0.0,
         )
     if norm(about) > 0.0:
-        out = times(
-            -1.0 if dot(about, cross(out, multiply_elementwise(radii, way))) < 0.0 else 1.0, out
+        outwards = times(
+            -1.0
+            if dot(about, cross(outwards, multiply_elementwise(radii, scaled_chord))) < 0.0
+            else 1.0,
+            outwards,
         )
         # Perpendicular to the least deep direction: another surface may make that the shortest.
-        other = cross(multiply_elementwise(radii, way), about)
-        if p[SURFACE.KIND] == SURFACE_TYPE.SPHERE and dot(unit(other), unit(out)) < ASIDE:
-            out = other
-    if side != 0.0 and not is_on_side(out, axis, side):
+        outwards_about = cross(multiply_elementwise(radii, scaled_chord), about)
+        if (
+            p[SURFACE.KIND] == SURFACE_TYPE.SPHERE
+            and dot(unit(outwards_about), unit(outwards)) < ASIDE
+        ):
+            outwards = outwards_about
+    if side != 0.0 and not is_on_side(outwards, axis, side):
         # Towards the mirror image, which itself is near no geodesic.
-        mirrored = replace_component(out, axis, -component(out, axis))
-        out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
-    out = multiply_elementwise(scale, out)
-    result = start_on_section(radii, one, two, cross(out, way), work)
+        mirrored = replace_component(outwards, axis, -component(outwards, axis))
+        outwards = times(1.0 if dot(mirrored, outwards) >= 0.0 else -1.0, outwards)
+    outwards = multiply_elementwise(scale, outwards)
+    result = start_on_section(
+        radii, scaled_first, scaled_second, cross(outwards, scaled_chord), work
+    )
     turn, _, sets_out, _ = result
     # A section that turns far, or that starts on the wrong side, is a poor start.
     is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
-        side == 0.0 or dot(out, middle) > 0.0
+        side == 0.0 or dot(outwards, middle) > 0.0
     )
     if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or how == BENDING.PULLED):
         result = start_on_string(p, turn, first, second, work)
     return result
 
 
-def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector:
+def way_out(radii: Vector, middle: Vector, chord: Vector, deeper: float) -> Vector:
     """Return the direction across a line in which it is least deep in an ellipsoid, a unit vector.
 
     Args:
         radii: half axes.
         middle: point of the line.
-        way: direction of the line.
+        chord: direction of the line.
         deeper: if positive, return the second best local minimum, or zeros if the line is more than
             this many times deeper there or no second minimum exists.
     """
-    x, y, z = way
+    x, y, z = chord
     # Any axis that is not along the line gives two directions across it.
     axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
-    a = unit(cross(way, replace_component((0.0, 0.0, 0.0), axis, 1.0)))
-    b = cross(unit(way), a)
+    a = unit(cross(chord, replace_component((0.0, 0.0, 0.0), axis, 1.0)))
+    b = cross(unit(chord), a)
     ra, rb = multiply_elementwise(radii, a), multiply_elementwise(radii, b)
     aa, ab, bb = dot(ra, ra), dot(ra, rb), dot(rb, rb)
     ma, mb = dot(middle, a), dot(middle, b)
     # Sample the depth all around, and refine each minimum by the parabola through three samples.
     best = second = (inf, 0.0)
-    before, here = line_depth(aa, ab, bb, ma, mb, -2), line_depth(aa, ab, bb, ma, mb, -1)
+    previous_depth, this_depth = (
+        line_depth(aa, ab, bb, ma, mb, -2),
+        line_depth(aa, ab, bb, ma, mb, -1),
+    )
     for k in range(WAYS):
-        after = line_depth(aa, ab, bb, ma, mb, k)
-        if here < before and here <= after:
+        next_depth = line_depth(aa, ab, bb, ma, mb, k)
+        if this_depth < previous_depth and this_depth <= next_depth:
             result = (
-                here,
-                2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after)),
+                this_depth,
+                2.0
+                * pi
+                / WAYS
+                * (
+                    k
+                    - 1
+                    + 0.5
+                    * (previous_depth - next_depth)
+                    / (previous_depth - 2.0 * this_depth + next_depth)
+                ),
             )
-            if here < best[0]:
+            if this_depth < best[0]:
                 best, second = result, best
-            elif here < second[0]:
+            elif this_depth < second[0]:
                 second = result
-        before, here = here, after
+        previous_depth, this_depth = this_depth, next_depth
     depth, angle = second if deeper > 0.0 else best
     if depth == inf or depth > max(deeper, 1.0) * best[0]:
         return 0.0, 0.0, 0.0
@@ -419,24 +479,24 @@ def line_depth(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) ->
 
 
 def start_on_section(
-    radii: Vector, one: Vector, two: Vector, across: Vector, work: Floats
+    radii: Vector, scaled_first: Vector, scaled_second: Vector, across: Vector, work: Floats
 ) -> Start:
     """Return the start on a plane section of an ellipsoid, and beads along it.
 
     Args:
         radii: half axes.
-        one: first end, scaled so that the surface is the unit sphere.
-        two: second end, scaled in the same way.
+        scaled_first: first end, scaled so that the surface is the unit sphere.
+        scaled_second: second end, scaled in the same way.
         across: normal of the plane of the section; the path turns to the left about it.
         work: filled with the direction at the end, and the beads.
     """
     # The section of the unit sphere is a circle with this centre and radius.
     normal = unit(across)
-    centre = times(dot(normal, one), normal)
+    centre = times(dot(normal, scaled_first), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
     a1, a2 = (
-        find_tangent(minus(one, centre), radius, normal, 1.0),
-        find_tangent(minus(two, centre), radius, normal, -1.0),
+        find_tangent(minus(scaled_first, centre), radius, normal, 1.0),
+        find_tangent(minus(scaled_second, centre), radius, normal, -1.0),
     )
     across = cross(normal, a1)
     turn = atan2(dot(across, a2), dot(a1, a2))
@@ -482,7 +542,7 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
     store_vector(work, 3 * BEADS, second)
     # Start with four segments, so that the string moves far in few sweeps.
     stride = BEADS // 4
-    one, two = BEADS, 0
+    first_bead, last_bead = BEADS, 0
     while stride > 0:
         for pull in range(PULLS + 1):
             # The first sweep sets the new beads only.
@@ -494,26 +554,29 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
                 )
                 if surface_value(p, bead) > 0.0:
                     for _ in range(2):
-                        out = multiply_elementwise(vector(p, SURFACE.WEIGHTS), bead)
-                        bead = add_scaled(bead, 0.5 * surface_value(p, bead) / dot(out, out), out)
+                        gradient = multiply_elementwise(vector(p, SURFACE.WEIGHTS), bead)
+                        bead = add_scaled(
+                            bead, 0.5 * surface_value(p, bead) / dot(gradient, gradient), gradient
+                        )
                     # In the last sweep note the first and last bead that touch.
                     if stride == 1 and pull == PULLS:
-                        one, two = min(one, k), k
+                        first_bead, last_bead = min(first_bead, k), k
                 store_vector(work, 3 * k, bead)
         stride //= 2
-    if two == 0:
+    if last_bead == 0:
         return 0.0, first, second, 0.0
-    begin, end = vector(work, 3 * one - 3), vector(work, 3 * one)
+    begin, end = vector(work, 3 * first_bead - 3), vector(work, 3 * first_bead)
     # The first and last segment are half on the surface.
     length = 0.5 * (
-        norm(minus(end, begin)) + norm(minus(vector(work, 3 * two + 3), vector(work, 3 * two)))
+        norm(minus(end, begin))
+        + norm(minus(vector(work, 3 * last_bead + 3), vector(work, 3 * last_bead)))
     )
-    for k in range(one, two):
+    for k in range(first_bead, last_bead):
         length += norm(minus(vector(work, 3 * k + 3), vector(work, 3 * k)))
     return turn, times(0.5, plus(begin, end)), minus(end, begin), length
 
 
-def find_tangent(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
+def find_tangent(point: Vector, radius: float, normal: Vector, rotation_sense: float) -> Vector:
     """Return the tangent point of a circle about the origin, seen from a point of its plane.
 
     For a point inside, it is the nearest point of the circle.
@@ -522,13 +585,13 @@ def find_tangent(point: Vector, radius: float, normal: Vector, way: float) -> Ve
         point: point of the plane of the circle.
         radius: radius of the circle.
         normal: unit normal of the plane.
-        way: 1.0 for the tangent point to the left about the normal, -1.0 for that to the right.
+        rotation_sense: 1.0 for the tangent point to the left about the normal, -1.0 for that to the right.
     """
     distance = max(norm(point), LEAST)
     cosine = min(radius / distance, 1.0)
     foot = times(radius * cosine / distance, point)
     return add_scaled(
-        foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point)
+        foot, rotation_sense * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point)
     )
 
 
@@ -546,29 +609,29 @@ def start_on_torus(
         side: sign of the active side, 0.0 for the complete surface.
         how: AS_MEANT or ANY_SIDE of `BENDING`.
     """
-    x, y, _ = near = nearest_to_ring(ring, first, second)
-    if side != 0.0 and not is_on_side(near, axis, side):
-        return 0.0, first, near, 0.0
+    x, y, _ = ring_point = nearest_to_ring(ring, first, second)
+    if side != 0.0 and not is_on_side(ring_point, axis, side):
+        return 0.0, first, ring_point, 0.0
     rx, ry, _ = inwards = unit((-x, -y, 0.0))
     centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
-    one, two = (
+    local_first, local_second = (
         vector_in_cylinder(minus(first, centre), inwards, tangent),
         vector_in_cylinder(minus(second, centre), inwards, tangent),
     )
-    turn, point, way, length = start_on_cylinder(
+    turn, point, start_direction, length = start_on_cylinder(
         # The active side of the cylinder is the inside of the ring, since a path passes through the
         # hole.
         tube,
         inf,
-        one,
-        two,
+        local_first,
+        local_second,
         (0.0 if how == BENDING.ANY_SIDE else 1.0, 0.0, 0.0),
         0.0,
     )
     return (
         turn,
         add_scaled(vector_from_cylinder(point, inwards, tangent), 1.0, centre),
-        vector_from_cylinder(way, inwards, tangent),
+        vector_from_cylinder(start_direction, inwards, tangent),
         length,
     )
 
@@ -581,15 +644,15 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
         first: start of the segment.
         second: end of the segment.
     """
-    wx, wy, wz = way = minus(second, first)
+    wx, wy, wz = chord = minus(second, first)
     best, least = 0.0, inf
     # The distance has up to two minima along a line: sample it before Newton's method.
     for k in range(SAMPLES + 1):
-        distance = distance_from_ring(add_scaled(first, k / SAMPLES, way), ring)
+        distance = distance_from_ring(add_scaled(first, k / SAMPLES, chord), ring)
         if distance < least:
             best, least = k / SAMPLES, distance
     for _ in range(STEPS):
-        x, y, z = add_scaled(first, best, way)
+        x, y, z = add_scaled(first, best, chord)
         square = max(x * x + y * y, LEAST)
         outer, flat = sqrt(square), x * wx + y * wy
         slope = flat * (1.0 - ring / outer) + z * wz
@@ -602,7 +665,7 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
         if not bends > 0.0:
             break
         best = min(max(best - slope / bends, 0.0), 1.0)
-    return add_scaled(first, best, way)
+    return add_scaled(first, best, chord)
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:

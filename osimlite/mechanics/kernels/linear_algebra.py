@@ -67,7 +67,7 @@ def factorise_by_law(model: Ints, data: Floats, count: int, a: Floats, smallest:
 
 
 def solve_by_law(
-    model: Ints, count: int, a: Floats, values: Floats, room: Floats, reals: Floats
+    model: Ints, count: int, a: Floats, values: Floats, work: Floats, reals: Floats
 ) -> None:
     """Solve equations that `factorise_by_law` factorised, see `solve_minimum_norm`.
 
@@ -76,14 +76,14 @@ def solve_by_law(
         count: number of equations.
         a: factor.
         values: right sides (count,).
-        room: workspace (count,).
+        work: workspace (count,).
         reals: filled with the shortest solution (n,).
     """
     call(
         model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.MINIMUM_NORM]],
         model,
         values,
-        room,
+        work,
         a,
         reals,
         count,
@@ -154,15 +154,15 @@ def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> in
         order[r] = r
     least = 0.0
     for r in range(min(count, size)):
-        best, most = r, -1.0
+        best, largest_square = r, -1.0
         # Pivoting: process the equation with the longest remaining part next.
         for i in range(r, count):
             square = 0.0
             for k in range(r, size):
                 square += a[size * i + k] * a[size * i + k]
-            if square > most:
-                best, most = i, square
-        length = sqrt(max(most, 0.0))
+            if square > largest_square:
+                best, largest_square = i, square
+        length = sqrt(max(largest_square, 0.0))
         # The first equation is the longest one and defines the scale of the threshold.
         if r == 0:
             least = smallest * length
@@ -208,19 +208,21 @@ def make_reflection(first: int, end: int, stride: int, length: float, v: Floats)
     Returns:
         The value of the entry after the reflection.
     """
-    lead = v[stride * first]
+    first_entry = v[stride * first]
     # Reflect to the opposite sign of the entry, so that the difference does not cancel.
-    value = -length if lead > 0.0 else length
+    value = -length if first_entry > 0.0 else length
     if length > 0.0:
-        v[stride * first] = lead - value
+        v[stride * first] = first_entry - value
         # Scale the vector to the squared norm 2, so that the reflection needs no division.
-        scale = 1.0 / sqrt(length * (length + abs(lead)))
+        scale = 1.0 / sqrt(length * (length + abs(first_entry)))
         for k in range(first, end):
             v[stride * k] *= scale
     return value
 
 
-def apply_reflection(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats) -> None:
+def apply_reflection(
+    first: int, end: int, stride: int, v: Floats, x_stride: int, x: Floats
+) -> None:
     """Reflect the vector x by a Householder vector v: x -= (v . x) v.
 
     Args:
@@ -228,18 +230,18 @@ def apply_reflection(first: int, end: int, stride: int, v: Floats, apart: int, x
         end: end of both.
         stride: distance between the entries of v.
         v: Householder vector of norm sqrt(2).
-        apart: distance between the entries of x.
+        x_stride: distance between the entries of x.
         x: vector; changed.
     """
     total = 0.0
     for k in range(first, end):
-        total += v[stride * k] * x[apart * k]
+        total += v[stride * k] * x[x_stride * k]
     for k in range(first, end):
-        x[apart * k] -= total * v[stride * k]
+        x[x_stride * k] -= total * v[stride * k]
 
 
 def solve_minimum_norm(
-    count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats
+    count: int, size: int, a: Floats, rank: int, values: Floats, work: Floats, x: Floats
 ) -> None:
     """Compute the shortest least-squares solution of factorised equations.
 
@@ -249,31 +251,31 @@ def solve_minimum_norm(
         a: factor.
         rank: number of independent equations.
         values: right sides (count,).
-        room: workspace (count,).
+        work: workspace (count,).
         x: filled with the solution (size,).
     """
     diagonal, order = at(a, count * size), at(a, count * size + count)
     for i in range(count):
-        room[i] = values[int(order[i])]
+        work[i] = values[int(order[i])]
     # Least squares over all equations, redundant ones included.
     if rank < count:
         t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
         for r in range(rank):
-            apply_reflection(r, count, count, at(t, r), 1, room)
+            apply_reflection(r, count, count, at(t, r), 1, work)
         for r in range(rank - 1, -1, -1):
-            total = room[r]
+            total = work[r]
             for k in range(r + 1, rank):
-                total -= t[count * r + k] * room[k]
-            room[r] = total / corner[r]
+                total -= t[count * r + k] * work[k]
+            work[r] = total / corner[r]
     else:
         for r in range(rank):
-            total = room[r]
+            total = work[r]
             for k in range(r):
-                total -= a[size * r + k] * room[k]
-            room[r] = total / diagonal[r]
+                total -= a[size * r + k] * work[k]
+            work[r] = total / diagonal[r]
     # Unknowns beyond the rank are zero in the rotated basis, which makes the solution shortest.
     for k in range(size):
-        x[k] = room[k] if k < rank else 0.0
+        x[k] = work[k] if k < rank else 0.0
     apply_q(size, a, rank, x)
 
 
@@ -323,11 +325,11 @@ def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
     for i in range(size):
         row, entry = at(a, size * i), a[size * i + i]
         for k in range(i + 1):
-            other, total = at(a, size * k), row[k]
+            upper_row, total = at(a, size * k), row[k]
             for j in range(k):
-                total -= row[j] * other[j]
+                total -= row[j] * upper_row[j]
             if k < i:
-                row[k] = total / other[k]
+                row[k] = total / upper_row[k]
             else:
                 # Also false for NaN.
                 if not total > smallest * entry:
@@ -374,12 +376,12 @@ def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
         for j in range(size):
             vectors[size * i + j] = 1.0 if i == j else 0.0
     for _ in range(MAX_SWEEPS):
-        off = on = 0.0
+        off_diagonal = on_diagonal = 0.0
         for i in range(size):
-            on += a[size * i + i] * a[size * i + i]
+            on_diagonal += a[size * i + i] * a[size * i + i]
             for j in range(i):
-                off += a[size * i + j] * a[size * i + j]
-        if not off > NEGLIGIBLE * on:
+                off_diagonal += a[size * i + j] * a[size * i + j]
+        if not off_diagonal > NEGLIGIBLE * on_diagonal:
             return
         for i in range(size):
             for j in range(i):
@@ -406,13 +408,19 @@ def rotate_plane(size: int, a: Floats, vectors: Floats, i: int, j: int) -> None:
     cosine = 1.0 / sqrt(1.0 + tangent * tangent)
     sine = tangent * cosine
     for k in range(size):
-        one, two = a[size * i + k], a[size * j + k]
-        a[size * i + k], a[size * j + k] = cosine * one - sine * two, sine * one + cosine * two
+        first_entry, second_entry = a[size * i + k], a[size * j + k]
+        a[size * i + k], a[size * j + k] = (
+            cosine * first_entry - sine * second_entry,
+            sine * first_entry + cosine * second_entry,
+        )
     for k in range(size):
-        one, two = a[size * k + i], a[size * k + j]
-        a[size * k + i], a[size * k + j] = cosine * one - sine * two, sine * one + cosine * two
-        one, two = vectors[size * i + k], vectors[size * j + k]
+        first_entry, second_entry = a[size * k + i], a[size * k + j]
+        a[size * k + i], a[size * k + j] = (
+            cosine * first_entry - sine * second_entry,
+            sine * first_entry + cosine * second_entry,
+        )
+        first_entry, second_entry = vectors[size * i + k], vectors[size * j + k]
         vectors[size * i + k], vectors[size * j + k] = (
-            cosine * one - sine * two,
-            sine * one + cosine * two,
+            cosine * first_entry - sine * second_entry,
+            sine * first_entry + cosine * second_entry,
         )

@@ -29,7 +29,7 @@ ORDER = 4.0
 """Order of the error."""
 
 
-def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, offset: int) -> int:
     """Try one step from y0, which is followed by its derivative, to y1.
 
     Args:
@@ -38,12 +38,12 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
-        place: offset of the method's record in data.
+        offset: offset of the method's record in data.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
-    h = at(data, place)
+    h = at(data, offset)
     errors, stages = (
         at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]),
         at(h, HEAD),

@@ -57,33 +57,43 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    one, two, count, is_plane = i[ITEM.OWN], i[ITEM.OWN + 1], i[ITEM.OWN + 3], i[ITEM.OWN + 4]
+    first_link, second_link, count, is_plane = (
+        i[ITEM.OWN],
+        i[ITEM.OWN + 1],
+        i[ITEM.OWN + 3],
+        i[ITEM.OWN + 4],
+    )
     p, result = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
     for k in range(MESH_WORK):
         result[k] = 0.0
-    o, about = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
-    n, way = direction(model, data, one, vector(p, 3)), minus(about, o)
+    o, about = (
+        station(model, data, first_link, vector(p, 0)),
+        station(model, data, second_link, vector(p, 7)),
+    )
+    n, mesh_offset = direction(model, data, first_link, vector(p, 3)), minus(about, o)
     # Skip all springs if the bounding sphere of the mesh does not reach the other surface.
     if is_plane:
-        if dot(way, n) >= p[10]:
+        if dot(mesh_offset, n) >= p[10]:
             return OUTCOME.OK
-    elif dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
+    elif dot(mesh_offset, mesh_offset) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
     # Relative motion at one point, from which `spring_load` computes that of each spring.
-    v = minus(velocity(model, data, one, about), velocity(model, data, two, about))
-    turning = minus(angular_velocity(model, data, one), angular_velocity(model, data, two))
+    v = minus(velocity(model, data, first_link, about), velocity(model, data, second_link, about))
+    turning = minus(
+        angular_velocity(model, data, first_link), angular_velocity(model, data, second_link)
+    )
     force = torque = ZERO
     energy = 0.0
     for k in range(count):
         spring = at(p, SPRINGS + 4 * k)
-        middle = station(model, data, two, vector(spring, 1))
+        middle = station(model, data, second_link, vector(spring, 1))
         d, end = (
             spring_in_half_space(o, n, middle) if is_plane else spring_in_sphere(o, p[6], middle)
         )
         if d > 0.0:
             constants = FoundationSpring(spring[0], p[11], p[12], p[13], p[14], p[15])
-            push, turn, stored = spring_load(constants, middle, end, about, v, turning)
-            force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
+            push, turn, stored_energy = spring_load(constants, middle, end, about, v, turning)
+            force, torque, energy = plus(force, push), plus(torque, turn), energy + stored_energy
     apply_mesh_load(model, data, item, about, force, torque, energy)
     return OUTCOME.OK
 
@@ -109,7 +119,7 @@ def apply_mesh_load(
         energy: potential energy (J).
     """
     i = at(model, item)
-    one, two, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(data, i[ITEM.RECORD])
+    first_link, second_link, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(data, i[ITEM.RECORD])
     contact = at(
         data,
         model[
@@ -122,10 +132,10 @@ def apply_mesh_load(
     store_vector(contact, 0, force)
     store_vector(contact, 3, about)
     result[9] = energy
-    apply_force(model, data, two, about, force)
-    apply_torque(model, data, two, torque)
-    apply_force(model, data, one, about, times(-1.0, force))
-    apply_torque(model, data, one, times(-1.0, torque))
+    apply_force(model, data, second_link, about, force)
+    apply_torque(model, data, second_link, torque)
+    apply_force(model, data, first_link, about, times(-1.0, force))
+    apply_torque(model, data, first_link, times(-1.0, torque))
     # A mesh has no depth of its own: 1 says that it transmits a force.
     if norm(force) != 0.0:
         contact[CONTACT_WORK.DEPTH] = 1.0

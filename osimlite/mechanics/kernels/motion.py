@@ -65,7 +65,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
     """
     # Parents come before children, so that one pass is enough.
     for link in range(model[MODEL.LINKS]):
-        i, here = link_ints(model, link), link_work(model, data, link)
+        i, link_record = link_ints(model, link), link_work(model, data, link)
         # Start from the frame of the parent, or of ground.
         axes, origin = (X, Y, Z), ZERO
         if i[LINK.PARENT] >= 0:
@@ -99,14 +99,14 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                     amount = a[OPERATION_WORK.AMOUNT]
                 # Rotate about z, or translate along the axis; keep the axis for the velocities.
                 if motion == MOTION.TURN:
-                    one, two, three = axes
-                    store_vector(a, OPERATION_WORK.AXIS, three)
+                    x_axis, y_axis, z_axis = axes
+                    store_vector(a, OPERATION_WORK.AXIS, z_axis)
                     store_vector(a, OPERATION_WORK.POINT, origin)
                     sine, cosine = sine_cosine(amount)
                     axes = (
-                        add_scaled(times(cosine, one), sine, two),
-                        add_scaled(times(cosine, two), -sine, one),
-                        three,
+                        add_scaled(times(cosine, x_axis), sine, y_axis),
+                        add_scaled(times(cosine, y_axis), -sine, x_axis),
+                        z_axis,
                     )
                 else:
                     axis = combine_axes(axes, vector(b, FIXED.AXIS))
@@ -121,10 +121,10 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                 axes, origin = axes_from_rows(frame), vector(frame, LINK_WORK.POSITION)
         # All links of a tree share the origin of its first link for their spatial vectors, so that
         # these add up without shifts.
-        set_frame(here, axes, origin)
+        set_frame(link_record, axes, origin)
         if i[LINK.PARENT] >= 0:
             origin = vector(link_work(model, data, i[LINK.PARENT]), LINK_WORK.ORIGIN)
-        store_vector(here, LINK_WORK.ORIGIN, origin)
+        store_vector(link_record, LINK_WORK.ORIGIN, origin)
 
 
 def axes_from_rows(rows: Floats) -> Axes:
@@ -140,10 +140,10 @@ def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
         axes: axes of the frame, the columns of the rotation.
         origin: position of its origin (m).
     """
-    one, two, three = axes
-    rows[0], rows[3], rows[6] = one
-    rows[1], rows[4], rows[7] = two
-    rows[2], rows[5], rows[8] = three
+    x_axis, y_axis, z_axis = axes
+    rows[0], rows[3], rows[6] = x_axis
+    rows[1], rows[4], rows[7] = y_axis
+    rows[2], rows[5], rows[8] = z_axis
     store_vector(rows, LINK_WORK.POSITION, origin)
 
 
@@ -175,8 +175,8 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
             at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO
         )
     for link in range(model[MODEL.LINKS]):
-        i, here = link_ints(model, link), link_work(model, data, link)
-        origin = vector(here, LINK_WORK.ORIGIN)
+        i, link_record = link_ints(model, link), link_work(model, data, link)
+        origin = vector(link_record, LINK_WORK.ORIGIN)
         # An upward acceleration of ground has the same effect as gravity.
         spin, velocity, spin_rate, acceleration = (
             ZERO,
@@ -250,8 +250,8 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
             spin_rate = plus(spin_rate, cross(spin, turn))
             acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))
             spin, velocity = plus(spin, turn), plus(velocity, shift)
-        set_spatial_vector(at(here, LINK_WORK.VELOCITY), spin, velocity)
-        set_spatial_vector(at(here, LINK_WORK.ACCELERATION), spin_rate, acceleration)
+        set_spatial_vector(at(link_record, LINK_WORK.VELOCITY), spin, velocity)
+        set_spatial_vector(at(link_record, LINK_WORK.ACCELERATION), spin_rate, acceleration)
     return status
 
 

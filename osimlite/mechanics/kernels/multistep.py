@@ -122,7 +122,7 @@ PATIENCE = 3
 """Number of consecutive rejections after which the history is dropped, as the motion has a kink."""
 
 
-def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, offset: int) -> int:
     """Try one step by a numerical differentiation formula, see `try_multistep`.
 
     Args:
@@ -131,15 +131,15 @@ def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place:
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end, then its derivative.
-        place: offset of the method's record in data.
+        offset: offset of the method's record in data.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
-    return try_multistep(model, reals, data, y0, y1, place, FORMULAS.BDF)
+    return try_multistep(model, reals, data, y0, y1, offset, FORMULAS.BDF)
 
 
-def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, offset: int) -> int:
     """Try one step by an Adams-Moulton formula, see `try_multistep`.
 
     Args:
@@ -148,16 +148,16 @@ def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, plac
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end, then its derivative.
-        place: offset of the method's record in data.
+        offset: offset of the method's record in data.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
-    return try_multistep(model, reals, data, y0, y1, place, FORMULAS.ADAMS)
+    return try_multistep(model, reals, data, y0, y1, offset, FORMULAS.ADAMS)
 
 
 def try_multistep(
-    model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int
+    model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, offset: int, method: int
 ) -> int:
     """Try one step from y0, which is followed by its derivative, to y1.
 
@@ -169,14 +169,14 @@ def try_multistep(
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end, then its derivative.
-        place: offset of the method's record in data.
+        offset: offset of the method's record in data.
         method: BDF or ADAMS of `FORMULAS`.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
     size = model[MODEL.STATE_SIZE]
-    h = at(data, place)
+    h = at(data, offset)
     rows, work = at(h, HEAD), at(h, HEAD + STATES * size)
     d, psi, errors = (
         at(rows, ROWS * size),
@@ -421,14 +421,16 @@ def choose_order(
     )
     best, factor = order, step_factor(error / accuracy, order)
     # Compare the steps that each neighbouring order allows.
-    for other in (order - 1, order + 1):
-        if not 1 <= other <= MOST_ORDER[method]:
+    for candidate in (order - 1, order + 1):
+        if not 1 <= candidate <= MOST_ORDER[method]:
             continue
         for k in range(size):
-            errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
-        result = step_factor(error_norm(model, y0, errors, h, 1) / accuracy, other)
+            errors[k] = (
+                ERROR_CONSTANT[WIDTH * method + candidate] * rows[size * (candidate + 1) + k]
+            )
+        result = step_factor(error_norm(model, y0, errors, h, 1) / accuracy, candidate)
         if result > factor:
-            best, factor = other, result
+            best, factor = candidate, result
     factor = min(safety * factor, GROW)
     if factor >= WORTH or factor < 1.0:
         h[MULTISTEP_WORK.ORDER], h[MULTISTEP_WORK.EQUAL] = float(best), 0.0
@@ -460,26 +462,26 @@ def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor:
     # Adams' differences are those of h f, and follow the state.
     order, differing = int(h[MULTISTEP_WORK.ORDER]) - method, at(rows, size * method)
     scale = factor if method == FORMULAS.ADAMS else 1.0
-    new, unit, both = (
+    new, unit, product = (
         at(h, MULTISTEP_WORK.MATRICES),
         at(h, MULTISTEP_WORK.MATRICES + WIDTH * WIDTH),
         at(h, MULTISTEP_WORK.MATRICES + 2 * WIDTH * WIDTH),
     )
-    column = at(both, WIDTH * WIDTH)
+    column = at(product, WIDTH * WIDTH)
     fill_difference_matrix(order, factor, new)
     fill_difference_matrix(order, 1.0, unit)
     # The product of both matrices maps old differences to new ones; the unit matrix inverts the
     # conversion of differences to values.
     for i in range(order + 1):
         for j in range(order + 1):
-            both[WIDTH * i + j] = 0.0
+            product[WIDTH * i + j] = 0.0
             for m in range(order + 1):
-                both[WIDTH * i + j] += scale * new[WIDTH * j + m] * unit[WIDTH * m + i]
+                product[WIDTH * i + j] += scale * new[WIDTH * j + m] * unit[WIDTH * m + i]
     for k in range(size):
         for i in range(order + 1):
             column[i] = differing[size * i + k]
         for i in range(order + 1):
-            differing[size * i + k] = dot_range(0, order + 1, at(both, WIDTH * i), column)
+            differing[size * i + k] = dot_range(0, order + 1, at(product, WIDTH * i), column)
     h[MULTISTEP_WORK.STEP] *= factor
     h[MULTISTEP_WORK.EQUAL] = 0.0
 

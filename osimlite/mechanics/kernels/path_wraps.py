@@ -106,8 +106,8 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
                 first = result
             elif k == 1:
                 second = result
-        before, length = length, measure_points(model, data, y, item)
-        if abs(length - before) < STILL:
+        previous_length, length = length, measure_points(model, data, y, item)
+        if abs(length - previous_length) < STILL:
             break
         # OpenSim exchanges the first two wraps if the first does not wrap and the second fails in
         # the first round.
@@ -169,12 +169,12 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
         i[PATH.POINTS] + 2 * number,
     )
     # Tangent points have the numbers behind those of the points.
-    kept = 0
+    kept_count = 0
     for k in range(count):
         if not first <= order[k] <= first + 1:
-            order[kept] = order[k]
-            kept += 1
-    result[PATH_WORK.COUNT] = kept
+            order[kept_count] = order[k]
+            kept_count += 1
+    result[PATH_WORK.COUNT] = kept_count
 
 
 def wrap_surface(
@@ -224,7 +224,10 @@ def wrap_surface(
     if begin < 0:
         return WRAPPING.NOWHERE
     code, best, least = WRAPPING.NONE, -1, inf
-    one, two = at(work, NODE_WORK.SIZE * tangent), at(work, NODE_WORK.SIZE * (tangent + 1))
+    first_tangent, second_tangent = (
+        at(work, NODE_WORK.SIZE * tangent),
+        at(work, NODE_WORK.SIZE * (tangent + 1)),
+    )
     for k in range(begin, end):
         m, n = at(nodes, NODE.SIZE * int(order[k])), at(nodes, NODE.SIZE * int(order[k + 1]))
         a, b = (
@@ -266,16 +269,19 @@ def wrap_surface(
             )
         if increase < least:
             best, least = k, increase
-            store_vector(one, NODE_WORK.PLACE, r1)
-            store_vector(two, NODE_WORK.PLACE, r2)
-            one[NODE_WORK.SURFACE], two[NODE_WORK.SURFACE] = 0.0, e[WRAP_WORK.SURFACE_LENGTH]
+            store_vector(first_tangent, NODE_WORK.PLACE, r1)
+            store_vector(second_tangent, NODE_WORK.PLACE, r2)
+            first_tangent[NODE_WORK.SURFACE], second_tangent[NODE_WORK.SURFACE] = (
+                0.0,
+                e[WRAP_WORK.SURFACE_LENGTH],
+            )
             # Keep the results of the chosen segment, which the next trial overwrites.
             for j in range(WRAP_WORK.ROOM - WRAP_WORK.FIRST_TANGENT):
                 e[SURFACE_WORK.BEST + j] = e[WRAP_WORK.FIRST_TANGENT + j]
         if code == WRAPPING.MANDATORY:
             break
     # The tangent points are NaN where OpenSim finds none.
-    if best >= 0 and one[NODE_WORK.PLACE] == one[NODE_WORK.PLACE]:
+    if best >= 0 and first_tangent[NODE_WORK.PLACE] == first_tangent[NODE_WORK.PLACE]:
         for k in range(count - 1, best, -1):
             order[k + 2] = order[k]
         order[best + 1], order[best + 2] = tangent, tangent + 1

@@ -223,7 +223,10 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
     )
     count = 0
     for number in range(i[PATH.POINTS]):
-        node, here = at(i, PATH.NODES_AT + NODE.SIZE * number), at(work, NODE_WORK.SIZE * number)
+        node, node_record = (
+            at(i, PATH.NODES_AT + NODE.SIZE * number),
+            at(work, NODE_WORK.SIZE * number),
+        )
         n = at(p, node[NODE.AT])
         point = vector(n, NODE_NUMBERS.STATION)
         if node[NODE.KIND] != NODE_TYPE.FIXED:
@@ -250,11 +253,11 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
                     _, dz, _ = evaluate_function(at(p, node[NODE.TABLES + 2]), value)
                 point = plus(point, rotate(t, (qx, qy, qz)))
                 store_vector(
-                    here,
+                    node_record,
                     NODE_WORK.GRADIENT,
                     direction(model, data, node[NODE.LINK], rotate(t, (dx, dy, dz))),
                 )
-        store_vector(here, NODE_WORK.PLACE, station(model, data, node[NODE.LINK], point))
+        store_vector(node_record, NODE_WORK.PLACE, station(model, data, node[NODE.LINK], point))
         order[count] = number
         count += 1
     result[PATH_WORK.COUNT] = count
@@ -280,11 +283,11 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
     )
     length = speed = 0.0
     for k in range(1, int(result[PATH_WORK.COUNT])):
-        one, two = int(order[k - 1]), int(order[k])
-        m, n = at(nodes, NODE.SIZE * one), at(nodes, NODE.SIZE * two)
-        a, b = at(work, NODE_WORK.SIZE * one), at(work, NODE_WORK.SIZE * two)
-        way = minus(line_end(n, b), line_end(m, a))
-        distance = norm(way)
+        first_node, second_node = int(order[k - 1]), int(order[k])
+        m, n = at(nodes, NODE.SIZE * first_node), at(nodes, NODE.SIZE * second_node)
+        a, b = at(work, NODE_WORK.SIZE * first_node), at(work, NODE_WORK.SIZE * second_node)
+        line = minus(line_end(n, b), line_end(m, a))
+        distance = norm(line)
         # Between both tangent points of one surface the path is not straight.
         if (
             m[NODE.KIND] == NODE_TYPE.TANGENT
@@ -301,33 +304,33 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
             or n[NODE.KIND] >= NODE_TYPE.MOVING
         ):
             moves = minus(node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a))
-            speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
+            speed += norm(moves) if distance < COINCIDENT else dot(moves, line) / distance
         # Forces along a segment without direction vanish, where OpenSim has NaN.
         store_vector(
-            a, NODE_WORK.ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way)
+            a, NODE_WORK.ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, line)
         )
     result[PATH_WORK.LENGTH], result[PATH_WORK.SPEED] = length, speed
     return length
 
 
-def line_end(node: Ints, here: Floats) -> Vector:
+def line_end(node: Ints, node_record: Floats) -> Vector:
     """Return the position of a node that straight lines begin and end at (m).
 
     OpenSim caches the position of a tangent point at its first use, see `path_wraps`.
 
     Args:
         node: integers of the node.
-        here: results of the node; a tangent point is cached.
+        node_record: results of the node; a tangent point is cached.
     """
     if node[NODE.KIND] != NODE_TYPE.TANGENT:
-        return vector(here, NODE_WORK.PLACE)
-    if here[NODE_WORK.IS_KEPT] == 0.0:
-        store_vector(here, NODE_WORK.KEPT, vector(here, NODE_WORK.PLACE))
-        here[NODE_WORK.IS_KEPT] = 1.0
-    return vector(here, NODE_WORK.KEPT)
+        return vector(node_record, NODE_WORK.PLACE)
+    if node_record[NODE_WORK.IS_KEPT] == 0.0:
+        store_vector(node_record, NODE_WORK.KEPT, vector(node_record, NODE_WORK.PLACE))
+        node_record[NODE_WORK.IS_KEPT] = 1.0
+    return vector(node_record, NODE_WORK.KEPT)
 
 
-def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
+def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, node_record: Floats) -> Vector:
     """Return the velocity of a node in ground (m/s).
 
     Tangent points move with the body of their surface.
@@ -337,11 +340,13 @@ def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats
         data: results of an evaluation.
         y: state.
         node: integers of the node.
-        here: results of the node.
+        node_record: results of the node.
     """
-    v = velocity(model, data, node[NODE.LINK], vector(here, NODE_WORK.PLACE))
+    v = velocity(model, data, node[NODE.LINK], vector(node_record, NODE_WORK.PLACE))
     if NODE_TYPE.MOVING <= node[NODE.KIND] <= NODE_TYPE.CLAMPED and node[NODE.OF] >= 0:
-        return add_scaled(v, y[model[MODEL.DOFS] + node[NODE.OF]], vector(here, NODE_WORK.GRADIENT))
+        return add_scaled(
+            v, y[model[MODEL.DOFS] + node[NODE.OF]], vector(node_record, NODE_WORK.GRADIENT)
+        )
     return v
 
 
@@ -367,20 +372,22 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         at(result, PATH_WORK.ORDER),
         at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
     )
-    tension, last = result[PATH_WORK.TENSION], int(result[PATH_WORK.COUNT]) - 1
+    tension, last_node = result[PATH_WORK.TENSION], int(result[PATH_WORK.COUNT]) - 1
     pull = 0.0, 0.0, 0.0
-    for k in range(last + 1):
+    for k in range(last_node + 1):
         number = int(order[k])
-        node, here = at(nodes, NODE.SIZE * number), at(work, NODE_WORK.SIZE * number)
+        node, node_record = at(nodes, NODE.SIZE * number), at(work, NODE_WORK.SIZE * number)
         # The force at a node is the pull towards the next one less the pull of the one before.
         back, pull = pull, (0.0, 0.0, 0.0)
-        if k < last and nodes[NODE.SIZE * int(order[k + 1]) + NODE.BODY] != node[NODE.BODY]:
-            pull = times(tension, vector(here, NODE_WORK.ALONG))
+        if k < last_node and nodes[NODE.SIZE * int(order[k + 1]) + NODE.BODY] != node[NODE.BODY]:
+            pull = times(tension, vector(node_record, NODE_WORK.ALONG))
         force = minus(pull, back)
-        apply_force(model, data, node[NODE.LINK], vector(here, NODE_WORK.PLACE), force)
+        apply_force(model, data, node[NODE.LINK], vector(node_record, NODE_WORK.PLACE), force)
         # A moving point does work along its coordinate, even within its link.
         if NODE_TYPE.MOVING <= node[NODE.KIND] <= NODE_TYPE.CLAMPED and node[NODE.OF] >= 0:
-            f[model[MODEL.DOFS] + node[NODE.OF]] += dot(force, vector(here, NODE_WORK.GRADIENT))
+            f[model[MODEL.DOFS] + node[NODE.OF]] += dot(
+                force, vector(node_record, NODE_WORK.GRADIENT)
+            )
     return OUTCOME.OK
 
 
@@ -411,7 +418,7 @@ def pull_each(
     Returns:
         `OUTCOME.OK`, or the outcome of the evaluation that failed.
     """
-    size, items = model[MODEL.DOFS], model[MODEL.ITEMS]
+    size, item_count = model[MODEL.DOFS], model[MODEL.ITEMS]
     applied = at(f, size)
     for row in range(count):
         for k in range(model[MODEL.STATE_SIZE]):
@@ -420,12 +427,12 @@ def pull_each(
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.FORCE)
         if status != OUTCOME.OK:
             return status
-        for number in range(items):
+        for number in range(item_count):
             clear_wrenches(model, data)
             for k in range(size):
                 applied[k] = 0.0
             pull_path(model, reals, data, y, f, model[model[MODEL.ITEM_AT] + number], 1.0)
             add_generalized_forces(model, data, applied)
             for k in range(size):
-                forces[size * (items * row + number) + k] = applied[k]
+                forces[size * (item_count * row + number) + k] = applied[k]
     return OUTCOME.OK

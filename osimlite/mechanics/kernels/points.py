@@ -108,16 +108,16 @@ def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
     )
 
 
-def direction(model: Ints, data: Floats, link: int, along: Vector) -> Vector:
+def direction(model: Ints, data: Floats, link: int, local_direction: Vector) -> Vector:
     """Return a direction that is given in a link, along the axes of ground.
 
     Args:
         model: integers of the model.
         data: results of an evaluation.
         link: number of the link, negative for ground.
-        along: direction in the link.
+        local_direction: direction in the link.
     """
-    return along if link < 0 else rotate(link_work(model, data, link), along)
+    return local_direction if link < 0 else rotate(link_work(model, data, link), local_direction)
 
 
 def place_frame(
@@ -152,9 +152,9 @@ def velocity(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
     """
     if link < 0:
         return ZERO
-    here = link_work(model, data, link)
-    v = at(here, LINK_WORK.VELOCITY)
-    px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
+    link_record = link_work(model, data, link)
+    v = at(link_record, LINK_WORK.VELOCITY)
+    px, py, pz = minus(point, vector(link_record, LINK_WORK.ORIGIN))
     # v + w x p, written out: this is the most frequent product of an evaluation.
     return v[3] + v[1] * pz - v[2] * py, v[4] + v[2] * px - v[0] * pz, v[5] + v[0] * py - v[1] * px
 
@@ -185,13 +185,13 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
     """
     if link < 0:
         return ZERO
-    here = link_work(model, data, link)
+    link_record = link_work(model, data, link)
     v, a, g = (
-        at(here, LINK_WORK.VELOCITY),
-        at(here, LINK_WORK.ACCELERATION),
+        at(link_record, LINK_WORK.VELOCITY),
+        at(link_record, LINK_WORK.ACCELERATION),
         at(reals, REALS.GRAVITY),
     )
-    px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
+    px, py, pz = minus(point, vector(link_record, LINK_WORK.ORIGIN))
     wx, wy, wz = v[0], v[1], v[2]
     # v holds the angular velocity, then that of the material point of the link at its origin.
     vx, vy, vz = v[3] + wy * pz - wz * py, v[4] + wz * px - wx * pz, v[5] + wx * py - wy * px
@@ -226,13 +226,13 @@ def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vect
     """
     if link < 0:
         return
-    here = link_work(model, data, link)
-    load = at(here, LINK_WORK.WRENCH)
+    link_record = link_work(model, data, link)
+    load = at(link_record, LINK_WORK.WRENCH)
     store_vector(
         # Wrenches are torque, then force, about the origin of the link's work, in axes of ground.
         load,
         0,
-        plus(vector(load, 0), cross(minus(point, vector(here, LINK_WORK.ORIGIN)), force)),
+        plus(vector(load, 0), cross(minus(point, vector(link_record, LINK_WORK.ORIGIN)), force)),
     )
     store_vector(load, 3, plus(vector(load, 3), force))
 

@@ -78,32 +78,32 @@ def restore_equations(m: Fit, y: Floats) -> bool:
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count, errors, step = count_equations(m), at(v, p[FIT.ERRORS]), at(v, p[FIT.STEP])
-    ranges, before = at(m.c, p[FIT.RANGES_AT]), inf
+    ranges, previous_error = at(m.c, p[FIT.RANGES_AT]), inf
     for _ in range(50):
         evaluate_pose(m, y)
         apply_couplers(m, y)
-        off = 0.0
+        largest_error = 0.0
         for k in range(count):
-            off = max(off, abs(errors[k]))
-        if off <= EXACT:
+            largest_error = max(largest_error, abs(errors[k]))
+        if largest_error <= EXACT:
             return True
         # Rounding may keep the errors above EXACT; then the search ends when they stop to halve.
-        if off <= 1e-9 and off >= 0.5 * before:
+        if largest_error <= 1e-9 and largest_error >= 0.5 * previous_error:
             return True
-        before = off
+        previous_error = largest_error
         free = list_free(m)
-        factor, right, room = free_equations(m, free, 0)
+        factor, right, work = free_equations(m, free, 0)
         rank = factorise_equations(count, free, factor, REDUNDANT * count)
-        solve_minimum_norm(count, free, factor, rank, right, room, step)
+        solve_minimum_norm(count, free, factor, rank, right, work, step)
         furthest = 0.0
         for k in range(free):
             furthest = max(furthest, abs(step[k]))
         # Steps of at most half a radian or metre keep the linearization valid.
-        part = 1.0 if furthest <= 0.5 else 0.5 / furthest
+        fraction = 1.0 if furthest <= 0.5 else 0.5 / furthest
         for k in range(free):
             freedom = p[p[FIT.FREE_AT] + k]
-            to = y[freedom] + part * step[k]
-            y[freedom] = min(max(to, ranges[2 * freedom]), ranges[2 * freedom + 1])
+            trial_value = y[freedom] + fraction * step[k]
+            y[freedom] = min(max(trial_value, ranges[2 * freedom]), ranges[2 * freedom + 1])
         set_dependents(m, y)
         if not is_finite(size, y):
             return False

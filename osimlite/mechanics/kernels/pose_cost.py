@@ -62,13 +62,13 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     for k in range(size * size):
         stiffness[k] = bend[k] = 0.0
     for link in range(model[MODEL.LINKS]):
-        here, turned = (
+        link_sums, turned = (
             at(link_work(model, data, link), LINK_WORK.INERTIA),
             at(v, p[FIT.TURNED] + 9 * link),
         )
         # Inertia and wrench of each link collect masses and forces of springs.
         for k in range(16):
-            here[k] = 0.0
+            link_sums[k] = 0.0
         for k in range(9):
             turned[k] = 0.0
     value = add_markers(m) + add_sensors(m)
@@ -81,9 +81,9 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
         )
         if weight > 0.0:
             # A goal is a spring on its coordinate.
-            off = y[freedom] - v[p[FIT.MEASURED] + goals + k]
-            value += 0.5 * weight * off * off
-            slope[freedom] += weight * off
+            deviation = y[freedom] - v[p[FIT.MEASURED] + goals + k]
+            value += 0.5 * weight * deviation * deviation
+            slope[freedom] += weight * deviation
             stiffness[size * freedom + freedom] += weight
     apply_couplers(m, y)
     return value
@@ -118,15 +118,15 @@ def convert_ball_columns(m: Fit, y: Floats, angles: Ints) -> None:
     columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
-    one, two, three = (
+    first_column, second_column, third_column = (
         at(columns, 6 * angles[0]),
         at(columns, 6 * angles[1]),
         at(columns, 6 * angles[2]),
     )
     for k in range(6):
-        a, b, c = one[k], two[k], three[k]
-        two[k] = c1 * b + s1 * c
-        three[k] = s2 * a - s1 * c2 * b + c1 * c2 * c
+        a, b, c = first_column[k], second_column[k], third_column[k]
+        second_column[k] = c1 * b + s1 * c
+        third_column[k] = s2 * a - s1 * c2 * b + c1 * c2 * c
 
 
 def add_markers(m: Fit) -> float:
@@ -145,17 +145,17 @@ def add_markers(m: Fit) -> float:
             continue
         point = station(model, data, link, vector(m.c, MARKER_NUMBERS * k))
         # Gradient of the cost by the position of the marker: the pull of the spring, reversed.
-        off = minus(point, vector(v, p[FIT.MEASURED] + 3 * k))
-        value += 0.5 * weight * dot(off, off)
+        deviation = minus(point, vector(v, p[FIT.MEASURED] + 3 * k))
+        value += 0.5 * weight * dot(deviation, deviation)
         if link < 0:
             continue
-        here = link_work(model, data, link)
+        link_record = link_work(model, data, link)
         i, load, turned = (
-            at(here, LINK_WORK.INERTIA),
-            at(here, LINK_WORK.WRENCH),
+            at(link_record, LINK_WORK.INERTIA),
+            at(link_record, LINK_WORK.WRENCH),
             at(v, p[FIT.TURNED] + 9 * link),
         )
-        pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
+        pull, arm = times(weight, deviation), minus(point, vector(link_record, LINK_WORK.ORIGIN))
         a, b, c = arm
         mx, my, mz = times(weight, arm)
         # Inertia of a point mass about the common origin.
@@ -190,10 +190,10 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     slope, stiffness, bend = at(v, p[FIT.SLOPE]), at(v, p[FIT.STIFFNESS]), at(v, p[FIT.BEND])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        j, here = link_ints(model, link), link_work(model, data, link)
+        j, link_record = link_ints(model, link), link_work(model, data, link)
         i, load, turned = (
-            at(here, LINK_WORK.INERTIA),
-            at(here, LINK_WORK.WRENCH),
+            at(link_record, LINK_WORK.INERTIA),
+            at(link_record, LINK_WORK.WRENCH),
             at(v, p[FIT.TURNED] + 9 * link),
         )
         # A subtree without measurements contributes nothing.
@@ -220,13 +220,13 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
                     k = freedoms[DOF.SIZE * k + DOF.ABOVE]
             add_joint_curvature(m, y, link, load, turned)
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
+            parent_sums = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # Inertia (10) and wrench (6) are adjacent, and both are summed.
             for k in range(16):
-                above[k] += i[k]
-            above = at(v, p[FIT.TURNED] + 9 * j[LINK.PARENT])
+                parent_sums[k] += i[k]
+            parent_sums = at(v, p[FIT.TURNED] + 9 * j[LINK.PARENT])
             for k in range(9):
-                above[k] += turned[k]
+                parent_sums[k] += turned[k]
 
 
 def apply_couplers(m: Fit, y: Floats) -> None:

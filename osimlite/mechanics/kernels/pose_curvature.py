@@ -60,18 +60,20 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floa
         turned: sum of forces times arms on the subtree.
     """
     p = m.p
-    places = at(p, p[FIT.AXES_AT])
-    for one in range(places[link], places[link + 1]):
-        turn, shift = axis_column(m, y, link, one)
+    axis_ranges = at(p, p[FIT.AXES_AT])
+    for outer_axis in range(axis_ranges[link], axis_ranges[link + 1]):
+        turn, shift = axis_column(m, y, link, outer_axis)
         carried = displaced_moment(load, turned, turn, shift)
         # An axis carries itself and those after it.
-        for other in range(places[link], one + 1):
-            around, _ = axis_column(m, y, link, other)
+        for inner_axis in range(axis_ranges[link], outer_axis + 1):
+            around, _ = axis_column(m, y, link, inner_axis)
             amount = dot(around, carried)
-            add_axis_product(m, y, other, one, amount)
-            if other < one:
-                add_axis_product(m, y, one, other, amount)
-        add_axis_curvature(m, y, one, dot(turn, vector(load, 0)) + dot(shift, vector(load, 3)))
+            add_axis_product(m, y, inner_axis, outer_axis, amount)
+            if inner_axis < outer_axis:
+                add_axis_product(m, y, outer_axis, inner_axis, amount)
+        add_axis_curvature(
+            m, y, outer_axis, dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
+        )
 
 
 def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
@@ -89,15 +91,17 @@ def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
     first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
     # Translations to the ellipsoid are functions of the first two angles.
     if axis[1] >= SLIDES:
-        second, part = model[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
+        second, axis_index = model[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
         s1, c1 = sine_cosine(y[first])
         s2, c2 = sine_cosine(y[second])
-        far = pull * m.reals[j[OPERATION.EXTRA] + part]
-        both = far * component((0.0, c1 * s2, s1 * s2), part)
-        bend[size * first + first] += far * component((0.0, s1 * c2, -c1 * c2), part)
-        bend[size * first + second] += both
-        bend[size * second + first] += both
-        bend[size * second + second] += far * component((-s2, s1 * c2, -c1 * c2), part)
+        scaled_pull = pull * m.reals[j[OPERATION.EXTRA] + axis_index]
+        mixed = scaled_pull * component((0.0, c1 * s2, s1 * s2), axis_index)
+        bend[size * first + first] += scaled_pull * component((0.0, s1 * c2, -c1 * c2), axis_index)
+        bend[size * first + second] += mixed
+        bend[size * second + first] += mixed
+        bend[size * second + second] += scaled_pull * component(
+            (-s2, s1 * c2, -c1 * c2), axis_index
+        )
     # With unit speeds the curvature of an operation is its second derivative.
     elif axis[1] < 0 and j[OPERATION.DOF] < 0 and j[OPERATION.ARGUMENT_COUNT] == 1 and first >= 0:
         bend[size * first + first] += (
@@ -134,18 +138,18 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     )
     around, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
     if axis[1] >= SLIDES:
-        part = axis[1] - SLIDES
+        axis_index = axis[1] - SLIDES
         sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
-        return ZERO, times(sign, (a[part], a[3 + part], a[6 + part]))
+        return ZERO, times(sign, (a[axis_index], a[3 + axis_index], a[6 + axis_index]))
     if axis[1] >= 0:
         # A column of a ball already is the axis of one angle, see `convert_ball_columns`.
         around = vector(
             data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]]
         )
-        far = multiply_elementwise(
+        end_position = multiply_elementwise(
             vector(m.reals, j[OPERATION.EXTRA]), third_axis(y, at(model, j[OPERATION.ARGUMENTS]))
         )
-        center = plus(center, turned_by(a, far))
+        center = plus(center, turned_by(a, end_position))
     elif j[OPERATION.MOTION] != MOTION.TURN:
         return ZERO, around
     return around, cross(
@@ -153,25 +157,25 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     )
 
 
-def add_axis_product(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
+def add_axis_product(m: Fit, y: Floats, first_axis: int, second_axis: int, amount: float) -> None:
     """Add to the Hessian a multiple of the product of two axes' derivatives by all coordinates.
 
     Args:
         m: the fit.
         y: state.
-        one: number of the first axis.
-        two: number of the second axis.
+        first_axis: number of the first axis.
+        second_axis: number of the second axis.
         amount: the multiple.
     """
     size, bend = m.model[MODEL.DOFS], at(m.v, m.p[FIT.BEND])
-    for k in range(count_arguments(m, one)):
-        first, gain = axis_argument(m, y, one, k)
+    for k in range(count_arguments(m, first_axis)):
+        first, gain = axis_argument(m, y, first_axis, k)
         if first < 0:
             continue
-        for other in range(count_arguments(m, two)):
-            second, more = axis_argument(m, y, two, other)
+        for argument in range(count_arguments(m, second_axis)):
+            second, second_gain = axis_argument(m, y, second_axis, argument)
             if second >= 0:
-                bend[size * first + second] += amount * gain * more
+                bend[size * first + second] += amount * gain * second_gain
 
 
 def count_arguments(m: Fit, number: int) -> int:
@@ -203,13 +207,13 @@ def axis_argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     model, axis = m.model, axis_ints(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
-        part = axis[1] - SLIDES
+        axis_index = axis[1] - SLIDES
         s1, c1 = sine_cosine(y[model[j[OPERATION.ARGUMENTS]]])
         s2, c2 = sine_cosine(y[model[j[OPERATION.ARGUMENTS] + 1]])
         slope = (0.0, -c1 * c2, -s1 * c2) if k == 0 else (c2, s1 * s2, -c1 * s2)
-        return model[j[OPERATION.ARGUMENTS] + k], m.reals[j[OPERATION.EXTRA] + part] * component(
-            slope, part
-        )
+        return model[j[OPERATION.ARGUMENTS] + k], m.reals[
+            j[OPERATION.EXTRA] + axis_index
+        ] * component(slope, axis_index)
     if axis[1] >= 0:
         return model[j[OPERATION.ARGUMENTS] + axis[1]], 1.0
     if j[OPERATION.DOF] >= 0:

@@ -139,80 +139,88 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     """
     v, p, size = m.v, m.p, m.model[MODEL.DOFS]
     history = at(v, p[FIT.HISTORY])
-    previous_count, last, trial = int(history[0]), at(history, 1), at(v, p[FIT.TRIAL])
-    seen = compute_weights(m)
+    previous_count, last_pose, trial = int(history[0]), at(history, 1), at(v, p[FIT.TRIAL])
+    has_measurements = compute_weights(m)
     if previous_count > 0:
-        copy_numbers(size, last, y)
+        copy_numbers(size, last_pose, y)
     if not fulfil_constraints(m, y):
         evaluate_pose(m, y)
         return inf, 0, APART
-    if not seen:
+    if not has_measurements:
         evaluate_pose(m, y)
         return 0.0, 0, UNSEEN
     note_pattern(m, y)
     value, is_vague = inf, v[p[FIT.PATTERN] + p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]] > 0.0
     # Two previous poses allow linear extrapolation of the motion, unless poses fit alike.
     if previous_count > 1 and not is_vague:
-        before = at(last, size)
+        earlier_pose = at(last_pose, size)
         for k in range(size):
             trial[k] = (
-                y[k] if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.IDLE else 2.0 * last[k] - before[k]
+                y[k]
+                if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.IDLE
+                else 2.0 * last_pose[k] - earlier_pose[k]
             )
         if fulfil_constraints(m, trial):
             value = evaluate_cost(m, trial)
     # If the extrapolated pose costs much more than the previous one, compare it with that.
     if not value < 4.0 * history[1 + POSES * size] + 1e-8:
-        other = evaluate_cost(m, y)
-        if not value < other:
+        last_cost = evaluate_cost(m, y)
+        if not value < last_cost:
             copy_numbers(size, y, trial)
-        value = other if not value < other else evaluate_cost(m, trial)
+        value = last_cost if not value < last_cost else evaluate_cost(m, trial)
     lightest, start = VAGUE if is_vague else LIGHTEST, at(history, 2 + POSES * size)
     if previous_count == 0:
-        copy_numbers(size, trial, last)
+        copy_numbers(size, trial, last_pose)
     copy_numbers(size, trial, start)
     value, steps, status = descend_to_minimum(m, trial, y, value, lightest, lightest)
     if previous_count == 0:
         # From far away a descent may end in several minima. Small steps find others than large
         # ones, and starts inside the ranges keep coordinates from being held at their ends early.
-        value, more, status = descend_again(m, start, y, value, status, FIRST_DAMPING, lightest)
-        steps += more
+        value, added_steps, status = descend_again(
+            m, start, y, value, status, FIRST_DAMPING, lightest
+        )
+        steps += added_steps
         for inwards in range(2):
-            start_inwards(m, last, start, 2.0 * INWARDS * (1 + inwards))
-            value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
-            steps += more
+            start_inwards(m, last_pose, start, 2.0 * INWARDS * (1 + inwards))
+            value, added_steps, status = descend_again(
+                m, start, y, value, status, SMALL_STEPS, lightest
+            )
+            steps += added_steps
         for number in range(2 * size):
-            if start_turned(m, last, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
-                value, more, status = descend_again(
+            if start_turned(m, last_pose, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
+                value, added_steps, status = descend_again(
                     m, start, y, value, status, SMALL_STEPS, lightest
                 )
-                steps += more
+                steps += added_steps
     # Coordinates held at ends of their ranges may have left the way to a better minimum.
     if start_off_ends(m, y, start):
-        value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
-        steps += more
-    value, more, status = try_other_ends(m, start, y, value, status, lightest)
-    steps += more
+        value, added_steps, status = descend_again(m, start, y, value, status, lightest, lightest)
+        steps += added_steps
+    value, added_steps, status = try_other_ends(m, start, y, value, status, lightest)
+    steps += added_steps
     for number in range(size):
         if start_upside_down(m, y, start, number):
             upright = value
-            value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
-            steps += more
+            value, added_steps, status = descend_again(
+                m, start, y, value, status, SMALL_STEPS, lightest
+            )
+            steps += added_steps
             # A pose that was better upside down may need other full turns, too.
             if value < upright:
-                value, more, status = try_other_ends(m, start, y, value, status, lightest)
-                steps += more
+                value, added_steps, status = try_other_ends(m, start, y, value, status, lightest)
+                steps += added_steps
     # Of poses that fit alike, the first frame reports the one without full turns.
-    if previous_count == 0 and remove_full_turns(m, y, last, start, value):
-        value, more, status = descend_to_minimum(
+    if previous_count == 0 and remove_full_turns(m, y, last_pose, start, value):
+        value, added_steps, status = descend_to_minimum(
             m, start, y, evaluate_cost(m, start), lightest, lightest
         )
-        steps += more
+        steps += added_steps
     free_ends(m)
-    before = at(last, size)
+    earlier_pose = at(last_pose, size)
     for k in range(size):
         # A full turn, from one end of a range to the other, is no motion to extrapolate.
-        before[k] = last[k] + 2.0 * pi * floor((y[k] - last[k]) / (2.0 * pi) + 0.5)
-    copy_numbers(size, y, last)
+        earlier_pose[k] = last_pose[k] + 2.0 * pi * floor((y[k] - last_pose[k]) / (2.0 * pi) + 0.5)
+    copy_numbers(size, y, last_pose)
     history[0], history[1 + POSES * size] = min(previous_count + 1.0, float(POSES)), value
     evaluate_pose(m, y)
     return value, steps, status
@@ -305,8 +313,10 @@ def try_other_ends(
     steps = 0
     for number in range(m.model[MODEL.DOFS]):
         if start_full_turn(m, y, start, number):
-            value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
-            steps += more
+            value, added_steps, status = descend_again(
+                m, start, y, value, status, lightest, lightest
+            )
+            steps += added_steps
     return value, steps, status
 
 
@@ -331,13 +341,13 @@ def compute_weights(m: Fit) -> bool:
             numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
         )
     # OpenSim normalizes the weights of markers and sensors, each over those that are measured.
-    seen = normalize_weights(markers, weights)
-    seen = normalize_weights(sensors, at(weights, markers)) or seen
+    has_measurements = normalize_weights(markers, weights)
+    has_measurements = normalize_weights(sensors, at(weights, markers)) or has_measurements
     numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
     for k in range(p[FIT.GOALS]):
         weights[markers + sensors + k] = numbers[k] if is_finite(1, at(goals, k)) else 0.0
-        seen = seen or weights[markers + sensors + k] > 0.0
-    return seen
+        has_measurements = has_measurements or weights[markers + sensors + k] > 0.0
+    return has_measurements
 
 
 def normalize_weights(count: int, weights: Floats) -> bool:
@@ -376,7 +386,7 @@ def descend_to_minimum(
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     step = at(v, p[FIT.STEP])
-    before, bends, status = inf, damping == LIGHTEST, STUCK
+    previous_length, bends, status = inf, damping == LIGHTEST, STUCK
     copy_numbers(size, start, y)
     steps = 0
     clear_curvature(m)
@@ -404,13 +414,13 @@ def descend_to_minimum(
             # Convergence is judged by the ratio of successive steps: the remaining distance is
             # estimated by a geometric series.
             value = new
-            shrinking = length / before if before < inf else 1.0
+            shrinking = length / previous_length if previous_length < inf else 1.0
             if length <= FINEST or (
                 shrinking < 0.5 and length * shrinking <= FINEST * (1.0 - shrinking)
             ):
                 status = FITTED
                 break
-            before = length if damping == lightest else inf
+            previous_length = length if damping == lightest else inf
             damping = max(0.1 * damping, lightest)
             # Where poses fit alike, use the complete Hessian last: far from the minimum it is
             # misleading.
@@ -420,7 +430,11 @@ def descend_to_minimum(
                 # No better pose can be distinguished from this one.
                 status = FITTED
                 break
-            damping, bends, before = max(10.0 * damping, FIRST_DAMPING), steps >= PATIENCE, inf
+            damping, bends, previous_length = (
+                max(10.0 * damping, FIRST_DAMPING),
+                steps >= PATIENCE,
+                inf,
+            )
             if damping > HEAVIEST:
                 break
             evaluate_cost(m, y)

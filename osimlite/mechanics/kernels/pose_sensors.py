@@ -53,29 +53,29 @@ def add_sensors(m: Fit) -> float:
         weight, link = v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + k], p[p[FIT.SENSOR_AT] + k]
         if not weight > 0.0:
             continue
-        off = sensor_rotation(m, k)
-        square = dot(off, off)
+        deviation = sensor_rotation(m, k)
+        square = dot(deviation, deviation)
         value += 0.5 * weight * square
         if link < 0:
             continue
-        here = link_work(model, data, link)
+        link_record = link_work(model, data, link)
         i, load, turned = (
-            at(here, LINK_WORK.INERTIA),
-            at(here, LINK_WORK.WRENCH),
+            at(link_record, LINK_WORK.INERTIA),
+            at(link_record, LINK_WORK.WRENCH),
             at(v, p[FIT.TURNED] + 9 * link),
         )
         # Symmetric part of the derivative of the spring's torque: weight (1 + c [phi]^2).
-        x, y, z = times(weight * squared_factor(sqrt(square)), off)
-        a, b, c = off
+        x, y, z = times(weight * squared_factor(sqrt(square)), deviation)
+        a, b, c = deviation
         i[4] += weight - (y * b + z * c)
         i[5] += weight - (x * a + z * c)
         i[6] += weight - (x * a + y * b)
         i[7] += x * b
         i[8] += x * c
         i[9] += y * c
-        store_vector(load, 0, add_scaled(vector(load, 0), weight, off))
+        store_vector(load, 0, add_scaled(vector(load, 0), weight, deviation))
         # Antisymmetric part, weight [phi] / 2, which belongs to the sums of forces times arms.
-        a, b, c = times(0.5 * weight, off)
+        a, b, c = times(0.5 * weight, deviation)
         store_vector(turned, 0, plus(vector(turned, 0), (0.0, -c, b)))
         store_vector(turned, 3, plus(vector(turned, 3), (c, 0.0, -a)))
         store_vector(turned, 6, plus(vector(turned, 6), (-b, a, 0.0)))

@@ -167,7 +167,7 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     Returns:
         Whether the degree of freedom is at an end of its range and such angles exist.
     """
-    link, others = joint_to_ground(m, freedom), 0
+    link, other_angles = joint_to_ground(m, freedom), 0
     if link < 0 or not is_at_end(m, y, freedom):
         return False
     copy_numbers(m.model[MODEL.DOFS], y, start)
@@ -175,12 +175,12 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     j, ranges = link_ints(m.model, link), at(m.c, m.p[FIT.RANGES_AT])
     for k in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
         if k != freedom and is_angle(m, k):
-            others += 1
+            other_angles += 1
             # Half a turn in either direction; ranges may allow only one of them.
             start[k] = y[k] - pi if y[k] - pi >= ranges[2 * k] else y[k] + pi
             if start[k] > ranges[2 * k + 1]:
                 return False
-    return others == 2 and is_angle(m, freedom)
+    return other_angles == 2 and is_angle(m, freedom)
 
 
 def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
@@ -226,11 +226,11 @@ def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: fl
     copy_numbers(size, y, start)
     for k in range(size):
         # Rounding to the nearest integer by floor is the same in all languages of the kernels.
-        turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
-        near = y[k] - 2.0 * pi * turns
-        if turns != 0.0 and ranges[2 * k] <= near <= ranges[2 * k + 1]:
+        turn_count = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
+        reduced_value = y[k] - 2.0 * pi * turn_count
+        if turn_count != 0.0 and ranges[2 * k] <= reduced_value <= ranges[2 * k + 1]:
             copy_numbers(size, start, trial)
-            trial[k] = near
+            trial[k] = reduced_value
             # Only rounding may raise the cost, by a relative amount or, if it is almost 0, an
             # absolute one.
             if (

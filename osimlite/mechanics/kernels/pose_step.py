@@ -90,10 +90,10 @@ def find_ends(m: Fit, y: Floats) -> None:
             or p[p[FIT.RESOLVED_AT] + k] == FREEDOM.AT_END
         ):
             low, high = ranges[2 * k], ranges[2 * k + 1]
-            out = (
+            is_at_end_of_range = (
                 (y[k] <= low and slope[k] > 0.0) or (y[k] >= high and slope[k] < 0.0) or low == high
             )
-            p[p[FIT.RESOLVED_AT] + k] = FREEDOM.AT_END if out else FREEDOM.VARIABLE
+            p[p[FIT.RESOLVED_AT] + k] = FREEDOM.AT_END if is_at_end_of_range else FREEDOM.VARIABLE
 
 
 def free_ends(m: Fit) -> None:
@@ -128,18 +128,22 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
         if solution < 0:
             return False
         result = at(v, solution)
-        again = False
+        has_left_range = False
         for k in range(free):
             freedom = p[p[FIT.FREE_AT] + k]
-            to = y[freedom] + result[k]
-            end = ranges[2 * freedom] if to < ranges[2 * freedom] else ranges[2 * freedom + 1]
-            if to < ranges[2 * freedom] or to > ranges[2 * freedom + 1]:
-                step[freedom], p[p[FIT.RESOLVED_AT] + freedom], again = (
+            trial_value = y[freedom] + result[k]
+            end = (
+                ranges[2 * freedom]
+                if trial_value < ranges[2 * freedom]
+                else ranges[2 * freedom + 1]
+            )
+            if trial_value < ranges[2 * freedom] or trial_value > ranges[2 * freedom + 1]:
+                step[freedom], p[p[FIT.RESOLVED_AT] + freedom], has_left_range = (
                     end - y[freedom],
                     FREEDOM.AT_END,
                     True,
                 )
-        if not again:
+        if not has_left_range:
             for k in range(free):
                 step[p[p[FIT.FREE_AT] + k]] = result[k]
             return True
@@ -171,17 +175,21 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
     for k in range(free):
         freedom = p[p[FIT.FREE_AT] + k]
         # Steps that are known already move to the right side.
-        row, more, total = at(stiffness, size * freedom), at(bend, size * freedom), -slope[freedom]
+        row, bend_row, total = (
+            at(stiffness, size * freedom),
+            at(bend, size * freedom),
+            -slope[freedom],
+        )
         constraint_row = at(v, p[FIT.CURVES] + (size * freedom if count > 0 else 0))
         for j in range(size):
             if p[p[FIT.RESOLVED_AT] + j] == FREEDOM.AT_END:
-                total -= (row[j] + bent * more[j]) * step[j]
+                total -= (row[j] + bent * bend_row[j]) * step[j]
         solution[k] = total
         for j in range(free):
-            other = p[p[FIT.FREE_AT] + j]
-            matrix[free * k + j] = row[other] + bent * more[other]
+            column = p[p[FIT.FREE_AT] + j]
+            matrix[free * k + j] = row[column] + bent * bend_row[column]
             if count > 0:
-                matrix[free * k + j] += bent * constraint_row[other]
+                matrix[free * k + j] += bent * constraint_row[column]
         # Levenberg-Marquardt damping relative to the stiffness, plus a part for coordinates without
         # any.
         matrix[free * k + k] += damping * (row[freedom] + SOFTEST)
@@ -214,37 +222,37 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     factor, right, work = free_equations(m, free, 1)
     rank = factorise_equations(count, free, factor, REDUNDANT * count)
     solve_minimum_norm(count, free, factor, rank, right, work, across)
-    left = free - rank
+    dimension = free - rank
     write_null_space(free, factor, rank, directions)
     # Gradient after that step.
     for k in range(free):
         for j in range(free):
             solution[k] -= matrix[free * k + j] * across[j]
-    rhs = at(reduced, left * left)
+    rhs = at(reduced, dimension * dimension)
     # Projections of gradient and Hessian on the null space.
-    for k in range(left):
+    for k in range(dimension):
         row = at(directions, free * k)
         rhs[k] = 0.0
         for j in range(free):
             rhs[k] += row[j] * solution[j]
-    for k in range(left):
+    for k in range(dimension):
         row = at(directions, free * k)
-        product = at(rhs, left)
+        product = at(rhs, dimension)
         for i in range(free):
             product[i] = 0.0
             for j in range(free):
                 product[i] += matrix[free * i + j] * row[j]
-        for other in range(k + 1):
-            total, second = 0.0, at(directions, free * other)
+        for column in range(k + 1):
+            total, second = 0.0, at(directions, free * column)
             for i in range(free):
                 total += second[i] * product[i]
-            reduced[left * k + other] = reduced[left * other + k] = total
-    if not factorise_cholesky(left, reduced, smallest):
+            reduced[dimension * k + column] = reduced[dimension * column + k] = total
+    if not factorise_cholesky(dimension, reduced, smallest):
         return -1
-    solve_cholesky(left, reduced, rhs)
+    solve_cholesky(dimension, reduced, rhs)
     for j in range(free):
         total = across[j]
-        for k in range(left):
+        for k in range(dimension):
             total += directions[free * k + j] * rhs[k]
         solution[j] = total
     return offset

@@ -40,7 +40,7 @@ def look(
     Returns:
         `OUTCOME.OK`, or the outcome of the evaluation that failed.
     """
-    size, room, count, moving, law, selected = (
+    size, work_size, count, moving, law, selected = (
         model[MODEL.STATE_SIZE],
         model[MODEL.WORK_SIZE],
         order[0],
@@ -61,9 +61,9 @@ def look(
             return status
         row = at(results, selected * number)
         for k in range(selected):
-            place = order[4 + k]
+            offset = order[4 + k]
             # Indices beyond data refer to f, so that one list selects from both.
-            row[k] = data[place] if place < room else f[place - room]
+            row[k] = data[offset] if offset < work_size else f[offset - work_size]
     return OUTCOME.OK
 
 
@@ -120,13 +120,13 @@ def push_each(
             row[k] = applied[k]
         for actuator in range(actuators):
             actuator_record = at(order, 2 + 4 * actuator)
-            to = at(row, freedoms + actuator * (freedoms + 1))
+            actuator_row = at(row, freedoms + actuator * (freedoms + 1))
             # One actuator at a time, from empty wrenches.
             clear_wrenches(model, data)
             for k in range(freedoms):
                 applied[k] = 0.0
             if actuator_record[2] >= 0:
-                to[freedoms] = data[actuator_record[3]]
+                actuator_row[freedoms] = data[actuator_record[3]]
                 pull_path(model, reals, data, y, f, actuator_record[2], data[actuator_record[3]])
             else:
                 # All other controls are 0, and forces are linear in the control.
@@ -140,12 +140,12 @@ def push_each(
                     f,
                     actuator_record[0],
                 )
-                data[actuator_record[1]], to[freedoms] = 0.0, 1.0
+                data[actuator_record[1]], actuator_row[freedoms] = 0.0, 1.0
                 if status != OUTCOME.OK:
                     return status
             add_generalized_forces(model, data, applied)
             for k in range(freedoms):
-                to[k] = applied[k]
+                actuator_row[k] = applied[k]
     return OUTCOME.OK
 
 
@@ -179,8 +179,8 @@ def watch(
     """
     # The list has three parts: indices of results, indices to clear, and items.
     size, selected, cleared = model[MODEL.STATE_SIZE], order[0], order[1]
-    places, clears = at(order, 2), at(order, 2 + selected)
-    items = at(order, 2 + selected + cleared)
+    offsets, clears = at(order, 2), at(order, 2 + selected)
+    path_indices = at(order, 2 + selected + cleared)
     outcome = OUTCOME.OK
     for number in range(count):
         for k in range(size):
@@ -189,7 +189,7 @@ def watch(
         for k in range(cleared):
             data[clears[k]] = 0.0
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
-        first, end = items[number], items[number] + 1
+        first, end = path_indices[number], path_indices[number] + 1
         if first < 0:
             first, end = 0, model[MODEL.ITEMS]
         for k in range(first, end):
@@ -198,6 +198,6 @@ def watch(
                 status = call(model[item + ITEM.LAW], model, reals, data, y, f, item)
         for k in range(selected):
             # A state that fails must not look like a result.
-            results[selected * number + k] = data[places[k]] if status == OUTCOME.OK else nan
+            results[selected * number + k] = data[offsets[k]] if status == OUTCOME.OK else nan
         outcome = outcome if status == OUTCOME.OK else status
     return outcome

@@ -43,41 +43,45 @@ def run_program(
     # The operations are tested in the order of STEPS.
     value = 0.0
     for k in range(count):
-        kind, one, two = steps[3 * k], steps[3 * k + 1], steps[3 * k + 2]
-        if kind == 0:
-            value = constants[one]
+        operation, first_register, second_register = (
+            steps[3 * k],
+            steps[3 * k + 1],
+            steps[3 * k + 2],
+        )
+        if operation == 0:
+            value = constants[first_register]
         else:
-            a, b = registers[one], registers[two]
-            if kind == 1:
+            a, b = registers[first_register], registers[second_register]
+            if operation == 1:
                 value = a + b
-            elif kind == 2:
+            elif operation == 2:
                 value = a - b
-            elif kind == 3:
+            elif operation == 3:
                 value = a * b
-            elif kind == 4:
+            elif operation == 4:
                 value = -a
-            elif kind == 5:
+            elif operation == 5:
                 value = divide(a, b)
-            elif kind == 6:
+            elif operation == 6:
                 value = power(a, b)
-            elif kind == 7:
+            elif operation == 7:
                 value = smaller(a, b)
-            elif kind == 8:
+            elif operation == 8:
                 value = larger(a, b)
             else:
-                value = of_one(kind - 9, a)
+                value = of_one(operation - 9, a)
         registers[variables + k] = value
     return value
 
 
 def run_binary_program(
-    one: float, two: float, steps: Ints, constants: Floats, registers: Floats
+    first_value: float, second_value: float, steps: Ints, constants: Floats, registers: Floats
 ) -> float:
     """Run a program of two variables.
 
     Args:
-        one: first variable.
-        two: second variable.
+        first_value: first variable.
+        second_value: second variable.
         steps: number of steps, then the steps.
         constants: numbers of the formula.
         registers: workspace of 2 registers and one for each step.
@@ -85,5 +89,5 @@ def run_binary_program(
     Returns:
         Result of the program.
     """
-    registers[0], registers[1] = one, two
+    registers[0], registers[1] = first_value, second_value
     return run_program(at(steps, 1), steps[0], constants, registers, 2)

@@ -138,13 +138,13 @@ def project_values(
         for k in range(size):
             # Speeds are copied, since the evaluation of velocities needs a complete state.
             following[k], following[size + k] = y[k] - step[k], y[size + k]
-        before, norm = norm, inf
+        previous_norm, norm = norm, inf
         if evaluate_equations(model, reals, data, following) == OUTCOME.OK:
             norm = collect_position_errors(model, data, errors)
         # As in Simbody, the first step is accepted even if it increases the errors; a later one
         # that does ends the search.
-        if iteration > 0 and not norm <= before:
-            norm = before
+        if iteration > 0 and not norm <= previous_norm:
+            norm = previous_norm
             break
         for k in range(size):
             y[k] = following[k]

@@ -258,8 +258,8 @@ def note_events(
     t1: float,
     y1: Floats,
     f1: Floats,
-    before: Floats,
-    after: Floats,
+    previous_levels: Floats,
+    next_levels: Floats,
 ) -> float:
     """Record what began and ended within a step.
 
@@ -271,8 +271,8 @@ def note_events(
         t1: time at the end of the step (s).
         y1: state at the end.
         f1: its rates.
-        before: levels at the start.
-        after: levels at the end, then workspace for levels.
+        previous_levels: levels at the start.
+        next_levels: levels at the end, then workspace for levels.
 
     Returns:
         The time at which an event stops the run (s), or infinity.
@@ -287,10 +287,10 @@ def note_events(
     )
     # WORK_STATE has room for STATES states, and `integrate_run` uses the first four.
     ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
-    fa, result = at(ya, size), at(after, total)
+    fa, result = at(ya, size), at(next_levels, total)
     for number in range(total):
-        rises = after[number] > 0.0
-        if rises == (before[number] > 0.0):
+        rises = next_levels[number] > 0.0
+        if rises == (previous_levels[number] > 0.0):
             continue
         low, high = t0, t1
         # Bisect the interpolated motion for the change of sign.

@@ -183,15 +183,15 @@ def delayed_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay: fl
         delay: delay (control steps).
     """
     # Before the start a delayed sensor has its first value.
-    back, latest = min(delay, frames - 1.0), frames - 1
-    whole = floor(back + NEAR)
-    part = min(max(back - whole, 0.0), 1.0)
-    near = int(latest - whole)
+    delay_frames, latest = min(delay, frames - 1.0), frames - 1
+    full_frames = floor(delay_frames + NEAR)
+    fraction = min(max(delay_frames - full_frames, 0.0), 1.0)
+    frame = int(latest - full_frames)
     size, width = i[REFLEXES.KEPT], i[REFLEXES.SENSORS]
-    value = history[width * (near % size) + sensor]
+    value = history[width * (frame % size) + sensor]
     # The ring buffer holds KEPT rows, the newest one at frames - 1.
-    other = history[width * (max(near - 1, 0) % size) + sensor]
-    return value + part * (other - value)
+    earlier_value = history[width * (max(frame - 1, 0) % size) + sensor]
+    return value + fraction * (earlier_value - value)
 
 
 def update_leg_states(
@@ -209,22 +209,34 @@ def update_leg_states(
         legs: states of the legs (2,); changed.
     """
     # Loads are the first two sensors, and are delayed like all others.
-    one, two = (
+    first_load, second_load = (
         delayed_sensor(i, frames, history, 0, p[0]),
         delayed_sensor(i, frames, history, 1, p[0]),
     )
-    first, second = foot_lead(senses, row, 0), foot_lead(senses, row, 1)
-    of_one, of_two, is_direct = (
+    first_lead, second_lead = foot_lead(senses, row, 0), foot_lead(senses, row, 1)
+    first_limits, second_limits, is_direct = (
         at(p, 1),
         at(p, 1 + LIMITS.OF_LEG),
         i[REFLEXES.SWINGS_FROM_STANCE] > 0,
     )
     states = int(legs[0]), int(legs[1])
     legs[0] = next_leg_state(
-        states[0], of_one, one, two > of_two[LIMITS.STANDS], first, second, is_direct
+        states[0],
+        first_limits,
+        first_load,
+        second_load > second_limits[LIMITS.STANDS],
+        first_lead,
+        second_lead,
+        is_direct,
     )
     legs[1] = next_leg_state(
-        states[1], of_two, two, one > of_one[LIMITS.STANDS], second, first, is_direct
+        states[1],
+        second_limits,
+        second_load,
+        first_load > first_limits[LIMITS.STANDS],
+        second_lead,
+        first_lead,
+        is_direct,
     )
 
 
@@ -233,8 +245,8 @@ def next_leg_state(
     limits: Floats,
     load: float,
     other_stands: bool,
-    here: float,
-    other: float,
+    foot_offset: float,
+    other_foot_offset: float,
     is_direct: bool,
 ) -> int:
     """Return the next state of a leg.
@@ -244,14 +256,14 @@ def next_leg_state(
         limits: numbers of the leg, see `LIMITS`.
         load: load on the leg over the weight.
         other_stands: whether the other leg stands.
-        here: how far its foot is ahead (m).
-        other: how far the foot of the other leg is ahead (m).
+        foot_offset: how far its foot is ahead (m).
+        other_foot_offset: how far the foot of the other leg is ahead (m).
         is_direct: whether it may go from stance to swing directly.
     """
     stands, swings = load > limits[LIMITS.STANDS], load <= limits[LIMITS.SWINGS]
-    late, lands = here < limits[LIMITS.LATE], here > limits[LIMITS.LANDS]
+    late, lands = foot_offset < limits[LIMITS.LATE], foot_offset > limits[LIMITS.LANDS]
     # Liftoff begins as soon as the other leg stands with its foot ahead.
-    follows = other_stands and here < other
+    follows = other_stands and foot_offset < other_foot_offset
     # The first control step decides by the load alone.
     if state == LEG_STATE.UNKNOWN and not stands:
         return LEG_STATE.LANDING if lands else LEG_STATE.SWING
@@ -267,14 +279,16 @@ def next_leg_state(
         )
     if state == LEG_STATE.LATE_STANCE:
         return (
-            LEG_STATE.LIFTOFF if follows or here < limits[LIMITS.LEAVES] else LEG_STATE.LATE_STANCE
+            LEG_STATE.LIFTOFF
+            if follows or foot_offset < limits[LIMITS.LEAVES]
+            else LEG_STATE.LATE_STANCE
         )
     if state == LEG_STATE.LIFTOFF:
         return LEG_STATE.SWING if swings else LEG_STATE.LIFTOFF
     if state == LEG_STATE.SWING:
         if stands:
             # A foot that touches behind the other one has stumbled, and stays in swing.
-            return LEG_STATE.EARLY_STANCE if here > other else LEG_STATE.SWING
+            return LEG_STATE.EARLY_STANCE if foot_offset > other_foot_offset else LEG_STATE.SWING
         return LEG_STATE.LANDING if lands else LEG_STATE.SWING
     return LEG_STATE.EARLY_STANCE if stands else LEG_STATE.LANDING
 
@@ -295,11 +309,11 @@ def add_reflexes(
     terms, count = at(i, REFLEXES.HEAD), i[REFLEXES.TERMS]
     gates, numbers = at(terms, TERM.SIZE * count), at(p, LIMITS.HEAD)
     for k in range(count):
-        term, own = at(terms, TERM.SIZE * k), at(numbers, OF_EACH * k)
+        term, term_numbers = at(terms, TERM.SIZE * k), at(numbers, OF_EACH * k)
         # The states in which a term is active are bits of an integer.
         if term[TERM.STATES] >> int(legs[term[TERM.LEG]]) & 1 == 0:
             continue
-        value = own[1]
+        value = term_numbers[1]
         if term[TERM.SENSOR] >= 0:
             gate = term[TERM.GATE]
             # A suppressed term is skipped, without changing the other terms.
@@ -307,14 +321,17 @@ def add_reflexes(
                 i, at(gates, OF_GATE * gate), at(numbers, OF_EACH * (count + gate)), frames, history
             ):
                 continue
-            value = delayed_sensor(i, frames, history, term[TERM.SENSOR], own[0]) - own[2]
+            value = (
+                delayed_sensor(i, frames, history, term[TERM.SENSOR], term_numbers[0])
+                - term_numbers[2]
+            )
             if term[TERM.KIND] == TERM_TYPE.OF_SENSOR:
                 value = max(value, 0.0)
-            value *= own[1]
+            value *= term_numbers[1]
             if term[TERM.KIND] == TERM_TYPE.OF_RESULT:
                 value = max(value, 0.0)
         else:
-            since = frames - 1.0 - own[0]
+            since = frames - 1.0 - term_numbers[0]
             # The term begins at its delay, up to rounding.
             if since < -NEAR:
                 continue
@@ -323,7 +340,7 @@ def add_reflexes(
         result[term[TERM.TARGET]] += value
 
 
-def is_suppressed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats) -> bool:
+def is_suppressed(i: Ints, gate: Ints, gate_numbers: Floats, frames: int, history: Floats) -> bool:
     """Return whether a gate suppresses a term.
 
     It does if its coordinate is beyond the range and moves further away.
@@ -331,31 +348,35 @@ def is_suppressed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats
     Args:
         i: integers of the reflexes.
         gate: integers of the gate.
-        own: numbers of the gate: delay, smallest and largest value.
+        gate_numbers: numbers of the gate: delay, smallest and largest value.
         frames: number of sensor rows.
         history: ring buffer of sensors.
     """
-    value = delayed_sensor(i, frames, history, gate[0], own[0])
-    speed = delayed_sensor(i, frames, history, gate[1], own[0])
-    return (value < own[1] and speed < 0.0) or (value > own[2] and speed >= 0.0)
+    value = delayed_sensor(i, frames, history, gate[0], gate_numbers[0])
+    speed = delayed_sensor(i, frames, history, gate[1], gate_numbers[0])
+    return (value < gate_numbers[1] and speed < 0.0) or (value > gate_numbers[2] and speed >= 0.0)
 
 
-def draw_normal(seed: int, what: int, step: int, number: int) -> float:
+def draw_normal(seed: int, purpose: int, step: int, number: int) -> float:
     """Return a normally distributed number of mean 0 and deviation 1, by the method of Box and Muller.
 
     Args:
         seed: seed of 64 bits.
-        what: stream, CONTROLS or SENSORS of `NOISE`.
+        purpose: stream, CONTROLS or SENSORS of `NOISE`.
         step: number of the control step.
         number: number of the control or sensor.
     """
     # A counter-based generator: noise depends on step and number only, not on the order of calls.
-    one, two = philox(int(step) & WORD, int(number), what, 0, seed & WORD, (seed >> 32) & WORD)
+    first_word, second_word = philox(
+        int(step) & WORD, int(number), purpose, 0, seed & WORD, (seed >> 32) & WORD
+    )
     # Add 1 to the first word, since the logarithm of 0 is infinite.
-    return sqrt(-2.0 * log((one + 1.0) / (WORD + 1.0))) * cos(2.0 * pi * two / (WORD + 1.0))
+    return sqrt(-2.0 * log((first_word + 1.0) / (WORD + 1.0))) * cos(
+        2.0 * pi * second_word / (WORD + 1.0)
+    )
 
 
-def philox(a: int, b: int, c: int, d: int, key: int, other: int) -> tuple[int, int]:
+def philox(a: int, b: int, c: int, d: int, first_key: int, second_key: int) -> tuple[int, int]:
     """Return the first two words of Philox4x32-10.
 
     Source: J. K. Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011.
@@ -365,15 +386,15 @@ def philox(a: int, b: int, c: int, d: int, key: int, other: int) -> tuple[int, i
         b: second word.
         c: third word.
         d: fourth word.
-        key: first word of the key.
-        other: second word of the key.
+        first_key: first word of the key.
+        second_key: second word of the key.
 
     Returns:
         Two words of 32 bits.
     """
     for _ in range(10):
-        one, two = 0xD2511F53 * a, 0xCD9E8D57 * c
-        a, b = ((two >> 32) & WORD) ^ b ^ key, two & WORD
-        c, d = ((one >> 32) & WORD) ^ d ^ other, one & WORD
-        key, other = (key + 0x9E3779B9) & WORD, (other + 0xBB67AE85) & WORD
+        first_product, second_product = 0xD2511F53 * a, 0xCD9E8D57 * c
+        a, b = ((second_product >> 32) & WORD) ^ b ^ first_key, second_product & WORD
+        c, d = ((first_product >> 32) & WORD) ^ d ^ second_key, first_product & WORD
+        first_key, second_key = (first_key + 0x9E3779B9) & WORD, (second_key + 0xBB67AE85) & WORD
     return a, b

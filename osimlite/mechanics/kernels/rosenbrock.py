@@ -69,8 +69,8 @@ def _divide_by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
     """Return a row times the inverse of GAMMA."""
     result = [0.0] * STAGES
     for j in range(STAGES - 1, -1, -1):
-        rest = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
-        result[j] = (row[j] - rest) / DIAGONAL
+        known_sum = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
+        result[j] = (row[j] - known_sum) / DIAGONAL
     return tuple(result)
 
 
@@ -101,7 +101,9 @@ WORTH = 1.1
 """Smallest factor with which a step is made longer."""
 
 
-def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def rosenbrock(
+    model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, offset: int
+) -> int:
     """Try one step from y0, which is followed by its derivative, to y1.
 
     Args:
@@ -110,13 +112,13 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
-        place: offset of the method's record in data.
+        offset: offset of the method's record in data.
 
     Returns:
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
     size = model[MODEL.STATE_SIZE]
-    h = at(data, place)
+    h = at(data, offset)
     stages, work = at(h, HEAD), at(h, HEAD + STATES * size)
     errors, f1 = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
     t0, accuracy, step = h[METHOD_WORK.REACHED], h[METHOD_WORK.ACCEPTED], h[METHOD_WORK.NEXT_STEP]

@@ -29,7 +29,7 @@ def run_several(
     model: Ints,
     reals: Floats,
     data: Floats,
-    each: int,
+    number_count: int,
     sizes: Ints,
     clocks: Floats,
     counts: Ints,
@@ -44,15 +44,15 @@ def run_several(
     levels: Floats,
     endings: Ints,
     first: int,
-    last: int,
+    stop: int,
 ) -> int:
-    """Integrate the runs `first` to `last` - 1, each on its own rows.
+    """Integrate the runs `first` to `stop` - 1, each on its own rows.
 
     Args:
         model: integers of the model.
-        reals: numbers of the runs, in rows of `each`.
+        reals: numbers of the runs, in rows of `number_count`.
         data: workspace of an evaluation and of the method, shared.
-        each: length of a row of numbers, 0 if all runs share one.
+        number_count: length of a row of numbers, 0 if all runs share one.
         sizes: sizes and settings, see `RUN_SIZES`.
         clocks: per run time and next step to try (s).
         counts: per run the counts, see `COUNTS`.
@@ -67,7 +67,7 @@ def run_several(
         levels: numbers of the watches.
         endings: filled with the ending of each run, see `ENDING`.
         first: number of the first run.
-        last: end of the runs.
+        stop: end of the runs.
 
     Returns:
         `OUTCOME.OK`; how each run ended is in `endings`.
@@ -88,25 +88,25 @@ def run_several(
         watches,
         levels,
     )
-    for k in range(first, last):
-        m = select_run(runs, each, k)
+    for k in range(first, stop):
+        m = select_run(runs, number_count, k)
         endings[k] = integrate_run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
     return OUTCOME.OK
 
 
-def select_run(runs: Motion, each: int, k: int) -> Motion:
+def select_run(runs: Motion, number_count: int, k: int) -> Motion:
     """Return one of several runs.
 
     Args:
         runs: vectors of all runs, each of which has a row of `reals`, `clock`, `counts`, `reports`,
             `events` and `peaks`; the others are shared.
-        each: length of a row of `reals`, 0 if all runs share one.
+        number_count: length of a row of `reals`, 0 if all runs share one.
         k: number of the run.
     """
     size, pairs, sizes = runs.model[MODEL.STATE_SIZE], runs.model[MODEL.CONTACTS], runs.sizes
     return Motion(
         runs.model,
-        at(runs.reals, each * k),
+        at(runs.reals, number_count * k),
         runs.data,
         sizes,
         at(runs.clock, 2 * k),
@@ -137,8 +137,8 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     size = model[MODEL.STATE_SIZE]
     work, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[RUN_SIZES.METHOD_AT])
     y0, f0, y1, f1 = work, at(work, size), at(work, 2 * size), at(work, 3 * size)
-    before = at(work, STATES * size)
-    after = at(before, model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES])
+    previous_levels = at(work, STATES * size)
+    next_levels = at(previous_levels, model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES])
     # The caller says whether the initial state fulfils the constraints; else project it.
     is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[RUN_SIZES.START_HOLDS] > 0
     if not is_kept and not project_by_law(
@@ -153,7 +153,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     if status != OUTCOME.OK or not is_finite(size, f0):
         return ENDING.FAILED
     h[METHOD_WORK.IS_EVALUATED] = 0.0 if is_going else 1.0
-    compute_levels(m, y0, before)
+    compute_levels(m, y0, previous_levels)
     note_peaks(m, clock[0])
     # Reports at or before the start get the initial state.
     while (
@@ -194,12 +194,14 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
         # Locate events within the step; one of them may end the run.
         if sizes[RUN_SIZES.MOST_EVENTS] > 0 or sizes[RUN_SIZES.WATCHES] > 0:
             h[METHOD_WORK.IS_EVALUATED] = 0.0
-            compute_levels(m, y1, after)
-            end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
+            compute_levels(m, y1, next_levels)
+            end = note_events(m, t0, y0, f0, t1, y1, f1, previous_levels, next_levels)
             stopped = end <= t1
             end = min(end, t1)
             # Levels at the end are those at the start of the next step.
-            copy_numbers(model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES], after, before)
+            copy_numbers(
+                model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES], next_levels, previous_levels
+            )
         while (
             counts[COUNTS.REPORTED] < sizes[RUN_SIZES.TIMES]
             and m.times[counts[COUNTS.REPORTED]] <= end

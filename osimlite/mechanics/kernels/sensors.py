@@ -114,16 +114,16 @@ def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats)
         p: numbers that contain those of the source.
         row: sensor row.
     """
-    kind, index = source[SOURCE.KIND], source[SOURCE.PLACE]
-    if kind == SOURCE_TYPE.IN_ROW:
+    source_type, index = source[SOURCE.KIND], source[SOURCE.PLACE]
+    if source_type == SOURCE_TYPE.IN_ROW:
         return row[index]
-    if kind == SOURCE_TYPE.SPINDLE:
+    if source_type == SOURCE_TYPE.SPINDLE:
         speed = row[source[SOURCE.MORE]]
         # Prochazka's formula contains the square root of the velocity, odd in its sign. Rates are
         # not negative.
         return max(row[index] + SPINDLE_GAIN * (sqrt(speed) if speed > 0.0 else -sqrt(-speed)), 0.0)
     numbers = at(p, source[SOURCE.MORE])
-    if kind == SOURCE_TYPE.ANGLE:
+    if source_type == SOURCE_TYPE.ANGLE:
         # Angles of successive rotations, by the entries of the rotation matrix of the link.
         xx, yx, zx = direction(model, data, index, vector(numbers, 0))
         _, yy, _ = direction(model, data, index, vector(numbers, 3))
@@ -131,14 +131,14 @@ def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats)
         return dot(
             vector(numbers, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx)))
         )
-    if kind == SOURCE_TYPE.TURN:
+    if source_type == SOURCE_TYPE.TURN:
         return dot(
             direction(model, data, index, vector(numbers, 0)), angular_velocity(model, data, index)
         )
     point = station(model, data, index, vector(numbers, 0))
     return dot(
         vector(numbers, 3),
-        point if kind == SOURCE_TYPE.POSITION else velocity(model, data, index, point),
+        point if source_type == SOURCE_TYPE.POSITION else velocity(model, data, index, point),
     )
 
 
@@ -157,12 +157,12 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
     muscle_ints, optimal = at(i, SENSES.HEAD), at(p, SENSOR_NUMBERS.HEAD)
     strengths = at(optimal, muscles)
     for k in range(muscles):
-        places = at(muscle_ints, OF_MUSCLE * k)
-        row[i[SENSES.LENGTHS] + k] = data[places[0]] / optimal[k]
-        row[i[SENSES.VELOCITIES] + k] = data[places[1]] / optimal[k]
-        row[i[SENSES.FORCES] + k] = data[places[2]] / strengths[k]
-        row[i[SENSES.ACTIVATIONS] + k] = data[places[3]]
-        row[i[SENSES.ACTIVE] + k] = data[places[4]]
+        offsets = at(muscle_ints, OF_MUSCLE * k)
+        row[i[SENSES.LENGTHS] + k] = data[offsets[0]] / optimal[k]
+        row[i[SENSES.VELOCITIES] + k] = data[offsets[1]] / optimal[k]
+        row[i[SENSES.FORCES] + k] = data[offsets[2]] / strengths[k]
+        row[i[SENSES.ACTIVATIONS] + k] = data[offsets[3]]
+        row[i[SENSES.ACTIVE] + k] = data[offsets[4]]
     copy_numbers(2 * freedoms, y, at(row, i[SENSES.VALUES]))
     # A coordinate without a limit force has none.
     limits, moments = at(muscle_ints, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
@@ -228,5 +228,5 @@ def leg_ints(i: Ints, leg: int) -> Ints:
         i: plan of the sensor row.
         leg: number of the leg.
     """
-    before = SENSES.HEAD + OF_MUSCLE * i[SENSES.MUSCLES] + 2 * i[SENSES.LIMITS] + i[SENSES.BODIES]
-    return at(i, before + OF_LEG * leg)
+    offset = SENSES.HEAD + OF_MUSCLE * i[SENSES.MUSCLES] + 2 * i[SENSES.LIMITS] + i[SENSES.BODIES]
+    return at(i, offset + OF_LEG * leg)

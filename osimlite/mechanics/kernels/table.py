@@ -113,9 +113,9 @@ def compile_text(name: str, module: str, source: str, **scope: Any) -> Callable[
         source: text of the function.
         scope: names that the text uses besides the records of the layout.
     """
-    known = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
+    namespace = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
     file = f"<kernel {name}>"
-    exec(compile(source, file, "exec", dont_inherit=True), known)
+    exec(compile(source, file, "exec", dont_inherit=True), namespace)
     # Let tracebacks and `inspect.getsource` show the text as that of a file.
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    return known[name]
+    return namespace[name]

@@ -90,14 +90,14 @@ def hold_several(
     counts: Ints,
     states: Floats,
     peaks: Floats,
-    places: Ints,
+    control_offsets: Ints,
     controls: Floats,
     held_by: int,
-    going: Ints,
+    running: Ints,
     first: int,
-    last: int,
+    stop: int,
 ) -> int:
-    """Integrate one control step of the copies `first` to `last` - 1.
+    """Integrate one control step of the copies `first` to `stop` - 1.
 
     Args:
         model: integers of the model.
@@ -108,22 +108,22 @@ def hold_several(
         counts: per copy the counts, see `record.TAKEN`.
         states: per copy the state; changed.
         peaks: per copy the largest forces of contacts.
-        places: offsets in reals of the controls.
+        control_offsets: offsets in reals of the controls.
         controls: per copy the controls.
         held_by: number of controls.
-        going: filled with 1 for a copy that reaches the end of the step, else 0.
+        running: filled with 1 for a copy that reaches the end of the step, else 0.
         first: number of the first copy.
-        last: end of the copies.
+        stop: end of the copies.
 
     Returns:
         `OUTCOME.OK`.
     """
-    for k in range(first, last):
+    for k in range(first, stop):
         # All copies share the numbers of the model, so controls are written before each copy runs.
         for number in range(held_by):
-            reals[places[number]] = controls[held_by * k + number]
-        m = select_motion(model, reals, data, sizes, clocks, counts, peaks, places, k)
-        going[k] = (
+            reals[control_offsets[number]] = controls[held_by * k + number]
+        m = select_motion(model, reals, data, sizes, clocks, counts, peaks, control_offsets, k)
+        running[k] = (
             1 if integrate_control_step(m, at(states, model[MODEL.STATE_SIZE] * k), False) else 0
         )
     return OUTCOME.OK
@@ -191,22 +191,22 @@ def walk_several(
     states: Floats,
     peaks: Floats,
     senses: Ints,
-    known: Floats,
+    sensor_numbers: Floats,
     driven: Ints,
     plan: Ints,
     numbers: Floats,
     criteria: Ints,
     bounds: Floats,
-    room: Floats,
+    work: Floats,
     rows: Floats,
     excitations: Floats,
     record: Floats,
     progress: Ints,
     order: int,
     first: int,
-    last: int,
+    stop: int,
 ) -> int:
-    """Carry out an order for the walks `first` to `last` - 1, see `ORDER`.
+    """Carry out an order for the walks `first` to `stop` - 1, see `ORDER`.
 
     The first of all is recorded.
 
@@ -220,37 +220,37 @@ def walk_several(
         states: per walk the state; changed.
         peaks: per walk the largest forces of contacts.
         senses: plan of the sensor rows, see `sensors.SENSES`.
-        known: numbers of the sensor rows, see `sensors.SENSOR_NUMBERS`.
+        sensor_numbers: numbers of the sensor rows, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: per walk the numbers of the reflexes, see `reflexes.LIMITS`.
         criteria: integers of the criteria, see `criteria.CRITERION`.
         bounds: numbers of the criteria.
-        room: per walk the memory of the reflexes and the criteria, see LEGS.
+        work: per walk the memory of the reflexes and the criteria, see LEGS.
         rows: per walk the sensor row.
         excitations: per walk the excitations.
         record: filled per control step of the first walk with state, excitations and loads.
         progress: per walk the progress, see `PROGRESS`.
         order: ORDER.FEEL, ORDER.BEGIN, ORDER.START, or a number of control steps.
         first: number of the first walk.
-        last: end of the walks.
+        stop: end of the walks.
 
     Returns:
         The worst outcome of the evaluations of FEEL, BEGIN and START of `ORDER`.
     """
     size, status = model[MODEL.STATE_SIZE], OUTCOME.OK
-    for k in range(first, last):
+    for k in range(first, stop):
         m = select_motion(model, reals, data, sizes, clocks, counts, peaks, senses, k)
         walk = Walk(
             m,
             senses,
-            known,
+            sensor_numbers,
             driven,
             plan,
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             criteria,
             bounds,
-            at(room, plan[REFLEXES.ROOM] * k),
+            at(work, plan[REFLEXES.ROOM] * k),
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
             record,
@@ -388,17 +388,17 @@ def update_excitations(a: Walk) -> None:
     add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
     # Noise is added before bounds apply, as in SCONE.
     add_noise(a.plan, a.numbers, a.progress[PROGRESS.STEPS], count, a.excitations)
-    least = at(a.known, SENSOR_NUMBERS.HEAD + 2 * a.senses[SENSES.MUSCLES])
-    most = at(least, count)
+    lower_bounds = at(a.known, SENSOR_NUMBERS.HEAD + 2 * a.senses[SENSES.MUSCLES])
+    upper_bounds = at(lower_bounds, count)
     for k in range(count):
-        a.excitations[k] = min(max(a.excitations[k], least[k]), most[k])
+        a.excitations[k] = min(max(a.excitations[k], lower_bounds[k]), upper_bounds[k])
 
 
 def run_by_reflexes(
     model: Ints,
     reals: Floats,
     data: Floats,
-    each: int,
+    number_count: int,
     sizes: Ints,
     clocks: Floats,
     counts: Ints,
@@ -413,25 +413,25 @@ def run_by_reflexes(
     levels: Floats,
     endings: Ints,
     senses: Ints,
-    known: Floats,
+    sensor_numbers: Floats,
     driven: Ints,
     plan: Ints,
     numbers: Floats,
-    room: Floats,
+    work: Floats,
     rows: Floats,
     excitations: Floats,
     record: Floats,
     progress: Ints,
     first: int,
-    last: int,
+    stop: int,
 ) -> int:
-    """Integrate the runs `first` to `last` - 1, as `run_several` does, each controlled by its reflexes.
+    """Integrate the runs `first` to `stop` - 1, as `run_several` does, each controlled by its reflexes.
 
     Args:
         model: integers of the model.
-        reals: numbers of the runs, in rows of `each`.
+        reals: numbers of the runs, in rows of `number_count`.
         data: workspace of an evaluation and of the method, shared.
-        each: length of a row of numbers.
+        number_count: length of a row of numbers.
         sizes: sizes and settings, see `record.MOST_TRIES`.
         clocks: per run time and next step to try (s).
         counts: per run the counts, see `record.TAKEN`.
@@ -446,17 +446,17 @@ def run_by_reflexes(
         levels: numbers of the watches.
         endings: filled with the ending of each run, see `record.ENDING.DONE`.
         senses: plan of the sensor rows, see `sensors.SENSES`.
-        known: per run the numbers of the sensor row, see `sensors.SENSOR_NUMBERS`.
+        sensor_numbers: per run the numbers of the sensor row, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: per run the numbers of the reflexes, see `reflexes.LIMITS`.
-        room: per run the memory of the reflexes.
+        work: per run the memory of the reflexes.
         rows: per run the sensor row.
         excitations: per run the excitations.
         record: per run the record of control steps, see `begin_control_step`.
         progress: per run the progress, see `PROGRESS`.
         first: number of the first run.
-        last: end of the runs.
+        stop: end of the runs.
 
     Returns:
         `OUTCOME.OK`; how each run ended is in `endings`.
@@ -477,18 +477,18 @@ def run_by_reflexes(
         watches,
         levels,
     )
-    for k in range(first, last):
-        m = select_run(runs, each, k)
+    for k in range(first, stop):
+        m = select_run(runs, number_count, k)
         walk = Walk(
             m,
             senses,
-            at(known, senses[SENSES.KNOWN] * k),
+            at(sensor_numbers, senses[SENSES.KNOWN] * k),
             driven,
             plan,
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             plan,
             numbers,
-            at(room, plan[REFLEXES.ROOM] * k),
+            at(work, plan[REFLEXES.ROOM] * k),
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
             at(record, plan[REFLEXES.ROWS] * k * control_record_size(senses, plan)),
@@ -575,8 +575,8 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     row = progress[PROGRESS.STEPS] - a.plan[REFLEXES.FIRST]
     if row < a.plan[REFLEXES.ROWS]:
         record = at(a.record, row * control_record_size(a.senses, a.plan))
-        kept = sensors * ((progress[PROGRESS.FRAMES] - 1) % a.plan[REFLEXES.KEPT])
-        copy_numbers(sensors, at(a.room, LEGS + kept), record)
+        history_offset = sensors * ((progress[PROGRESS.FRAMES] - 1) % a.plan[REFLEXES.KEPT])
+        copy_numbers(sensors, at(a.room, LEGS + history_offset), record)
         copy_numbers(LEGS, a.room, at(record, sensors))
         copy_numbers(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
         record[control_record_size(a.senses, a.plan) - 1] = m.clock[1]

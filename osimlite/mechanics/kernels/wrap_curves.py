@@ -65,7 +65,7 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     points, wraps = i[PATH.POINTS], i[PATH.WRAPS]
     size = points + 2 * wraps
     order, work = at(result, PATH_WORK.ORDER), at(result, PATH_WORK.ORDER + size)
-    own = at(i, PATH.NODES_AT + NODE.SIZE * size)
+    wrap_ints = at(i, PATH.NODES_AT + NODE.SIZE * size)
     count = 0
     for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
@@ -76,11 +76,17 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         if (
             number >= points
             and number == points + 2 * wrap
-            and own[PATH_WRAP.SIZE * wraps + wrap] != 0
+            and wrap_ints[PATH_WRAP.SIZE * wraps + wrap] != 0
         ):
-            surface = item - own[PATH_WRAP.SIZE * wrap + PATH_WRAP.BACK]
+            surface = item - wrap_ints[PATH_WRAP.SIZE * wrap + PATH_WRAP.BACK]
             count += call(
-                own[PATH_WRAP.SIZE * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface
+                wrap_ints[PATH_WRAP.SIZE * wraps + wrap],
+                model,
+                reals,
+                data,
+                y,
+                at(f, 3 * count),
+                surface,
             )
     return count
 
@@ -108,13 +114,19 @@ def trace_cylinder(
         Number of points.
     """
     e = at(data, model[item + ITEM.RECORD])
-    one, two, turn = vector(e, TANGENTS.FIRST), vector(e, TANGENTS.SECOND), e[TANGENTS.SHAPE]
+    start_point, end_point, turn = (
+        vector(e, TANGENTS.FIRST),
+        vector(e, TANGENTS.SECOND),
+        e[TANGENTS.SHAPE],
+    )
     count = count_segments(turn)
     for k in range(1, count):
         store_vector(
             f,
             3 * (k - 1),
-            point_in_ground(at(e, SURFACE_WORK.POSE), helix_point(one, two, turn, k / count)),
+            point_in_ground(
+                at(e, SURFACE_WORK.POSE), helix_point(start_point, end_point, turn, k / count)
+            ),
         )
     return count - 1
 
@@ -135,32 +147,32 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     ring, outwards = p[WRAP_SURFACE.SIZES + 1], (e[TANGENTS.SHAPE + 1], e[TANGENTS.SHAPE + 2], 0.0)
-    one, two = (
+    start_point, end_point = (
         point_in_cylinder(vector(e, TANGENTS.FIRST), outwards, ring),
         point_in_cylinder(vector(e, TANGENTS.SECOND), outwards, ring),
     )
     count = count_segments(e[TANGENTS.SHAPE])
     for k in range(1, count):
         point = point_from_cylinder(
-            helix_point(one, two, e[TANGENTS.SHAPE], k / count), outwards, ring
+            helix_point(start_point, end_point, e[TANGENTS.SHAPE], k / count), outwards, ring
         )
         store_vector(f, 3 * (k - 1), point_in_ground(at(e, SURFACE_WORK.POSE), point))
     return count - 1
 
 
-def helix_point(one: Vector, two: Vector, turn: float, part: float) -> Vector:
+def helix_point(start_point: Vector, end_point: Vector, turn: float, fraction: float) -> Vector:
     """Return the point of a helix about z at a fraction of its length.
 
     Args:
-        one: first point of the helix (m).
-        two: last point; only its height is used (m).
+        start_point: first point of the helix (m).
+        end_point: last point; only its height is used (m).
         turn: angle of the helix (rad).
-        part: fraction of its length.
+        fraction: fraction of its length.
     """
-    x, y, z = one
-    _, _, end = two
-    c, s = cos(part * turn), sin(part * turn)
-    return c * x - s * y, s * x + c * y, z + part * (end - z)
+    x, y, z = start_point
+    _, _, end = end_point
+    c, s = cos(fraction * turn), sin(fraction * turn)
+    return c * x - s * y, s * x + c * y, z + fraction * (end - z)
 
 
 def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -178,8 +190,8 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         Number of points.
     """
     e = at(data, model[item + ITEM.RECORD])
-    one, turn = vector(e, TANGENTS.FIRST), e[TANGENTS.SHAPE]
-    across = cross(unit(cross(one, vector(e, TANGENTS.SECOND))), one)
+    start_point, turn = vector(e, TANGENTS.FIRST), e[TANGENTS.SHAPE]
+    across = cross(unit(cross(start_point, vector(e, TANGENTS.SECOND))), start_point)
     count = count_segments(turn)
     for k in range(1, count):
         angle = turn * k / count
@@ -187,7 +199,8 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
             f,
             3 * (k - 1),
             point_in_ground(
-                at(e, SURFACE_WORK.POSE), add_scaled(times(cos(angle), one), sin(angle), across)
+                at(e, SURFACE_WORK.POSE),
+                add_scaled(times(cos(angle), start_point), sin(angle), across),
             ),
         )
     return count - 1
@@ -212,9 +225,12 @@ def trace_ellipsoid(
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, WRAP_SURFACE.SIZES)
     factor = 3.0 / (a + b + c)
-    one, two = times(factor, vector(e, TANGENTS.FIRST)), times(factor, vector(e, TANGENTS.SECOND))
-    centre, to_one, across, turn = polar_coordinates(
-        one, two, vector(e, TANGENTS.SHAPE), e[TANGENTS.SHAPE + 3]
+    start_point, end_point = (
+        times(factor, vector(e, TANGENTS.FIRST)),
+        times(factor, vector(e, TANGENTS.SECOND)),
+    )
+    centre, start_direction, across, turn = polar_coordinates(
+        start_point, end_point, vector(e, TANGENTS.SHAPE), e[TANGENTS.SHAPE + 3]
     )
     # OpenSim may take the longer way around the section.
     turn -= 2.0 * pi * e[TANGENTS.SHAPE + 4]
@@ -224,9 +240,9 @@ def trace_ellipsoid(
         angle = turn * k / count
         # Rays from the centre of the section, at equal angles as in `measure_polyline`, meet the
         # surface.
-        way = add_scaled(times(cos(angle), to_one), sin(angle), across)
+        point_direction = add_scaled(times(cos(angle), start_direction), sin(angle), across)
         size = distance_to_sphere(
-            multiply_elementwise(scale, centre), multiply_elementwise(scale, way)
+            multiply_elementwise(scale, centre), multiply_elementwise(scale, point_direction)
         )
         if isnan(size):
             return 0
@@ -234,22 +250,23 @@ def trace_ellipsoid(
             f,
             3 * (k - 1),
             point_in_ground(
-                at(e, SURFACE_WORK.POSE), times(1.0 / factor, add_scaled(centre, size, way))
+                at(e, SURFACE_WORK.POSE),
+                times(1.0 / factor, add_scaled(centre, size, point_direction)),
             ),
         )
     return count - 1
 
 
-def distance_to_sphere(start: Vector, way: Vector) -> float:
+def distance_to_sphere(start: Vector, ray: Vector) -> float:
     """Return the multiple of a direction that leads from a point to the unit sphere.
 
     Args:
         start: point.
-        way: direction.
+        ray: direction.
 
     Returns:
         The multiple, NaN if the line misses the sphere.
     """
-    square, half = dot(way, way), dot(start, way)
+    square, half = dot(ray, ray), dot(start, ray)
     inner = half * half - square * (dot(start, start) - 1.0)
     return (sqrt(inner) - half) / square if inner >= 0.0 else nan

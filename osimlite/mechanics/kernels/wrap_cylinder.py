@@ -122,8 +122,8 @@ def bend_around_cylinder(
     a1, b1 = find_tangents(flat_first, radius, (0.0, 0.0, 1.0))
     a2, b2 = find_tangents(flat_second, radius, (0.0, 0.0, 1.0))
     if side == 0.0:
-        one, two = nearest_pair(a1, b1, a2, b2)
-        far = long = False
+        first_tangent, second_tangent = nearest_pair(a1, b1, a2, b2)
+        on_far_side = is_long = False
     else:
         # One path around the cylinder is from a1 to b2, the other from b1 to a2.
         wide = dot(a1, b2) < dot(b1, a2)
@@ -136,15 +136,24 @@ def bend_around_cylinder(
             axis,
             side,
         )
-        one, two = (a1, b2) if from_a else (b1, a2)
-        far = from_a == wide
-        long = dot(plus(one, two), plus(minus(one, flat_first), minus(two, flat_second))) < 0.0
+        first_tangent, second_tangent = (a1, b2) if from_a else (b1, a2)
+        on_far_side = from_a == wide
+        is_long = (
+            dot(
+                plus(first_tangent, second_tangent),
+                plus(minus(first_tangent, flat_first), minus(second_tangent, flat_second)),
+            )
+            < 0.0
+        )
 
     # The plane through both ends and an apex on the surface gives the heights of the tangent
     # points.
-    apex = apex_between(first, second, radius, far)
+    apex = apex_between(first, second, radius, on_far_side)
     normal = unit(cross(minus(first, apex), minus(second, apex)))
-    z1, z2 = edge_height(one, pz, first, normal), edge_height(two, qz, first, normal)
+    z1, z2 = (
+        edge_height(first_tangent, pz, first, normal),
+        edge_height(second_tangent, qz, first, normal),
+    )
     if abs(qz) < EPSILON:
         # OpenSim uses the foot of the second end as a direction, which is undefined at the origin:
         # all heights then count as that of the first end.
@@ -159,12 +168,12 @@ def bend_around_cylinder(
     # Both tangent points beyond the ends of the cylinder: the path misses it.
     if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
         return WRAPPING.NONE
-    x1, y1, _ = one
-    x2, y2, _ = two
+    x1, y1, _ = first_tangent
+    x2, y2, _ = second_tangent
     angle = atan2(x1 * y2 - y1 * x2, x1 * x2 + y1 * y2)
     # `turn` has a sign for drawing; the length uses the angle of the arc that is taken.
     turn = angle
-    if long:
+    if is_long:
         angle = 2.0 * pi - angle
         turn = -angle
     # OpenSim smooths the heights only if a path has several PathWraps.
@@ -188,14 +197,14 @@ def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vecto
         The point, and whether it is within the radius and between the ends.
     """
     x, y, _ = first
-    dx, dy, dz = way = minus(second, first)
+    dx, dy, dz = chord = minus(second, first)
     across = dx * dx + dy * dy
     # OpenSim treats a line along the axis as one that does not cross.
     if across <= PARALLEL * (across + dz * dz):
         return (0.0, 0.0, 0.0), False
-    part = -(x * dx + y * dy) / across
-    x, y, _ = closest = add_scaled(first, part, way)
-    return closest, x * x + y * y < radius * radius and 0.0 < part < 1.0
+    fraction = -(x * dx + y * dy) / across
+    x, y, _ = closest = add_scaled(first, fraction, chord)
+    return closest, x * x + y * y < radius * radius and 0.0 < fraction < 1.0
 
 
 def set_height(point: Vector, height: float) -> Vector:
@@ -231,18 +240,18 @@ def starts_at_a(
     return not is_on_side(a2, axis, side) and (a_active or is_on_side(b2, axis, side) or wide)
 
 
-def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vector:
+def apex_between(first: Vector, second: Vector, radius: float, on_far_side: bool) -> Vector:
     """Return the point of the cylinder over which the path bends.
 
     It is at the height of the point that divides the segment in the ratio of the distances of the ends
     from the axis, and in the direction in which the plane through the ends and the axis at that height
-    cuts the cylinder; on the far side of the axis if `far`.
+    cuts the cylinder; on the far side of the axis if `on_far_side`.
 
     Args:
         first: first end.
         second: second end.
         radius: radius of the cylinder (m).
-        far: whether the apex is on the far side of the axis.
+        on_far_side: whether the apex is on the far side of the axis.
     """
     px, py, pz = first
     qx, qy, qz = second
@@ -252,7 +261,7 @@ def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vec
     # or opposite.
     nx, ny, _ = unit(cross((px, py, pz - z), (qx, qy, qz - z)))
     ux, uy, _ = unit((-ny, nx, 0.0))
-    if (x * ux + y * uy > 0.0) == far:
+    if (x * ux + y * uy > 0.0) == on_far_side:
         ux, uy = -ux, -uy
     return radius * ux, radius * uy, z
 
@@ -289,7 +298,12 @@ def helix_length(arc: float, rise: float) -> float:
 
 
 def smooth_heights(
-    first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float
+    first: Vector,
+    second: Vector,
+    first_tangent: Vector,
+    second_tangent: Vector,
+    arc: float,
+    turn: float,
 ) -> tuple[float, float]:
     """Return the heights of the tangent points at which the lines continue as the helix.
 
@@ -302,17 +316,17 @@ def smooth_heights(
     Args:
         first: first end.
         second: second end.
-        one: first tangent point.
-        two: second tangent point.
+        first_tangent: first tangent point.
+        second_tangent: second tangent point.
         arc: length of the arc, seen along the axis (m).
         turn: angle of the arc (rad).
 
     Returns:
         The heights of the first and second tangent point (m).
     """
-    x1, y1, z1 = one
-    x2, y2, z2 = two
-    pieces, part = 0, 0.0
+    x1, y1, z1 = first_tangent
+    x2, y2, z2 = second_tangent
+    pieces, fraction = 0, 0.0
     leg1 = leg2 = (0.0, 0.0, 0.0, 0.0)
     for _ in range(ROUNDS):
         rise = z2 - z1
@@ -323,15 +337,15 @@ def smooth_heights(
         count = int(length)
         # Seen along the axis nothing changes while the number of segments stays the same.
         if count != pieces:
-            pieces, part = count, 1.0 / count
-            c, s = cos(part * turn), sin(part * turn)
-            leg1 = edge_constants(first, one, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
-            leg2 = edge_constants(second, two, (c * x2 + s * y2, c * y2 - s * x2, 0.0))
+            pieces, fraction = count, 1.0 / count
+            c, s = cos(fraction * turn), sin(fraction * turn)
+            leg1 = edge_constants(first, first_tangent, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
+            leg2 = edge_constants(second, second_tangent, (c * x2 + s * y2, c * y2 - s * x2, 0.0))
         _, _, height1 = first
         _, _, height2 = second
-        w1 = next_height(leg1, height1, z1, z1 + part * rise)
+        w1 = next_height(leg1, height1, z1, z1 + fraction * rise)
         # The helix has moved with its first point.
-        w2 = next_height(leg2, height2, z2, w1 + (1.0 - part) * rise)
+        w2 = next_height(leg2, height2, z2, w1 + (1.0 - fraction) * rise)
         if w1 == z1 and w2 == z2:
             break
         z1, z2 = w1, w2

@@ -95,34 +95,48 @@ def wrap_ellipsoid(
     first_height, second_height = ellipsoid_height(radii, first), ellipsoid_height(radii, second)
     if first_height < -CLOSE or second_height < -CLOSE:
         return WRAPPING.INSIDE
-    way = minus(first, second)
-    enters, leaves = find_crossings(radii, second, way)
-    one, two = add_scaled(second, enters, way), add_scaled(second, leaves, way)
+    chord = minus(first, second)
+    enters, leaves = find_crossings(radii, second, chord)
+    first_tangent, second_tangent = (
+        add_scaled(second, enters, chord),
+        add_scaled(second, leaves, chord),
+    )
     # Ends in the same direction have no plane; a chord outside of the segment does not cross.
     if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
         return WRAPPING.NONE
     support, by_fan, starts = support_point(
-        p[WRAP_SURFACE.METHOD], radii, one, minus(two, one), way, at(e, WRAP_WORK.ROOM)
+        p[WRAP_SURFACE.METHOD],
+        radii,
+        first_tangent,
+        minus(second_tangent, first_tangent),
+        chord,
+        at(e, WRAP_WORK.ROOM),
     )
     if starts:
-        one = two = support
+        first_tangent = second_tangent = support
     if side != 0.0 and not is_on_side(support, axis, side):
         # On the wrong side OpenSim mirrors the point across the plane of symmetry.
         outwards = -component(support, axis)
-        one = two = support = replace_component(support, axis, outwards)
+        first_tangent = second_tangent = support = replace_component(support, axis, outwards)
         if by_fan > 0.0:
             support = closest_point(
                 radii, replace_component(support, axis, outwards - by_fan * outwards)
             )
-    normal = unit(cross(way, minus(first, support)))
+    normal = unit(cross(chord, minus(first, support)))
     offset = dot(normal, support)
     # An end on the surface is its own tangent point.
-    one = tangent_point(radii, one, first, normal, offset) if abs(first_height) >= CLOSE else first
-    two = (
-        tangent_point(radii, two, second, normal, offset) if abs(second_height) >= CLOSE else second
+    first_tangent = (
+        tangent_point(radii, first_tangent, first, normal, offset)
+        if abs(first_height) >= CLOSE
+        else first
+    )
+    second_tangent = (
+        tangent_point(radii, second_tangent, second, normal, offset)
+        if abs(second_height) >= CLOSE
+        else second
     )
 
-    length = norm(minus(one, two)) / factor
+    length = norm(minus(first_tangent, second_tangent)) / factor
     # OpenSim's search may fail; it then wraps without points.
     if isnan(length):
         return clear_tangents(e, WRAPPING.MANDATORY)
@@ -131,20 +145,25 @@ def wrap_ellipsoid(
     # A short path is measured by its chord, a long one by a polyline as OpenSim draws it.
     if length >= PIECE:
         pieces = int(min(length / PIECE, 1.0 * PIECES))
-        length, next_one, next_two = measure_polyline(
-            radii, one, two, normal, offset, pieces, False
+        length, after_first, before_second = measure_polyline(
+            radii, first_tangent, second_tangent, normal, offset, pieces, False
         )
         # A path that starts backwards takes the longer way around the section.
         if (
             side != 0.0
             and pieces > 1
-            and (bends_back(first, one, next_one) or bends_back(second, two, next_two))
+            and (
+                bends_back(first, first_tangent, after_first)
+                or bends_back(second, second_tangent, before_second)
+            )
         ):
-            length, _, _ = measure_polyline(radii, one, two, normal, offset, pieces, True)
+            length, _, _ = measure_polyline(
+                radii, first_tangent, second_tangent, normal, offset, pieces, True
+            )
             e[WRAP_WORK.CURVE + 4] = 1.0
         length /= factor
-    store_vector(e, WRAP_WORK.FIRST_TANGENT, times(1.0 / factor, one))
-    store_vector(e, WRAP_WORK.SECOND_TANGENT, times(1.0 / factor, two))
+    store_vector(e, WRAP_WORK.FIRST_TANGENT, times(1.0 / factor, first_tangent))
+    store_vector(e, WRAP_WORK.SECOND_TANGENT, times(1.0 / factor, second_tangent))
     e[WRAP_WORK.SURFACE_LENGTH] = length
     return WRAPPING.MANDATORY
 
@@ -167,23 +186,23 @@ def invert_components(a: Vector) -> Vector:
     return 1.0 / x, 1.0 / y, 1.0 / z
 
 
-def find_crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
+def find_crossings(radii: Vector, point: Vector, ray: Vector) -> tuple[float, float]:
     """Return the multiples of the direction, the larger first, at which a line intersects the surface.
 
     Args:
         radii: half axes.
         point: point of the line.
-        way: direction of the line.
+        ray: direction of the line.
 
     Returns:
         Two multiples; NaN if the line misses the surface.
     """
-    way, point = (
-        multiply_elementwise(invert_components(radii), way),
+    ray, point = (
+        multiply_elementwise(invert_components(radii), ray),
         multiply_elementwise(invert_components(radii), point),
     )
     # Scaled by the half axes, the surface is a unit sphere and the equation is quadratic.
-    a, b, c = dot(way, way), 2.0 * dot(way, point), dot(point, point) - 1.0
+    a, b, c = dot(ray, ray), 2.0 * dot(ray, point), dot(point, point) - 1.0
     square = b * b - 4.0 * a * c
     if not (square >= 0.0 and a > 0.0):
         return nan, nan
@@ -191,7 +210,7 @@ def find_crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, fl
 
 
 def support_point(
-    method: float, radii: Vector, start: Vector, chord: Vector, way: Vector, room: Floats
+    method: float, radii: Vector, start: Vector, chord: Vector, ray: Vector, work: Floats
 ) -> tuple[Vector, float, bool]:
     """Return the point of the surface that determines the plane.
 
@@ -200,8 +219,8 @@ def support_point(
         radii: half axes.
         start: point where the chord enters.
         chord: vector to the point where it leaves.
-        way: vector between the ends of the segment.
-        room: workspace of the fan.
+        ray: vector between the ends of the segment.
+        work: workspace of the fan.
 
     Returns:
         The point, the weight of the fan, and whether the search for tangent points starts there.
@@ -210,26 +229,26 @@ def support_point(
     if method == ELLIPSOID_METHOD.MIDPOINT:
         return closest_point(radii, middle), 0.0, True
     # OpenSim's axial method uses the plane of symmetry across the largest component of the segment.
-    axis = longest_axis(way)
+    axis = longest_axis(ray)
     passes = -component(start, axis) / component(chord, axis)
     axial = closest_in_plane(radii, add_scaled(start, passes, chord), axis)
     if method == ELLIPSOID_METHOD.AXIAL:
         return axial, 0.0, 0.0 < passes < 1.0
-    cosine = abs(component(unit(way), axis))
+    cosine = abs(component(unit(ray), axis))
     # Where the chord crosses this plane near one of its ends, the fan is phased in.
     fade = max(0.0, min(passes, 1.0 - passes) / BORDER)
     if cosine > ALL_FAN and fade < 1.0:
         cosine = ALL_FAN + fade * (cosine - ALL_FAN)
     if cosine >= NO_FAN:
         return axial, 0.0, True
-    fanned = closest_point(radii, plus(middle, mean_way_out(radii, start, chord, room)))
+    fanned = closest_point(radii, plus(middle, mean_way_out(radii, start, chord, work)))
     if cosine <= ALL_FAN:
         return fanned, 1.0, True
     # Between both limits OpenSim blends the axial and the fanned point.
-    part = (cosine - ALL_FAN) / (NO_FAN - ALL_FAN)
+    axial_weight = (cosine - ALL_FAN) / (NO_FAN - ALL_FAN)
     return (
-        closest_point(radii, add_scaled(times(part, axial), 1.0 - part, fanned)),
-        1.0 - part,
+        closest_point(radii, add_scaled(times(axial_weight, axial), 1.0 - axial_weight, fanned)),
+        1.0 - axial_weight,
         True,
     )
 
@@ -265,7 +284,7 @@ def tangent_point(
     # Start with the tangent plane through r itself, where the third residual vanishes.
     d = -2.0 * dot(multiply_elementwise(weights, r), r)
     e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
-    error = before = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+    error = previous_error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     damping = 0.01
     for _ in range(ROUNDS):
         if not error > EXACT:
@@ -277,27 +296,27 @@ def tangent_point(
         size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEPS
         # Increase the damping until the error decreases.
         for _ in range(TRIALS):
-            if not error >= before:
+            if not error >= previous_error:
                 break
             step, d_step = damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
             step, d_step = times(size, step), size * d_step
             r, d = plus(r, step), d + d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
-            before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+            previous_error, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
             damping *= 4.0
         damping /= 8.0
         # Then repeat the step at double length as long as that helps, and take the last one back.
         longer = 0.5
         for _ in range(TRIALS):
-            if not error <= before:
+            if not error <= previous_error:
                 break
             longer *= 2.0
             r, d = add_scaled(r, longer, step), d + longer * d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
-            before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+            previous_error, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
         r, d = add_scaled(r, -longer, step), d - longer * d_step
         e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
-        before = error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+        previous_error = error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     return r
 
 
@@ -345,26 +364,34 @@ def damped_step(
     px, py, pz = normal
     nx, ny, nz = n
     qx, qy, qz = by_end
-    more = 1.0 + damping
+    damped_factor = 1.0 + damping
     x = add_scaled(add_scaled(times(px, normal), 5.0 * nx, n), qx, by_end)
     y = add_scaled(add_scaled(times(py, normal), 5.0 * ny, n), qy, by_end)
     z = add_scaled(add_scaled(times(pz, normal), 5.0 * nz, n), qz, by_end)
     # Marquardt's damping scales the diagonal, so that the step does not depend on the units.
-    x = replace_component(x, 0, more * component(x, 0))
-    y = replace_component(y, 1, more * component(y, 1))
-    z = replace_component(z, 2, more * component(z, 2))
+    x = replace_component(x, 0, damped_factor * component(x, 0))
+    y = replace_component(y, 1, damped_factor * component(y, 1))
+    z = replace_component(z, 2, damped_factor * component(z, 2))
     # Eliminate d, then use Cramer's rule.
     mixed = add_scaled(by_end, 2.0, n)
-    bx, by, bz = times(-0.5 / more, mixed)
+    bx, by, bz = times(-0.5 / damped_factor, mixed)
     x, y, z = add_scaled(x, bx, mixed), add_scaled(y, by, mixed), add_scaled(z, bz, mixed)
-    rest = add_scaled(downhill, -0.5 / more * d_downhill, mixed)
+    reduced_rhs = add_scaled(downhill, -0.5 / damped_factor * d_downhill, mixed)
     yz, zx, xy = cross(y, z), cross(z, x), cross(x, y)
-    step = times(1.0 / dot(x, yz), (dot(rest, yz), dot(rest, zx), dot(rest, xy)))
-    return step, 0.5 / more * (d_downhill - dot(mixed, step))
+    step = times(
+        1.0 / dot(x, yz), (dot(reduced_rhs, yz), dot(reduced_rhs, zx), dot(reduced_rhs, xy))
+    )
+    return step, 0.5 / damped_factor * (d_downhill - dot(mixed, step))
 
 
 def measure_polyline(
-    radii: Vector, one: Vector, two: Vector, normal: Vector, offset: float, pieces: int, far: bool
+    radii: Vector,
+    first_tangent: Vector,
+    second_tangent: Vector,
+    normal: Vector,
+    offset: float,
+    pieces: int,
+    is_long: bool,
 ) -> tuple[float, Vector, Vector]:
     """Compute the length of a polyline on the surface in a plane.
 
@@ -373,18 +400,18 @@ def measure_polyline(
 
     Args:
         radii: half axes.
-        one: first point.
-        two: last point.
+        first_tangent: first point.
+        second_tangent: last point.
         normal: unit normal n of the plane n . x = offset.
         offset: offset of the plane.
         pieces: number of segments.
-        far: whether the polyline takes the longer way.
+        is_long: whether the polyline takes the longer way.
 
     Returns:
         The length, and the corners next to the first and the last point.
     """
-    centre, a, b, angle = polar_coordinates(one, two, normal, offset)
-    to_one, to_two = minus(one, centre), minus(two, centre)
+    centre, a, b, angle = polar_coordinates(first_tangent, second_tangent, normal, offset)
+    to_first, to_second = minus(first_tangent, centre), minus(second_tangent, centre)
     # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the
     # plane at m (c, s).
     scale = invert_components(radii)
@@ -394,10 +421,10 @@ def measure_polyline(
         multiply_elementwise(scale, centre),
     )
     uu, uv, vv, uw, vw, ww = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), dot(w, w) - 1.0
-    piece = (angle - 2.0 * pi if far else angle) / pieces
+    piece = (angle - 2.0 * pi if is_long else angle) / pieces
     c_piece, s_piece = cos(piece), sin(piece)
-    c, s, m, x, y, length = 1.0, 0.0, 0.0, norm(to_one), 0.0, 0.0
-    next_one = one
+    c, s, m, x, y, length = 1.0, 0.0, 0.0, norm(to_first), 0.0, 0.0
+    after_first = first_tangent
     for k in range(1, pieces):
         c, s = c * c_piece - s * s_piece, s * c_piece + c * s_piece
         # Intersection of the ray with the surface: a quadratic equation for m, where `inner` is its
@@ -409,22 +436,22 @@ def measure_polyline(
         length += sqrt((m * c - x) * (m * c - x) + (m * s - y) * (m * s - y))
         x, y = m * c, m * s
         if k == 1:
-            next_one = add_scaled(add_scaled(centre, x, a), y, b)
-    next_two = add_scaled(add_scaled(centre, x, a), y, b)
-    dx, dy = dot(to_two, a) - x, dot(to_two, b) - y
-    return length + sqrt(dx * dx + dy * dy), next_one, next_two
+            after_first = add_scaled(add_scaled(centre, x, a), y, b)
+    before_second = add_scaled(add_scaled(centre, x, a), y, b)
+    dx, dy = dot(to_second, a) - x, dot(to_second, b) - y
+    return length + sqrt(dx * dx + dy * dy), after_first, before_second
 
 
 def polar_coordinates(
-    one: Vector, two: Vector, normal: Vector, offset: float
+    first_point: Vector, second_point: Vector, normal: Vector, offset: float
 ) -> tuple[Vector, Vector, Vector, float]:
     """Return polar coordinates of two points of a plane, about its intersection with an axis.
 
     The axis is the one closest to the normal of the plane.
 
     Args:
-        one: first point.
-        two: second point.
+        first_point: first point.
+        second_point: second point.
         normal: unit normal of the plane.
         offset: offset of the plane.
 
@@ -435,7 +462,7 @@ def polar_coordinates(
     axis = longest_axis(normal)
     across = component(normal, axis)
     centre = replace_component((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
-    a, b = unit(minus(one, centre)), unit(minus(two, centre))
+    a, b = unit(minus(first_point, centre)), unit(minus(second_point, centre))
     # Rounding may give a cosine beyond 1, for which acos is undefined in OpenSim.
     cosine = dot(a, b)
     return centre, a, cross(unit(cross(a, b)), a), acos(cosine) if abs(cosine) <= 1.0 else nan

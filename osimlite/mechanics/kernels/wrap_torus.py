@@ -71,17 +71,20 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     )
     # The search stops early, so that its result depends on the end from which it starts; OpenSim
     # tries both.
-    one, two = near_ring(first, second, ring), near_ring(second, first, ring)
-    closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
+    first_near_ring, second_near_ring = (
+        near_ring(first, second, ring),
+        near_ring(second, first, ring),
+    )
+    closer = distance_from_ring(first_near_ring, ring) < distance_from_ring(second_near_ring, ring)
     if p[WRAP_SURFACE.SIDE] != 0.0:
-        one_active, two_active = (
-            is_on_side(one, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
-            is_on_side(two, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
+        first_active, second_active = (
+            is_on_side(first_near_ring, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
+            is_on_side(second_near_ring, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
         )
-        if not (one_active or two_active):
+        if not (first_active or second_active):
             return WRAPPING.NONE
-        closer = one_active and (closer or not two_active)
-    rx, ry, _ = one if closer else two
+        closer = first_active and (closer or not second_active)
+    rx, ry, _ = first_near_ring if closer else second_near_ring
     distance = sqrt(rx * rx + ry * ry)
     # On the axis no part of the ring is nearest.
     if not distance > 0.0:
@@ -96,8 +99,10 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         <= WRAPPING.NONE
     ):
         return clear_tangents(e, WRAPPING.WRAPPED)
-    for place in (WRAP_WORK.FIRST_TANGENT, WRAP_WORK.SECOND_TANGENT):
-        store_vector(e, place, point_from_cylinder(vector(e, place), outwards, ring))
+    for tangent_offset in (WRAP_WORK.FIRST_TANGENT, WRAP_WORK.SECOND_TANGENT):
+        store_vector(
+            e, tangent_offset, point_from_cylinder(vector(e, tangent_offset), outwards, ring)
+        )
     e[WRAP_WORK.CURVE + 1], e[WRAP_WORK.CURVE + 2], _ = outwards
     return WRAPPING.WRAPPED
 
@@ -155,14 +160,16 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
     if not distance > 0.0:
         return nan, nan, nan
     x, y, _ = first
-    dx, dy, _ = way = dx / distance, dy / distance, dz / distance
+    dx, dy, _ = line_direction = dx / distance, dy / distance, dz / distance
     start, flat_start, flat, square = (
-        dot(first, way),
+        dot(first, line_direction),
         x * dx + y * dy,
         dx * dx + dy * dy,
         x * x + y * y,
     )
-    return add_scaled(first, minimize_residual(start, flat_start, flat, square, ring), way)
+    return add_scaled(
+        first, minimize_residual(start, flat_start, flat, square, ring), line_direction
+    )
 
 
 def compute_residual(
@@ -180,10 +187,10 @@ def compute_residual(
         square: squared distance of the first end from the axis (m²).
         ring: radius of the ring (m).
     """
-    apart = u * u * flat + 2.0 * flat_start * u + square
-    if not apart > 0.0:
+    squared_distance = u * u * flat + 2.0 * flat_start * u + square
+    if not squared_distance > 0.0:
         return nan
-    return 2.0 * start + 2.0 * u - 4.0 * ring * (flat * u + flat_start) / sqrt(apart)
+    return 2.0 * start + 2.0 * u - 4.0 * ring * (flat * u + flat_start) / sqrt(squared_distance)
 
 
 def minimize_residual(
@@ -199,7 +206,7 @@ def minimize_residual(
         ring: radius of the ring (m).
     """
     u = damping = scale = 0.0
-    value, radius, moved, evaluations = (
+    value, radius, has_moved, evaluations = (
         compute_residual(u, start, flat_start, flat, square, ring),
         FIRST_RADIUS,
         False,
@@ -215,7 +222,7 @@ def minimize_residual(
             step, damping = damped_step(slope, value, scale, radius, damping)
             size = scale * abs(step)
             # The first trust region is not longer than the first step.
-            if not moved:
+            if not has_moved:
                 radius = min(radius, size)
             next_value = compute_residual(u + step, start, flat_start, flat, square, ring)
             evaluations += 1
@@ -227,18 +234,18 @@ def minimize_residual(
             ratio = actual / predicted if predicted != 0.0 else 0.0
             # Shrink the trust region if the prediction was poor, and enlarge it if it was good.
             if ratio <= 0.25:
-                part = (
+                radius_factor = (
                     0.5
                     if actual >= 0.0
                     else 0.5 * (linear + damped) / (linear + damped - 0.5 * actual)
                 )
-                part = part if falls and part >= 0.1 else 0.1
-                radius, damping = part * min(radius, 10.0 * size), damping / part
+                radius_factor = radius_factor if falls and radius_factor >= 0.1 else 0.1
+                radius, damping = radius_factor * min(radius, 10.0 * size), damping / radius_factor
             elif damping == 0.0 or ratio >= 0.75:
                 radius, damping = 2.0 * size, 0.5 * damping
             accepted = ratio >= WORTHWHILE
             if accepted:
-                u, value, moved = u + step, next_value, True
+                u, value, has_moved = u + step, next_value, True
             small = abs(actual) <= TOLERANCE and predicted <= TOLERANCE and ratio <= 2.0
             if small or radius <= TOLERANCE * scale * abs(u) or evaluations >= EVALUATIONS:
                 return u
@@ -262,19 +269,19 @@ def damped_step(
         The step and its damping.
     """
     step = -value / slope
-    over = abs(scale * step) - radius
-    if over <= 0.1 * radius:
+    excess = abs(scale * step) - radius
+    if excess <= 0.1 * radius:
         return step, 0.0
-    least = over / radius * (slope / scale) ** 2
+    least = excess / radius * (slope / scale) ** 2
     # Bounds of the damping, as MINPACK's lmpar computes them for one unknown.
     damping = min(max(damping, least), abs(slope * value) / scale / radius)
-    for last in range(10):
+    for trial in range(10):
         square = slope * slope + damping * scale * scale
         step = -slope * value / square
-        over = abs(scale * step) - radius
-        if abs(over) <= 0.1 * radius or last == 9:
+        excess = abs(scale * step) - radius
+        if abs(excess) <= 0.1 * radius or trial == 9:
             break
-        if over > 0.0:
+        if excess > 0.0:
             least = max(least, damping)
-        damping = max(least, damping + over / radius * square / (scale * scale))
+        damping = max(least, damping + excess / radius * square / (scale * scale))
     return step, damping

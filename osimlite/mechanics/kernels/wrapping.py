@@ -222,34 +222,38 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         return WRAPPING.INSIDE
     if not crosses_sphere(first, second, radius):
         return WRAPPING.NONE
-    way = unit(minus(first, second))
-    normal = cross(way, unit(second))
+    chord_direction = unit(minus(first, second))
+    normal = cross(chord_direction, unit(second))
     # Ends and centre on one line define no plane.
     if norm(normal) < STRAIGHT:
         return clear_tangents(e, WRAPPING.WRAPPED)
     normal = unit(normal)
     a1, b1 = find_tangents(first, radius, normal)
     a2, b2 = find_tangents(second, radius, normal)
-    one, two = nearest_pair(a1, b1, a2, b2)
-    code, far = WRAPPING.WRAPPED, False
+    first_tangent, second_tangent = nearest_pair(a1, b1, a2, b2)
+    code, is_long = WRAPPING.WRAPPED, False
     if p[WRAP_SURFACE.SIDE] != 0.0:
         axis, side = int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]
         active = is_on_side(first, axis, side), is_on_side(second, axis, side)
-        before = dot(first, way)
+        distance_along_chord = dot(first, chord_direction)
         # OpenSim compares an absolute distance with 1 m here, see above.
         code = decide_wrapping(
-            *active, is_on_side(add_scaled(first, -before, way), axis, side), before < 1.0
+            *active,
+            is_on_side(add_scaled(first, -distance_along_chord, chord_direction), axis, side),
+            distance_along_chord < 1.0,
         )
         if code == WRAPPING.NONE:
             return WRAPPING.NONE
         # Only where an end is on the other side may the longer arc be the active one.
         if not (active[0] and active[1]):
-            one, two, far = pair_on_side(first, second, a1, b1, a2, b2, axis, side)
-    angle = atan2(norm(cross(one, two)), dot(one, two))
-    store_vector(e, WRAP_WORK.FIRST_TANGENT, one)
-    store_vector(e, WRAP_WORK.SECOND_TANGENT, two)
+            first_tangent, second_tangent, is_long = pair_on_side(
+                first, second, a1, b1, a2, b2, axis, side
+            )
+    angle = atan2(norm(cross(first_tangent, second_tangent)), dot(first_tangent, second_tangent))
+    store_vector(e, WRAP_WORK.FIRST_TANGENT, first_tangent)
+    store_vector(e, WRAP_WORK.SECOND_TANGENT, second_tangent)
     # The far arc has a negative length in OpenSim; the drawn arc goes the other way, too.
-    e[WRAP_WORK.CURVE] = angle - 2.0 * pi if far else angle
+    e[WRAP_WORK.CURVE] = angle - 2.0 * pi if is_long else angle
     e[WRAP_WORK.SURFACE_LENGTH] = radius * e[WRAP_WORK.CURVE]
     return code
 
@@ -262,8 +266,8 @@ def crosses_sphere(first: Vector, second: Vector, radius: float) -> bool:
         second: second end of the segment.
         radius: radius of the sphere.
     """
-    way = minus(first, second)
-    a, b, c = dot(way, way), 2.0 * dot(second, way), dot(second, second) - radius * radius
+    chord = minus(first, second)
+    a, b, c = dot(chord, chord), 2.0 * dot(second, chord), dot(second, second) - radius * radius
     discriminant = b * b - 4.0 * a * c
     if not (discriminant >= 0.0 and a > 0.0):
         return False
@@ -302,10 +306,10 @@ def pair_on_side(
         dot(a1, to_centre) < dot(b1, to_centre),
         dot(a2, to_centre) < dot(b2, to_centre),
     )
-    one, two = a1 if a1_nearer else b1, a2 if a2_nearer else b2
-    outwards = plus(minus(one, first), minus(two, second))
+    first_tangent, second_tangent = a1 if a1_nearer else b1, a2 if a2_nearer else b2
+    outwards = plus(minus(first_tangent, first), minus(second_tangent, second))
     # If the nearer tangent points lead away from the active side, take the other ones.
     if side * component(outwards, axis) < 0.0:
-        one, two = b1 if a1_nearer else a1, b2 if a2_nearer else a2
-        outwards = plus(minus(one, first), minus(two, second))
-    return one, two, dot(plus(one, two), outwards) < 0.0
+        first_tangent, second_tangent = b1 if a1_nearer else a1, b2 if a2_nearer else a2
+        outwards = plus(minus(first_tangent, first), minus(second_tangent, second))
+    return first_tangent, second_tangent, dot(plus(first_tangent, second_tangent), outwards) < 0.0

@@ -151,16 +151,16 @@ def _list_starts(x: Sequence[float], width: float) -> list[float]:
         low, high, u = u, 1.0, min(u + step, 1.0)
         for _ in range(ROUNDS):
             # Newton's method, or bisection where it would leave the interval.
-            off, slope = (
+            residual, slope = (
                 _evaluate_without_constant(x, u) - width * node / NODES,
                 _evaluate_derivative(x, u),
             )
-            low, high = (u, high) if off < 0.0 else (low, u)
-            before, u = u, u - off / slope if slope > 0.0 else -1.0
+            low, high = (u, high) if residual < 0.0 else (low, u)
+            previous_u, u = u, u - residual / slope if slope > 0.0 else -1.0
             if not low <= u <= high:
                 u = 0.5 * (low + high)
             # Newton's method converges quadratically; 1e-11 is far below what the search needs.
-            if abs(u - before) < NEAR * NEAR:
+            if abs(u - previous_u) < NEAR * NEAR:
                 break
         slope = _evaluate_derivative(x, u)
         step = width / NODES / slope if slope > 0.0 else 0.0
@@ -193,10 +193,10 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
     # Search without derivatives, then add them once by the implicit function theorem.
-    known = plain(x)
-    k, rest, u = find_section(c, known)
-    _, _, y, slope = search_section(c, k + X, 1, u, rest, ROUNDS)
-    return settled(y, slope * (known - x), 1.0), slope
+    plain_x = plain(x)
+    k, remainder, u = find_section(c, plain_x)
+    _, _, y, slope = search_section(c, k + X, 1, u, remainder, ROUNDS)
+    return settled(y, slope * (plain_x - x), 1.0), slope
 
 
 def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:
@@ -213,30 +213,30 @@ def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:
     while number < count - 1 and x >= c[HEAD + number]:
         number += 1
     k = HEAD + count + SECTION * number
-    rest = x - c[k + START]
-    part = rest * c[k + SCALE]
-    node = min(int(part), NODES - 1)
-    part -= node
+    remainder = x - c[k + START]
+    fraction = remainder * c[k + SCALE]
+    node = min(int(fraction), NODES - 1)
+    fraction -= node
     s = k + STARTS + 2 * node
     u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
     # Cubic Hermite interpolation of u between two nodes: most searches then need one step.
-    u = u0 + part * (
-        d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1))
+    u = u0 + fraction * (
+        d0 + fraction * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + fraction * (2.0 * (u0 - u1) + d0 + d1))
     )
-    return k, rest, u
+    return k, remainder, u
 
 
 def search_section(
-    c: Sequence[float], p: int, apart: int, u: float, rest: float, rounds: int
+    c: Sequence[float], p: int, stride: int, u: float, remainder: float, rounds: int
 ) -> tuple[float, bool, float, float]:
     """Find u on a section by Halley's method, and evaluate y there.
 
     Args:
         c: array that contains the coefficients of x and y.
         p: offset of the first coefficient.
-        apart: distance between coefficients.
+        stride: distance between coefficients.
         u: start of the search.
-        rest: distance of x from the start of the section.
+        remainder: distance of x from the start of the section.
         rounds: largest number of steps.
 
     Returns:
@@ -244,64 +244,64 @@ def search_section(
     """
     goes_on = True
     for _ in range(rounds):
-        u, goes_on = take_halley_step(c, p, apart, u, rest)
+        u, goes_on = take_halley_step(c, p, stride, u, remainder)
         if not goes_on:
             break
-    y, slope = evaluate_section(c, p, apart, u)
+    y, slope = evaluate_section(c, p, stride, u)
     return u, goes_on, y, slope
 
 
 def take_halley_step(
-    c: Sequence[float], p: int, apart: int, u: float, rest: float
+    c: Sequence[float], p: int, stride: int, u: float, remainder: float
 ) -> tuple[float, bool]:
     """Take one step of Halley's method for u, where x(u) has a requested value.
 
     Args:
         c: array that contains the coefficients of x and y.
         p: offset of the first coefficient.
-        apart: distance between coefficients.
+        stride: distance between coefficients.
         u: start of the step.
-        rest: distance of x from the start of the section.
+        remainder: distance of x from the start of the section.
 
     Returns:
         u, and whether more steps are necessary.
     """
-    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    a, b, d, e, f = c[p], c[p + stride], c[p + 2 * stride], c[p + 3 * stride], c[p + 4 * stride]
     # Two halves of the polynomial, which a processor evaluates in parallel.
     v = u * u
-    off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+    residual = u * ((a + u * b) + v * ((d + u * e) + v * f)) - remainder
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
     bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
     # Halley's step f f' / (f'^2 - f f'' / 2). `bend` is half of the second derivative. Where the
     # divisor is not positive, x(u) is too flat for a step, and the search ends.
-    divisor = run * run - off * bend
-    leads_on = divisor > 0.0
-    step = off * run / (divisor if leads_on else 1.0)
-    u = min(max(u - step, 0.0), 1.0) if leads_on else u
-    return u, leads_on and not abs(step) < NEAR
+    divisor = run * run - residual * bend
+    is_convergent = divisor > 0.0
+    step = residual * run / (divisor if is_convergent else 1.0)
+    u = min(max(u - step, 0.0), 1.0) if is_convergent else u
+    return u, is_convergent and not abs(step) < NEAR
 
 
-def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
+def evaluate_section(c: Sequence[float], p: int, stride: int, u: float) -> tuple[float, float]:
     """Return y and its slope by x at a parameter of a section.
 
     Args:
         c: array that contains the coefficients of x and y.
         p: offset of the first coefficient.
-        apart: distance between coefficients.
+        stride: distance between coefficients.
         u: parameter of the section, from 0 to 1.
 
     Returns:
         y and slope.
     """
-    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
-    v, q = u * u, p + 5 * apart
+    a, b, d, e, f = c[p], c[p + stride], c[p + 2 * stride], c[p + 3 * stride], c[p + 4 * stride]
+    v, q = u * u, p + 5 * stride
     g, h, i, j, k, m = (
         c[q],
-        c[q + apart],
-        c[q + 2 * apart],
-        c[q + 3 * apart],
-        c[q + 4 * apart],
-        c[q + 5 * apart],
+        c[q + stride],
+        c[q + 2 * stride],
+        c[q + 3 * stride],
+        c[q + 4 * stride],
+        c[q + 5 * stride],
     )
     # The slope dy/dx is (dy/du) / (dx/du); `run` and `rise` are these derivatives.
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
@@ -309,19 +309,19 @@ def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[
     return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
 
 
-def search_residual(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
+def search_residual(c: Sequence[float], p: int, stride: int, u: float, remainder: float) -> float:
     """Return x(u) less the requested x, the residual of the search.
 
     Args:
         c: array that contains the coefficients of x and y.
         p: offset of the first coefficient.
-        apart: distance between coefficients.
+        stride: distance between coefficients.
         u: parameter of the section.
-        rest: requested distance of x from the start of the section.
+        remainder: requested distance of x from the start of the section.
     """
-    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    a, b, d, e, f = c[p], c[p + stride], c[p + 2 * stride], c[p + 3 * stride], c[p + 4 * stride]
     v = u * u
-    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - remainder
 
 
 def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
@@ -346,9 +346,9 @@ def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tup
     end = end_beyond_sum(c, of_y, of_x, total)
     if end > 0:
         return extrapolate_sum(c, of_y, of_x, total, end), total - total
-    k, rest, u = find_section_of_sum(c, of_y, of_x, total)
+    k, remainder, u = find_section_of_sum(c, of_y, of_x, total)
     # Coefficients of the sum in one array, as `search_section` takes them.
-    own = (
+    sum_coefficients = (
         of_y * c[k + Y + 1] + of_x * c[k + X],
         of_y * c[k + Y + 2] + of_x * c[k + X + 1],
         of_y * c[k + Y + 3] + of_x * c[k + X + 2],
@@ -361,8 +361,8 @@ def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tup
         c[k + Y + 4],
         c[k + Y + 5],
     )
-    u, _, y, _ = search_section(own, 0, 1, u, rest, ROUNDS)
-    return y, search_residual(own, 0, 1, u, rest)
+    u, _, y, _ = search_section(sum_coefficients, 0, 1, u, remainder, ROUNDS)
+    return y, search_residual(sum_coefficients, 0, 1, u, remainder)
 
 
 def end_beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
@@ -432,17 +432,17 @@ def curve_integral(c: Sequence[float], x: float) -> float:
         c: numbers of the curve.
         x: upper limit.
     """
-    total, off = 0.0, x - c[FIRST]
+    total, excess = 0.0, x - c[FIRST]
     # Before the first end the curve is a line through it, so the integral is that of a trapezoid.
-    if off <= 0.0:
-        return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
-    at, rest, u = find_section(c, min(x, c[LAST]))
-    u, *_ = search_section(c, at + X, 1, u, rest, ROUNDS)
-    for k in range(HEAD + int(c[SECTIONS]), at, SECTION):
+    if excess <= 0.0:
+        return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * excess) * excess
+    section, remainder, u = find_section(c, min(x, c[LAST]))
+    u, *_ = search_section(c, section + X, 1, u, remainder, ROUNDS)
+    for k in range(HEAD + int(c[SECTIONS]), section, SECTION):
         total += _section_integral(c, k, 1.0)
-    total += _section_integral(c, at, u)
-    off = max(x - c[LAST], 0.0)
-    return total + (c[LAST + 1] + 0.5 * c[LAST + 2] * off) * off
+    total += _section_integral(c, section, u)
+    excess = max(x - c[LAST], 0.0)
+    return total + (c[LAST + 1] + 0.5 * c[LAST + 2] * excess) * excess
 
 
 def _section_integral(c: Sequence[float], k: int, u: float) -> float:

@@ -63,7 +63,7 @@ def cos_upright(length: float, height: float) -> float:
 
 
 def scaled_activation_rate(
-    excitation: float, activation: float, more: float, least: float, time: float
+    excitation: float, activation: float, rate_difference: float, smallest_rate: float, time: float
 ) -> float:
     """Return the rate of activation of Schutte's muscle (1/s).
 
@@ -73,11 +73,13 @@ def scaled_activation_rate(
     Args:
         excitation: excitation.
         activation: activation.
-        more: activation1, the increase of the rate with the excitation while rising.
-        least: activation2, the rate while falling.
+        rate_difference: activation1, the increase of the rate with the excitation while rising.
+        smallest_rate: activation2, the rate while falling.
         time: time_scale (s).
     """
-    speed = more * excitation + least if excitation >= activation else least
+    speed = (
+        rate_difference * excitation + smallest_rate if excitation >= activation else smallest_rate
+    )
     return (excitation - activation) * speed / time
 
 
@@ -91,8 +93,8 @@ def rigid_cos(path_length: float, m: OldMuscle) -> float:
         path_length: length of the path (m).
         m: muscle.
     """
-    along = path_length / m.optimal - m.slack
-    return cos_upright(sqrt(along * along + m.height * m.height), m.height)
+    length_along = path_length / m.optimal - m.slack
+    return cos_upright(sqrt(length_along * length_along + m.height * m.height), m.height)
 
 
 def generic_velocity_factor(rate: float, m: OldMuscle) -> float:
@@ -199,7 +201,12 @@ def thelen_active_force(length: float, width: float) -> float:
 
 
 def thelen_velocity(
-    activation: float, active: float, borne: float, damping: float, shape: float, most: float
+    activation: float,
+    active: float,
+    borne: float,
+    damping: float,
+    shape: float,
+    eccentric_limit: float,
 ) -> float:
     """Return the fiber velocity over the maximum one; the curve continues linearly at its ends.
 
@@ -209,26 +216,28 @@ def thelen_velocity(
         borne: force f that depends on the velocity.
         damping: constant c that is added to the denominator.
         shape: Af.
-        most: Flen.
+        eccentric_limit: Flen.
     """
     # Without activation the isometric force would be 0 and the curve degenerate.
-    isometric, near = max(activation, 1e-6) * active, 1e-6
+    isometric, small_force = max(activation, 1e-6) * active, 1e-6
     if borne < isometric:
         if borne >= 0.0:
             return thelen_shortening(borne, isometric, damping, shape)
-        # Continue below zero force with the slope of a secant over `near` at the end, as OpenSim
+        # Continue below zero force with the slope of a secant over `small_force` at the end, as OpenSim
         # does.
         at_end = thelen_shortening(0.0, isometric, damping, shape)
         return at_end + borne / (
-            near / (thelen_shortening(near, isometric, damping, shape) - at_end)
+            small_force / (thelen_shortening(small_force, isometric, damping, shape) - at_end)
         )
-    # The hyperbola has its asymptote at `most`; beyond 95 % of it the curve continues as a line.
-    end = 0.95 * isometric * most
+    # The hyperbola has its asymptote at `eccentric_limit`; beyond 95 % of it the curve continues as a line.
+    end = 0.95 * isometric * eccentric_limit
     if borne < end:
-        return thelen_lengthening(borne, isometric, damping, shape, most)
-    beside = (0.95 + near) * isometric * most
-    at_end = thelen_lengthening(end, isometric, damping, shape, most)
-    slope = (thelen_lengthening(beside, isometric, damping, shape, most) - at_end) / (beside - end)
+        return thelen_lengthening(borne, isometric, damping, shape, eccentric_limit)
+    next_force = (0.95 + small_force) * isometric * eccentric_limit
+    at_end = thelen_lengthening(end, isometric, damping, shape, eccentric_limit)
+    slope = (
+        thelen_lengthening(next_force, isometric, damping, shape, eccentric_limit) - at_end
+    ) / (next_force - end)
     return at_end + slope * (borne - end)
 
 
@@ -247,7 +256,7 @@ def thelen_shortening(borne: float, isometric: float, damping: float, shape: flo
 
 
 def thelen_lengthening(
-    borne: float, isometric: float, damping: float, shape: float, most: float
+    borne: float, isometric: float, damping: float, shape: float, eccentric_limit: float
 ) -> float:
     """Return the fiber velocity above the isometric force i, see `thelen_velocity`.
 
@@ -258,10 +267,11 @@ def thelen_lengthening(
         isometric: isometric force at the present activation.
         damping: constant c that is added to the denominator.
         shape: Af.
-        most: Flen, the largest force of lengthening fibers over the isometric one.
+        eccentric_limit: Flen, the largest force of lengthening fibers over the isometric one.
     """
     return (borne - isometric) / (
-        (2.0 + 2.0 / shape) * (isometric * most - borne) / (most - 1.0) + damping
+        (2.0 + 2.0 / shape) * (isometric * eccentric_limit - borne) / (eccentric_limit - 1.0)
+        + damping
     )
 
 
@@ -280,15 +290,15 @@ def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
     cos = cos_upright(length, m.height)
     tendon = path_length - length * cos
     if not tendon >= m.slack:
-        along, tendon = path_length - m.slack, m.slack
-        cos = max(along / sqrt(along * along + m.height * m.height), UPRIGHT)
-        length = max(along / cos, m.height)
+        length_along, tendon = path_length - m.slack, m.slack
+        cos = max(length_along / sqrt(length_along * length_along + m.height * m.height), UPRIGHT)
+        length = max(length_along / cos, m.height)
     return Guess(length, cos, tendon / m.slack - 1.0)
 
 
 def next_length(
     guess: Guess,
-    before: float,
+    previous_length: float,
     error: float,
     error_before: float,
     fibers: float,
@@ -304,7 +314,7 @@ def next_length(
 
     Args:
         guess: last guess.
-        before: fiber length of the previous guess (m).
+        previous_length: fiber length of the previous guess (m).
         error: tendon force less fiber force (N).
         error_before: the same for the previous guess (N).
         fibers: fiber force at the present activation.
@@ -316,7 +326,7 @@ def next_length(
     # step.
     if (error >= 0.0) != (error_before >= 0.0):
         return guess.length + abs(error) / (abs(error) + abs(error_before)) * (
-            before - guess.length
+            previous_length - guess.length
         )
     # A slack tendon has no stiffness; its modulus over its strength bounds the estimate from below.
     of_tendon = max(tendon, fibers * TENDON_MODULUS / TENDON_STRENGTH) * m.strength / m.slack

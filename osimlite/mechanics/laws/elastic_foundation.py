@@ -56,11 +56,13 @@ def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, V
     Returns:
         Depth and point (m). The spring acts where the depth is positive.
     """
-    way = minus(middle, center)
-    distance = norm(way)
+    radial = minus(middle, center)
+    distance = norm(radial)
     # Scale the radius vector to the surface; at the centre its direction is undefined.
     return (
-        (r - distance, add_scaled(center, r / distance, way)) if distance > 0.0 else (0.0, center)
+        (r - distance, add_scaled(center, r / distance, radial))
+        if distance > 0.0
+        else (0.0, center)
     )
 
 
@@ -101,19 +103,19 @@ def spring_load(
         Force (N), torque about `about` (N m), and energy (J).
     """
     k, c, us, ud, uv, vt = spring
-    way = minus(end, middle)
-    d = norm(way)
+    stretch = minus(end, middle)
+    d = norm(stretch)
     if d == 0.0:
         return ZERO, ZERO, 0.0
-    energy, n, arm = 0.5 * k * d * d, divide(way, d), minus(end, about)
+    energy, n, arm = 0.5 * k * d * d, divide(stretch, d), minus(end, about)
     # Velocity of the material of the other surface at the nearest point, relative to the mesh.
-    here = plus(v, cross(turning, arm))
-    vn = dot(here, n)
+    point_velocity = plus(v, cross(turning, arm))
+    vn = dot(point_velocity, n)
     f = k * d * (1.0 + c * vn)
     # A fast separation would make the contact pull; only the stored energy remains.
     if f <= 0.0:
         return ZERO, ZERO, energy
-    slip = add_scaled(here, -vn, n)
+    slip = add_scaled(point_velocity, -vn, n)
     w = norm(slip)
     # Without slip the direction of friction is undefined, and its size is 0.
     force = add_scaled(

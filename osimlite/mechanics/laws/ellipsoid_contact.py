@@ -42,10 +42,10 @@ def half_space_ellipsoid(
         Depth d, effective radius and point of application (m). The surfaces touch where d > 0;
         otherwise -d is the gap and the rest is undefined.
     """
-    one, two, three = axes
+    x_axis, y_axis, z_axis = axes
     rx, ry, rz = radii
     # The normal along the axes of the ellipsoid, times the half axes.
-    u = dot(n, one) * rx, dot(n, two) * ry, dot(n, three) * rz
+    u = dot(n, x_axis) * rx, dot(n, y_axis) * ry, dot(n, z_axis) * rz
     # Support function: the distance from the centre to the tangent plane that is perpendicular to
     # n.
     reach = norm(u)
@@ -54,7 +54,7 @@ def half_space_ellipsoid(
         return d, 0.0, ZERO
     # Lowest point of the ellipsoid, along its axes: -B n / reach.
     lx, ly, lz = divide(times(-1.0, multiply_elementwise(u, radii)), reach)
-    point = add_scaled(add_scaled(add_scaled(center, lx, one), ly, two), lz, three)
+    point = add_scaled(add_scaled(add_scaled(center, lx, x_axis), ly, y_axis), lz, z_axis)
     # The product of the curvatures of the section is (reach / (rx ry rz))^2; for a sphere the
     # effective radius is its radius.
     return d, sqrt(rx * ry * rz / reach), add_scaled(point, d * (1.0 - a), n)
@@ -90,7 +90,7 @@ def ellipsoid_ellipsoid(
         return 0.0, 0.0, ZERO, ZERO
     n = divide(centre_line, distance)
     squares1, squares2 = multiply_elementwise(radii1, radii1), multiply_elementwise(radii2, radii2)
-    tries, least, known, step = 0, inf, n, ZERO
+    tries, least, best_normal, step = 0, inf, n, ZERO
     while True:
         g1, g2 = stretch_by_squares(axes1, squares1, n), stretch_by_squares(axes2, squares2, n)
         s1, s2 = sqrt(dot(g1, n)), sqrt(dot(g2, n))
@@ -104,10 +104,10 @@ def ellipsoid_ellipsoid(
         if h > least * (1.0 + 1e-12) and tries < 100:
             # The step is too long: halve it.
             step = times(0.5, step)
-            n = plus(known, step)
+            n = plus(best_normal, step)
             n = divide(n, norm(n))
             continue
-        least, known = h, n
+        least, best_normal = h, n
         g1, g2 = divide(g1, s1), divide(g2, s2)
         u, v = make_perpendiculars(n)
         gu1, gv1, huu1, huv1, hvv1 = differentiate_support(axes1, squares1, g1, s1, u, v)
@@ -127,13 +127,13 @@ def ellipsoid_ellipsoid(
         step = add_scaled(
             times((huv * fv - hvv * fu) / determinant, u), (huv * fu - huu * fv) / determinant, v
         )
-        n = plus(known, step)
+        n = plus(best_normal, step)
         n = divide(n, norm(n))
     # The determinants are the inverse Gaussian curvatures of both surfaces; the relative curvature
     # follows from their sum.
-    one, two = huu1 * hvv1 - huv1 * huv1, huu2 * hvv2 - huv2 * huv2
+    first_determinant, second_determinant = huu1 * hvv1 - huv1 * huv1, huu2 * hvv2 - huv2 * huv2
     huv = huv1 + huv2
-    R = sqrt(one * two / ((huu1 + huu2) * (hvv1 + hvv2) - huv * huv))
+    R = sqrt(first_determinant * second_determinant / ((huu1 + huu2) * (hvv1 + hvv2) - huv * huv))
     return h, R, n, add_scaled(plus(c1, g1), -a * h, n)
 
 
@@ -148,10 +148,12 @@ def stretch_by_squares(axes: Axes, squares: Vector, x: Vector) -> Vector:
         squares: squares of the half axes (m²).
         x: vector.
     """
-    one, two, three = axes
+    x_axis, y_axis, z_axis = axes
     p, q, r = squares
     return add_scaled(
-        add_scaled(times(p * dot(one, x), one), q * dot(two, x), two), r * dot(three, x), three
+        add_scaled(times(p * dot(x_axis, x), x_axis), q * dot(y_axis, x), y_axis),
+        r * dot(z_axis, x),
+        z_axis,
     )
 
 

@@ -276,7 +276,7 @@ def bhargava2004_smoothed(
     force_length: float,
     maintained: float,
     m: Bhargava2004,
-    by: SmoothTransitions,
+    transitions: SmoothTransitions,
 ) -> tuple[float, float, float, float, float]:
     """Return the powers by Bhargava's model with smooth transitions (W).
 
@@ -292,7 +292,7 @@ def bhargava2004_smoothed(
         force_length: factor of the active force by length.
         maintained: factor of the heat of maintenance by length.
         m: muscle and probe.
-        by: parameters of the transitions.
+        transitions: parameters of the transitions.
 
     Returns:
         Total power, and the parts of activation, maintenance, shortening and work (W).
@@ -315,21 +315,31 @@ def bhargava2004_smoothed(
         )
         ends = 0.16 * isometric + 0.18 * total, 0.157 * total
         # OpenSim has no Huber form of this transition and takes the hyperbolic tangent instead.
-        factor = blend_values(velocity, *ends, by.velocity_smoothing, -1.0, min(by.form, 1.0))
+        factor = blend_values(
+            velocity, *ends, transitions.velocity_smoothing, -1.0, min(transitions.form, 1.0)
+        )
     else:
-        factor = blend_values(velocity, 0.25 * total, 0.0, by.velocity_smoothing, -1.0, by.form)
+        factor = blend_values(
+            velocity, 0.25 * total, 0.0, transitions.velocity_smoothing, -1.0, transitions.form
+        )
     shortening = -factor * velocity
     work = -active_force * fiber_velocity
     if not m.include_negative_mechanical_work:
         # Negative work, of lengthening fibers, is blended out.
-        work = blend_values(velocity, work, 0.0, by.velocity_smoothing, -1.0, by.form)
+        work = blend_values(
+            velocity, work, 0.0, transitions.velocity_smoothing, -1.0, transitions.form
+        )
     if m.forbid_negative_total_power:
         # Power that would be negative is blended into additional heat of shortening.
         power = starting + keeping + shortening + work
-        shortening -= blend_values(-power, 0.0, power, by.power_smoothing, 1.0, by.form)
+        shortening -= blend_values(
+            -power, 0.0, power, transitions.power_smoothing, 1.0, transitions.form
+        )
     heat = starting + keeping + shortening
     if m.enforce_minimum_heat_rate_per_muscle:
-        heat = blend_values(m.mass - heat, heat, m.mass, by.heat_rate_smoothing, 1.0, by.form)
+        heat = blend_values(
+            m.mass - heat, heat, m.mass, transitions.heat_rate_smoothing, 1.0, transitions.form
+        )
     return heat + work, starting, keeping, shortening, work
 
 

@@ -114,7 +114,7 @@ def evaluate_dynamics(
     turning, turn = -velocity / fiber * tan, -tan / fiber
     # Fiber velocity along the tendon, and derivatives by the fiber length at the same fiber
     # velocity.
-    along = velocity * cos - fiber * sin * turning
+    velocity_along = velocity * cos - fiber * sin * turning
     turning_slope = velocity / (fiber * fiber) * tan - velocity / fiber * (1.0 + tan * tan) * turn
     along_slope = (
         -velocity * sin * turn
@@ -140,7 +140,7 @@ def evaluate_dynamics(
     # The damping of steep fibers acts on their velocity along the tendon, normalized by the optimal
     # length along it.
     normal = m.steep_damping / (m.optimal * m.optimal_cos)
-    steepened = max(1.0 - normal * along, 0.0)
+    steepened = max(1.0 - normal * velocity_along, 0.0)
     steep_slope = -steep_slope * sin * turn * steepened - (
         steep * normal * along_slope if steepened > 0.0 else 0.0
     )
@@ -163,23 +163,33 @@ def evaluate_dynamics(
         + 2.0 * fiber * turning * turning_slope
     )
     # OpenSim does not count the fibers' own damping as a passive force.
-    told = m.strength * (stretch * stretched - short * shortened - steep * steepened * cos)
+    reported_passive = m.strength * (
+        stretch * stretched - short * shortened - steep * steepened * cos
+    )
     # From stiffness by fiber length to stiffness by length along the tendon.
     stiffness /= cos - fiber * sin * turn
     return MuscleDynamics(
-        cos, by_length, by_velocity, told, tension, acceleration, slope, stiffness, tendon_stiffness
+        cos,
+        by_length,
+        by_velocity,
+        reported_passive,
+        tension,
+        acceleration,
+        slope,
+        stiffness,
+        tendon_stiffness,
     )
 
 
 def millard2012_acceleration(
-    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
+    inputs: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Compute forces and rates of a muscle.
 
     Only the rate of activation is bounded, and no fiber length.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
 
@@ -188,55 +198,55 @@ def millard2012_acceleration(
         length and by velocity, active and passive fiber force (N), whether the fibers are longer than
         the muscle is wide, rate of activation (1/s), fiber velocity (m/s) and its rate (m/s²).
     """
-    fiber_length, velocity = now.fiber_length, now.fiber_velocity
+    fiber_length, velocity = inputs.fiber_length, inputs.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
     # With constant height the rate of the length along the tendon is v / cos(phi).
-    tendon, rate = now.length - fiber_length * cos, now.rate - velocity / cos
-    at = evaluate_dynamics(m, now.activation, fiber_length, velocity, tendon, rate, curves)
-    pull = now.activation * at.by_length * at.by_velocity * m.strength
+    tendon, rate = inputs.length - fiber_length * cos, inputs.rate - velocity / cos
+    dynamics = evaluate_dynamics(m, inputs.activation, fiber_length, velocity, tendon, rate, curves)
+    pull = inputs.activation * dynamics.by_length * dynamics.by_velocity * m.strength
     change = first_order_activation_rate(
-        now.excitation, now.activation, m.rising, m.falling, m.least
+        inputs.excitation, inputs.activation, m.rising, m.falling, m.least
     )
     return (
-        at.tension,
-        now.activation,
+        dynamics.tension,
+        inputs.activation,
         fiber_length,
-        at.cos,
-        at.by_length,
-        at.by_velocity,
+        dynamics.cos,
+        dynamics.by_length,
+        dynamics.by_velocity,
         pull,
-        at.passive,
+        dynamics.passive,
         fiber_length > m.height,
         change,
         velocity,
-        at.acceleration,
+        dynamics.acceleration,
     )
 
 
 def millard2012_acceleration_rigid(
-    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
+    inputs: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> float:
     """Return the force of fully active fibers along a rigid tendon (N).
 
     See OpenSim's calcInextensibleTendonActiveFiberForce.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
     """
     # Fibers clamped to their smallest length bear no force along a rigid tendon.
-    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    fiber = fiber_length_along(inputs.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     by_length, _ = curve_value(curves.active, fiber / m.optimal)
-    by_velocity, _ = curve_value(curves.velocity, now.rate * cos / (m.optimal * m.fastest))
+    by_velocity, _ = curve_value(curves.velocity, inputs.rate * cos / (m.optimal * m.fastest))
     return m.strength * by_length * by_velocity * cos
 
 
 def millard2012_acceleration_equilibrium(
-    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
+    inputs: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[bool, float, float]:
     """Find a fiber length that is not accelerated.
 
@@ -246,14 +256,14 @@ def millard2012_acceleration_equilibrium(
     stiffness becomes taut.
 
     Args:
-        now: inputs of the muscle; only length, rate, activation and fiber velocity are used.
+        inputs: inputs of the muscle; only length, rate, activation and fiber velocity are used.
         m: muscle.
         curves: curves of the muscle.
 
     Returns:
         Whether there is one, the fiber length (m), and its velocity (m/s).
     """
-    length, rate = now.length, now.rate
+    length, rate = inputs.length, inputs.rate
     # OpenSim starts with a tendon strained by 1 % and at rest. Its tolerance is that of a force,
     # but bounds the acceleration.
     tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
@@ -263,24 +273,26 @@ def millard2012_acceleration_equilibrium(
             break
         cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
         velocity = (rate - tendon_rate) * cos
-        at = evaluate_dynamics(m, now.activation, fiber, velocity, tendon, tendon_rate, curves)
-        if abs(at.acceleration) <= tolerance:
+        dynamics = evaluate_dynamics(
+            m, inputs.activation, fiber, velocity, tendon, tendon_rate, curves
+        )
+        if abs(dynamics.acceleration) <= tolerance:
             return True, fiber, velocity
         # Also false for NaN: an undefined slope ends the search.
-        if not SIGNIFICANT < abs(at.slope) < inf:
+        if not SIGNIFICANT < abs(dynamics.slope) < inf:
             break
-        fiber = max(fiber - STEP * at.acceleration / at.slope, m.shortest)
+        fiber = max(fiber - STEP * dynamics.acceleration / dynamics.slope, m.shortest)
         tendon = length - fiber * cos_pennation(
             fiber, m.height, m.shortest, m.largest_sin, m.least_cos
         )
         # A slack tendon takes the complete rate; a taut one its part by the stiffness of the
         # fibers.
-        both, tendon_rate = at.stiffness + at.tendon_stiffness, rate
-        if tendon > m.slack and abs(both) > SIGNIFICANT:
-            if at.tendon_stiffness == 0.0:
+        total_stiffness, tendon_rate = dynamics.stiffness + dynamics.tendon_stiffness, rate
+        if tendon > m.slack and abs(total_stiffness) > SIGNIFICANT:
+            if dynamics.tendon_stiffness == 0.0:
                 break
-            tendon_rate = at.stiffness / both * rate
-    return False, fiber, now.fiber_velocity
+            tendon_rate = dynamics.stiffness / total_stiffness * rate
+    return False, fiber, inputs.fiber_velocity
 
 
 def millard2012_acceleration_energy(

@@ -99,7 +99,7 @@ class MillardFibers(NamedTuple):
 
 
 def millard2012_equilibrium(
-    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+    inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Compute forces and rates of a muscle.
 
@@ -109,7 +109,7 @@ def millard2012_equilibrium(
     rigid tendon bears no pressure: the damping of fast fibers is bounded instead.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
 
@@ -118,7 +118,7 @@ def millard2012_equilibrium(
         length and by velocity, active and passive fiber force (N), whether a fiber velocity exists,
         rate of activation (1/s), fiber velocity (m/s), elastic part of the passive force (N).
     """
-    fibers = fibers_resting(now, m, curves)
+    fibers = fibers_resting(inputs, m, curves)
     is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
     # Only the branch that applies evaluates a curve over velocity.
     if fibers.told_by == RIGID:
@@ -135,7 +135,7 @@ def millard2012_equilibrium(
 
 
 def millard2012_again(
-    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
+    inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Compute the muscle with a known velocity of damped fibers, to obtain all derivatives.
 
@@ -143,7 +143,7 @@ def millard2012_again(
     function theorem, with the derivatives of the other quantities.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
         fiber_velocity: known fiber velocity (m/s).
@@ -151,7 +151,7 @@ def millard2012_again(
     Returns:
         The results of `millard2012_equilibrium`.
     """
-    fibers = fibers_resting(now, m, curves)
+    fibers = fibers_resting(inputs, m, curves)
     velocity = (
         plain(fiber_velocity) / (m.fastest * m.optimal)
         if fibers.told_by == DAMPED
@@ -165,27 +165,27 @@ def millard2012_again(
     if fibers.told_by == DAMPED:
         # Residual of the equilibrium; its derivative by the velocity gives the derivatives of the
         # root.
-        share = fibers.active * fibers.by_length
-        off = share * by_velocity + m.damping * velocity - fibers.velocity
-        velocity = settled(velocity, off, share * slope + m.damping)
+        active_factor = fibers.active * fibers.by_length
+        residual = active_factor * by_velocity + m.damping * velocity - fibers.velocity
+        velocity = settled(velocity, residual, active_factor * slope + m.damping)
     by_length, elastic, tendon = fibers.by_length, fibers.elastic, fibers.tendon
     return muscle_with(fibers, m, True, velocity, by_velocity, by_length, elastic, tendon)
 
 
 def fibers_resting(
-    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+    inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> MillardFibers:
     """Evaluate the curves over length, but not those over velocity.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
 
     Returns:
         Fibers, with the values of the curves over length and what determines the velocity.
     """
-    fibers, tendon = fibers_at(now, m), 0.0
+    fibers, tendon = fibers_at(inputs, m), 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
     elastic, _ = curve_value(curves.passive, fibers.by_length)
     if not m.is_rigid:
@@ -205,11 +205,11 @@ def fibers_resting(
     )
 
 
-def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
+def fibers_at(inputs: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     """Compute the arguments of all curves.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
 
     Returns:
@@ -217,30 +217,41 @@ def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
         normalized tendon length.
     """
     # OpenSim clamps the activation before it enters the equilibrium.
-    active = min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
-    fiber = now.fiber_length
+    active = min(max(inputs.excitation if m.is_excited else inputs.activation, m.least), 1.0)
+    fiber = inputs.fiber_length
     if m.is_rigid:
-        fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+        fiber = fiber_length_along(inputs.length - m.slack, m.height, m.shortest, m.least_cos)
     fiber = max(fiber, m.smallest)
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
-    along_tendon = now.length - fiber * cos
+    along_tendon = inputs.length - fiber * cos
     told_by, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
     if m.is_rigid:
         told_by = SLACK
         # A rigid tendon is slack where the path is too short for it; SIGNIFICANT allows for
         # rounding.
         if along_tendon >= m.slack - SIGNIFICANT:
-            told_by, velocity = RIGID, now.rate * cos / (m.optimal * m.fastest)
+            told_by, velocity = RIGID, inputs.rate * cos / (m.optimal * m.fastest)
     else:
         tendon = along_tendon / m.slack
     # Perpendicular fibers cannot balance a tendon.
     if not cos > SIGNIFICANT:
         told_by = NONE
     change = first_order_activation_rate(
-        now.excitation, now.activation, m.rising, m.falling, m.least
+        inputs.excitation, inputs.activation, m.rising, m.falling, m.least
     )
-    over = fiber / m.optimal
-    return MillardFibers(told_by, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
+    normalized_length = fiber / m.optimal
+    return MillardFibers(
+        told_by,
+        velocity,
+        1.0,
+        active,
+        fiber,
+        cos,
+        normalized_length,
+        normalized_length,
+        tendon,
+        change,
+    )
 
 
 def fibers_loaded(
@@ -394,25 +405,29 @@ def muscle_with(
     )
 
 
-def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:
+def millard2012_rigid(
+    inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+) -> float:
     """Return the force of fully active fibers along a rigid tendon (N).
 
     See OpenSim's calcInextensibleTendonActiveFiberForce. As there, the pennation that projects the
     force onto the tendon is that of fibers with their normalized length in m: next to none.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
     """
-    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    fiber = fiber_length_along(inputs.length - m.slack, m.height, m.shortest, m.least_cos)
     if fiber <= m.smallest:
         return 0.0
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     by_length, _ = curve_value(curves.active, fiber / m.optimal)
-    by_velocity, _ = curve_value(curves.velocity, now.rate * cos / (m.optimal * m.fastest))
-    taken = cos_pennation(fiber / m.optimal, m.height, m.shortest, m.largest_sin, m.least_cos)
-    return m.strength * by_length * by_velocity * taken
+    by_velocity, _ = curve_value(curves.velocity, inputs.rate * cos / (m.optimal * m.fastest))
+    normalized_cos = cos_pennation(
+        fiber / m.optimal, m.height, m.shortest, m.largest_sin, m.least_cos
+    )
+    return m.strength * by_length * by_velocity * normalized_cos
 
 
 def damped_velocity(
@@ -479,14 +494,14 @@ def millard2012_energy(
         cos: cosine of pennation.
         curves: curves of the muscle.
     """
-    stored = m.optimal * curve_integral(curves.passive, fiber_length / m.optimal)
+    energy = m.optimal * curve_integral(curves.passive, fiber_length / m.optimal)
     if not m.is_rigid:
-        stored += m.slack * curve_integral(curves.tendon, (length - fiber_length * cos) / m.slack)
-    return m.strength * stored
+        energy += m.slack * curve_integral(curves.tendon, (length - fiber_length * cos) / m.slack)
+    return m.strength * energy
 
 
 def millard2012_equilibrium_length(
-    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+    inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> tuple[bool, float]:
     """Find the fiber length at which resting fibers and tendon bear the same force.
 
@@ -494,7 +509,7 @@ def millard2012_equilibrium_length(
     which ignores the rate of the path. A length below the smallest one is replaced by it.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         curves: curves of the muscle.
 
@@ -502,8 +517,8 @@ def millard2012_equilibrium_length(
         Whether there is one, and the fiber length (m).
     """
     length, active = (
-        now.length,
-        min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0),
+        inputs.length,
+        min(max(inputs.excitation if m.is_excited else inputs.activation, m.least), 1.0),
     )
     # OpenSim's tolerance, and its start with a tendon strained by 1 %.
     tolerance = max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
@@ -514,19 +529,19 @@ def millard2012_equilibrium_length(
     for _ in range(LENGTH_ROUNDS):
         if not abs(error) > tolerance:
             break
-        before, last, part, direction = error, fiber, 1.0, error / slope
+        previous_error, previous_fiber, fraction, direction = error, fiber, 1.0, error / slope
         # Halve the step until the residual decreases.
-        while abs(error) >= abs(before):
-            step = -part * direction
+        while abs(error) >= abs(previous_error):
+            step = -fraction * direction
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
                 # Try the opposite direction.
-                step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
-            fiber = max(last + step, m.smallest)
+                step, fraction = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
+            fiber = max(previous_fiber + step, m.smallest)
             error, slope = force_imbalance(m, length, fiber, active, curves)
-            if part <= SMALLEST:
+            if fraction <= SMALLEST:
                 break
-            part *= 0.5
+            fraction *= 0.5
     # At the smallest length any residual is accepted, because the fibers cannot shorten further.
     return abs(error) < tolerance or (fiber <= m.smallest and not isnan(error)), fiber
 
@@ -557,10 +572,11 @@ def force_imbalance(
     sin = m.height / fiber
     # d(cos phi)/dl = sin^2(phi) / (l cos(phi)), because l sin(phi) is constant.
     turn = sin * sin / cos
-    along = (
+    fiber_stiffness = (
         m.strength * (active * active_slope + passive_slope) / m.optimal * cos
         + borne * turn / fiber
     )
-    return borne * cos - tendon * m.strength, along + tendon_slope * m.strength / m.slack * (
-        cos + turn
+    return (
+        borne * cos - tendon * m.strength,
+        fiber_stiffness + tendon_slope * m.strength / m.slack * (cos + turn),
     )

@@ -86,7 +86,7 @@ def force_velocity(
     isometric: float,
     eccentric_end: float,
     eccentric_near: float,
-    most: float,
+    eccentric_limit: float,
     concentric_curviness: float,
     eccentric_curviness: float,
     *,
@@ -100,7 +100,7 @@ def force_velocity(
         isometric: slope at zero velocity.
         eccentric_end: slope at the maximum lengthening velocity.
         eccentric_near: slope near it.
-        most: factor at the maximum lengthening velocity.
+        eccentric_limit: factor at the maximum lengthening velocity.
         concentric_curviness: curviness for shortening.
         eccentric_curviness: curviness for lengthening.
         inverse: whether to return the velocity over the factor.
@@ -109,7 +109,9 @@ def force_velocity(
         ValueError: there is no such curve.
     """
     # The conditions are OpenSim's; outside them its curve has no corner or does not rise.
-    _require_condition(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
+    _require_condition(
+        eccentric_limit > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1"
+    )
     _require_below(concentric_end, concentric_near, "concentric_slope_at_vmax")
     # OpenSim accepts a slope of 1 for this curve, but not for the inverse one.
     _require_condition(
@@ -124,7 +126,7 @@ def force_velocity(
     _require_condition(
         eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}"
     )
-    _require_below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
+    _require_below(eccentric_near, eccentric_limit - 1.0, "eccentric_slope_near_vmax")
     # OpenSim places the corners near the maximum velocities at 90 % of them; each point lies on a
     # line with the mean of both slopes.
     points = [
@@ -137,10 +139,12 @@ def force_velocity(
         (0.0, 1.0, isometric),
         (
             0.9,
-            most + 0.5 * eccentric_near * (0.9 - 1.0) + 0.5 * eccentric_end * (0.9 - 1.0),
+            eccentric_limit
+            + 0.5 * eccentric_near * (0.9 - 1.0)
+            + 0.5 * eccentric_end * (0.9 - 1.0),
             eccentric_near,
         ),
-        (1.0, most, eccentric_end),
+        (1.0, eccentric_limit, eccentric_end),
     ]
     # The inverse swaps the axes of the control points. It is not the exact inverse between them.
     if inverse:
@@ -299,21 +303,21 @@ def _require_above(slope: float, limit: float, name: str) -> None:
 
 
 def _complete_properties(
-    given: tuple[float | None, ...], usual: tuple[float, ...], first: str
+    values: tuple[float | None, ...], defaults: tuple[float, ...], first_name: str
 ) -> tuple[float, ...]:
     """Return optional properties, or their defaults if all are omitted.
 
     Args:
-        given: properties, None where omitted.
-        usual: their defaults.
-        first: name of the first property, for the message.
+        values: properties, None where omitted.
+        defaults: their defaults.
+        first_name: name of the first property, for the message.
 
     Raises:
         ValueError: some are omitted and others are not, which OpenSim does not accept.
     """
-    result = [x for x in given if x is not None]
+    result = [x for x in values if x is not None]
     _require_condition(
-        len(result) in (0, len(usual)),
-        f"its {first} and what follows it are neither all given nor all left out",
+        len(result) in (0, len(defaults)),
+        f"its {first_name} and what follows it are neither all given nor all left out",
     )
-    return tuple(result) or usual
+    return tuple(result) or defaults

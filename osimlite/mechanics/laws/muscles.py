@@ -95,15 +95,21 @@ def cos_pennation(
     return sqrt((length - height) * (length + height)) / length
 
 
-def fiber_length_along(along: float, height: float, shortest: float, least_cos: float) -> float:
+def fiber_length_along(
+    length_along: float, height: float, shortest: float, least_cos: float
+) -> float:
     """Return the fiber length for a length along the tendon (m).
 
     It is sqrt(h^2 + along^2), not less than the smallest fiber length.
 
     Args:
-        along: length of the fibers along the tendon (m).
+        length_along: length of the fibers along the tendon (m).
         height: height h of the fibers (m), from `pennation_constants` as all that follow.
         shortest: smallest fiber length (m).
         least_cos: cosine of the largest angle.
     """
-    return sqrt(height * height + along * along) if along >= shortest * least_cos else shortest
+    return (
+        sqrt(height * height + length_along * length_along)
+        if length_along >= shortest * least_cos
+        else shortest
+    )

@@ -30,32 +30,36 @@ def combine_axes(axes: Axes, a: Vector) -> Vector:
         a: components along them.
     """
     x, y, z = a
-    one, two, three = axes
+    x_axis, y_axis, z_axis = axes
     return (
-        x * one[0] + y * two[0] + z * three[0],
-        x * one[1] + y * two[1] + z * three[1],
-        x * one[2] + y * two[2] + z * three[2],
+        x * x_axis[0] + y * y_axis[0] + z * z_axis[0],
+        x * x_axis[1] + y * y_axis[1] + z * z_axis[1],
+        x * x_axis[2] + y * y_axis[2] + z * z_axis[2],
     )
 
 
-def multiply_rotations(axes: Axes, others: Axes) -> Axes:
-    """Return axes whose components along `axes` are `others`: the product of both rotations.
+def multiply_rotations(axes: Axes, local_axes: Axes) -> Axes:
+    """Return axes whose components along `axes` are `local_axes`: the product of both rotations.
 
     Args:
         axes: axes of a frame B in A.
-        others: axes of a frame C in B.
+        local_axes: axes of a frame C in B.
 
     Returns:
         Axes of C in A.
     """
-    one, two, three = others
-    return combine_axes(axes, one), combine_axes(axes, two), combine_axes(axes, three)
+    x_axis, y_axis, z_axis = local_axes
+    return combine_axes(axes, x_axis), combine_axes(axes, y_axis), combine_axes(axes, z_axis)
 
 
 def transpose_rotation(axes: Axes) -> Axes:
     """Return the inverse of a rotation, the transpose of its matrix."""
-    one, two, three = axes
-    return (one[0], two[0], three[0]), (one[1], two[1], three[1]), (one[2], two[2], three[2])
+    x_axis, y_axis, z_axis = axes
+    return (
+        (x_axis[0], y_axis[0], z_axis[0]),
+        (x_axis[1], y_axis[1], z_axis[1]),
+        (x_axis[2], y_axis[2], z_axis[2]),
+    )
 
 
 def rotation_about_axis(axis: Vector, s: float, c: float) -> Axes:

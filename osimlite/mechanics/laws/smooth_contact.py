@@ -117,17 +117,17 @@ def smooth_contact_derivatives(
         return 0.0, 0.0, 0.0, 0.0
     # The derivative of (1 + tanh(b x)) / 2 is that expression times b (1 - tanh(b x)).
     growth = 1.5 * d / (d * d + cf) + bd * (1.0 - tanh(bd * d))
-    part, slope = 1.0 + 1.5 * c * vn, 1.5 * c
+    damping_factor, slope = 1.0 + 1.5 * c * vn, 1.5 * c
     if c != 0.0:
         t = tanh(bv * (vn + 2.0 / (3.0 * c)))
-        slope = (0.5 + 0.5 * t) * (slope + part * bv * (1.0 - t))
-        part *= 0.5 + 0.5 * t
+        slope = (0.5 + 0.5 * t) * (slope + damping_factor * bv * (1.0 - t))
+        damping_factor *= 0.5 + 0.5 * t
     slip = add_scaled(v, -vn, n)
     w = sqrt(dot(slip, slip) + cf)
     return (
-        hertz * part * growth,
+        hertz * damping_factor * growth,
         hertz * slope,
-        hertz * part * friction_coefficient(w, us, ud, uv, vt) / w,
+        hertz * damping_factor * friction_coefficient(w, us, ud, uv, vt) / w,
         growth,
     )
 

@@ -168,7 +168,7 @@ def smooth_tendon_length(force: float, growth: float) -> float:
 
 
 def degroote(
-    now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
+    inputs: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
 ]:
@@ -183,7 +183,7 @@ def degroote(
     elastic tendon it changes only what is reported of the fibers.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         tendon: further parameters.
 
@@ -193,13 +193,13 @@ def degroote(
         normalized tendon force (1/s), fiber velocity (m/s), elastic part of the passive force (N),
         energy (J).
     """
-    a = now.activation if m.follows else now.excitation
-    force = now.normalized_tendon_force
+    a = inputs.activation if m.follows else inputs.excitation
+    force = inputs.normalized_tendon_force
     # The tendon force is the state, so its curve is inverted instead of the equilibrium solved.
     tendon_length = smooth_tendon_length(force, tendon.growth) if tendon.elastic else 1.0
-    along = now.length - m.slack * tendon_length
-    fiber_length = sqrt(along * along + m.height * m.height)
-    cos = along / fiber_length
+    length_along = inputs.length - m.slack * tendon_length
+    fiber_length = sqrt(length_along * length_along + m.height * m.height)
+    cos = length_along / fiber_length
     active = degroote_active(fiber_length / m.optimal, m.scale)
     passive, energy = (
         degroote_passive(fiber_length / m.optimal, tendon.passive_strain)
@@ -215,11 +215,11 @@ def degroote(
         velocity = degroote_velocity(factor)
         # Derivative of the tendon force by the normalized tendon length.
         slope = tendon.growth * (force + BELOW)
-        force_rate = (now.rate - velocity * fastest / cos) / m.slack * slope
+        force_rate = (inputs.rate - velocity * fastest / cos) / m.slack * slope
     else:
         # With a rigid tendon, or a tendon force that is constant here, fibers take the rate of the
         # path.
-        velocity = now.rate * cos / fastest
+        velocity = inputs.rate * cos / fastest
         factor = degroote_factor(velocity)
     active_force = m.strength * a * active * factor
     spring = m.strength * passive
@@ -229,49 +229,51 @@ def degroote(
         tension = m.strength * force
         # Integral of the tendon force over the stretch of the tendon.
         energy += m.strength * m.slack * (force / tendon.growth - BELOW * (tendon_length - 1.0))
-    activation_rate = smooth_activation_rate(now.excitation, a, m.rising, m.falling, m.sharpness)
+    activation_rate = smooth_activation_rate(inputs.excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
     return tension, a, *fibers, activation_rate, force_rate, velocity * fastest, spring, energy
 
 
-def degroote_rigid(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
+def degroote_rigid(inputs: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
     """Return the force of fully active fibers with a rigid tendon, along the fibers (N).
 
     As in OpenSim it is not projected onto the tendon.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         tendon: further parameters, without effect.
     """
-    fiber_length, velocity = rigid_fibers(now, m)
+    fiber_length, velocity = rigid_fibers(inputs, m)
     return m.strength * degroote_active(fiber_length, m.scale) * degroote_factor(velocity)
 
 
-def rigid_fibers(now: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
+def rigid_fibers(inputs: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
     """Return normalized length and velocity of the fibers with a rigid tendon.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
 
     Returns:
         Length and velocity.
     """
-    along = now.length - m.slack
-    fiber_length = sqrt(along * along + m.height * m.height)
-    return fiber_length / m.optimal, now.rate * (along / fiber_length) / (m.fastest * m.optimal)
+    length_along = inputs.length - m.slack
+    fiber_length = sqrt(length_along * length_along + m.height * m.height)
+    return fiber_length / m.optimal, inputs.rate * (length_along / fiber_length) / (
+        m.fastest * m.optimal
+    )
 
 
 def degroote_equilibrium(
-    now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
+    inputs: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> tuple[bool, float]:
     """Find the tendon force that the fibers bear while it is constant, by bisection from 0 to 5.
 
     The steps are those of OpenSim's solveBisection.
 
     Args:
-        now: inputs of the muscle; the tendon force is not used.
+        inputs: inputs of the muscle; the tendon force is not used.
         m: muscle.
         tendon: further parameters.
 
@@ -279,15 +281,15 @@ def degroote_equilibrium(
         Whether there is one, and the force.
     """
     low, high = 0.0, LARGEST_FORCE
-    at_low = degroote_residual(low, now, m, tendon)
+    at_low = degroote_residual(low, inputs, m, tendon)
     # OpenSim requires a change of sign between both ends. The search runs in any case.
-    result = at_low * degroote_residual(high, now, m, tendon) < 0.0
+    result = at_low * degroote_residual(high, inputs, m, tendon) < 0.0
     middle = low
     for _ in range(ROUNDS):
         if high - low <= CLOSE:
             break
         middle = 0.5 * (low + high)
-        residual = degroote_residual(middle, now, m, tendon)
+        residual = degroote_residual(middle, inputs, m, tendon)
         if residual * at_low < 0.0:
             high = middle
         else:
@@ -296,21 +298,23 @@ def degroote_equilibrium(
 
 
 def degroote_residual(
-    force: float, now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
+    force: float, inputs: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> float:
     """Return the tendon force less the force of the fibers along it, for a constant tendon force.
 
     Args:
         force: normalized tendon force.
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
         tendon: further parameters.
     """
     # A constant tendon force: the velocity of the fibers is that of the path, not that of the
     # equilibrium.
-    still = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
-    pulled = MuscleInputs(now.length, now.rate, now.excitation, now.activation, 0.0, 0.0, force)
-    result = degroote(pulled, m, still)
+    constant_tendon = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
+    pulled = MuscleInputs(
+        inputs.length, inputs.rate, inputs.excitation, inputs.activation, 0.0, 0.0, force
+    )
+    result = degroote(pulled, m, constant_tendon)
     # Fields 3, 6 and 7 of the result are the cosine of pennation and the active and passive fiber
     # force.
     return force - (result[6] + result[7]) / m.strength * result[3]
@@ -357,7 +361,7 @@ def meyer_factor(velocity: float) -> float:
 
 
 def meyer(
-    now: MuscleInputs, m: SmoothMuscle
+    inputs: MuscleInputs, m: SmoothMuscle
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
     """Compute forces and rates of Meyer's muscle, whose tendon is rigid.
 
@@ -366,7 +370,7 @@ def meyer(
     OpenSim defines no energy for it.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
 
     Returns:
@@ -374,31 +378,31 @@ def meyer(
         length and by velocity, active and passive fiber force (N), rate of activation (1/s), fiber
         velocity (m/s), elastic part of the passive force (N).
     """
-    a = now.activation if m.follows else now.excitation
+    a = inputs.activation if m.follows else inputs.excitation
     # The tendon is rigid: its length is always the slack length.
-    along = now.length - m.slack
-    fiber_length = sqrt(along * along + m.height * m.height)
-    cos = along / fiber_length
+    length_along = inputs.length - m.slack
+    fiber_length = sqrt(length_along * length_along + m.height * m.height)
+    cos = length_along / fiber_length
     active = meyer_active(fiber_length / m.optimal, m.scale)
     passive = meyer_passive(fiber_length / m.optimal) if m.passive else 0.0
-    velocity = now.rate * cos / (m.fastest * m.optimal)
+    velocity = inputs.rate * cos / (m.fastest * m.optimal)
     factor = meyer_factor(velocity)
     active_force = m.strength * a * active * factor
     passive_force = m.strength * (passive + m.damping * velocity)
     tension = (active_force + passive_force) * cos
-    activation_rate = smooth_activation_rate(now.excitation, a, m.rising, m.falling, m.sharpness)
+    activation_rate = smooth_activation_rate(inputs.excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
-    return tension, a, *fibers, activation_rate, now.rate * cos, m.strength * passive
+    return tension, a, *fibers, activation_rate, inputs.rate * cos, m.strength * passive
 
 
-def meyer_rigid(now: MuscleInputs, m: SmoothMuscle) -> float:
+def meyer_rigid(inputs: MuscleInputs, m: SmoothMuscle) -> float:
     """Return the force of fully active fibers with a rigid tendon, along the fibers (N).
 
     As in OpenSim it is not projected onto the tendon.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
     """
-    fiber_length, velocity = rigid_fibers(now, m)
+    fiber_length, velocity = rigid_fibers(inputs, m)
     return m.strength * meyer_active(fiber_length, m.scale) * meyer_factor(velocity)

@@ -165,8 +165,8 @@ def passive_energy(length: float, growth: float, factor: float) -> float:
         growth: KshapePassive / FmaxMuscleStrain.
         factor: 1 / (exp(KshapePassive) - 1).
     """
-    off = max(length - 1.0, 0.0)
-    return factor * ((exp(growth * off) - 1.0) / growth - off)
+    strain = max(length - 1.0, 0.0)
+    return factor * ((exp(growth * strain) - 1.0) / growth - strain)
 
 
 def passive_force(length: float, growth: float, factor: float) -> tuple[float, float]:
@@ -200,9 +200,9 @@ def active_force(length: float, width: float) -> tuple[float, float]:
     Returns:
         Force and derivative.
     """
-    off = length - 1.0
-    force = exp(-off * off / width)
-    return force, -2.0 * off / width * force
+    strain = length - 1.0
+    force = exp(-strain * strain / width)
+    return force, -2.0 * strain / width * force
 
 
 def fiber_velocity(
@@ -226,16 +226,16 @@ def fiber_velocity(
         Velocity and derivative by the force.
     """
     # Evaluate the curve within its bounds; the line through that point continues it.
-    at = 0.0 if force <= 0.0 else min(force, m.bound * (isometric * m.most))
+    bounded_force = 0.0 if force <= 0.0 else min(force, m.bound * (isometric * m.most))
     speed = 0.25 + 0.75 * activation
-    if at <= isometric:
-        divisor, change = isometric + at / m.shape, 1.0 / m.shape
+    if bounded_force <= isometric:
+        divisor, change = isometric + bounded_force / m.shape, 1.0 / m.shape
     else:
         steepness = (2.0 + 2.0 / m.shape) / (m.most - 1.0)
-        divisor, change = steepness * (isometric * m.most - at), -steepness
-    velocity = speed * (at - isometric) / divisor
+        divisor, change = steepness * (isometric * m.most - bounded_force), -steepness
+    velocity = speed * (bounded_force - isometric) / divisor
     slope = (speed - velocity * change) / divisor
-    return velocity + slope * (force - at), slope
+    return velocity + slope * (force - bounded_force), slope
 
 
 def force_at_velocity(
@@ -273,7 +273,7 @@ def equilibrium_tolerance(m: Thelen2003) -> float:
 
 
 def thelen2003(
-    now: MuscleInputs, m: Thelen2003
+    inputs: MuscleInputs, m: Thelen2003
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """Compute forces and rates of a muscle.
 
@@ -283,7 +283,7 @@ def thelen2003(
     force.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
 
     Returns:
@@ -291,14 +291,14 @@ def thelen2003(
         length and by velocity, active and passive fiber force (N), rate of activation (1/s), fiber
         velocity (m/s).
     """
-    active = min(max(now.activation, m.least), 1.0)
-    fibers = fibers_at(m, now.length, max(now.fiber_length, m.shortest))
+    active = min(max(inputs.activation, m.least), 1.0)
+    fibers = fibers_at(m, inputs.length, max(inputs.fiber_length, m.shortest))
     # What the tendon bears and the passive force does not is the active force.
     isometric, borne = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
     velocity, _ = fiber_velocity(m, borne, active, isometric)
     by_velocity = borne / isometric
     # OpenSim holds fibers at their smallest length and sets their active force to 0 there.
-    if now.fiber_length <= m.shortest and velocity <= 0.0:
+    if inputs.fiber_length <= m.shortest and velocity <= 0.0:
         velocity, by_velocity, borne = 0.0, 1.0, 0.0
     return (
         fibers.tendon * m.strength,
@@ -309,26 +309,30 @@ def thelen2003(
         by_velocity,
         borne * m.strength,
         fibers.passive * m.strength,
-        first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least),
+        first_order_activation_rate(
+            inputs.excitation, inputs.activation, m.rising, m.falling, m.least
+        ),
         velocity * m.fastest * m.optimal,
     )
 
 
-def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
+def thelen2003_rigid(inputs: MuscleInputs, m: Thelen2003) -> float:
     """Return the force of fully active fibers along a rigid tendon (N).
 
     See OpenSim's calcInextensibleTendonActiveFiberForce.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
     """
-    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    fiber = fiber_length_along(inputs.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     isometric, _ = active_force(fiber / m.optimal, m.width)
-    factor = force_at_velocity(m, now.rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH)
+    factor = force_at_velocity(
+        m, inputs.rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH
+    )
     return m.strength * isometric * factor * cos
 
 
@@ -351,7 +355,7 @@ def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: fl
     )
 
 
-def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, float]:
+def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, float]:
     """Find the fiber length at which fibers and tendon bear the same force.
 
     Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the rate
@@ -359,40 +363,40 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
     moves does not start at rest. A length below the smallest one is replaced by it.
 
     Args:
-        now: inputs of the muscle.
+        inputs: inputs of the muscle.
         m: muscle.
 
     Returns:
         Whether there is one, and the fiber length (m).
     """
-    length, active = now.length, min(max(now.activation, m.least), 1.0)
+    length, active = inputs.length, min(max(inputs.activation, m.least), 1.0)
     # OpenSim starts with a tendon strained by 1 %.
     fibers = fibers_at(
         m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos)
     )
     stiffness, _ = force_stiffnesses(m, fibers, active, 0.0)
-    by_velocity = shared_velocity_factor(m, fibers, active, now.rate, stiffness)
+    by_velocity = shared_velocity_factor(m, fibers, active, inputs.rate, stiffness)
     borne, error = fiber_balance(m, fibers, active * by_velocity)
     stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
     for _ in range(ROUNDS):
         if not abs(error) > equilibrium_tolerance(m):
             break
-        before, last, part = error, fibers.length, 1.0
+        previous_error, previous_length, fraction = error, fibers.length, 1.0
         # Halve the step until the residual decreases.
-        while abs(error) >= abs(before):
-            step = -part * before / (stiffness - of_tendon)
+        while abs(error) >= abs(previous_error):
+            step = -fraction * previous_error / (stiffness - of_tendon)
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
-                step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
-            fibers = fibers_at(m, length, max(last + step, m.shortest))
+                step, fraction = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
+            fibers = fibers_at(m, length, max(previous_length + step, m.shortest))
             borne, error = fiber_balance(m, fibers, active * by_velocity)
-            if part <= SMALLEST:
+            if fraction <= SMALLEST:
                 break
-            part *= 0.5
+            fraction *= 0.5
         stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
         # Outside of the line search, as in OpenSim: the factor by velocity stays constant along a
         # step.
-        by_velocity = shared_velocity_factor(m, fibers, active, now.rate, stiffness)
+        by_velocity = shared_velocity_factor(m, fibers, active, inputs.rate, stiffness)
     if isnan(by_velocity):
         return False, fibers.length
     # At the smallest length any residual is accepted, because the fibers cannot shorten further.
@@ -458,10 +462,10 @@ def shared_velocity_factor(
     if rate == 0.0:
         return 1.0
     # The products with cosines and the limit are those of OpenSim's initMuscleState.
-    along, of_tendon = stiffness * fibers.cos, fibers.tendon_slope * m.strength / m.slack
+    fiber_stiffness, of_tendon = stiffness * fibers.cos, fibers.tendon_slope * m.strength / m.slack
     of_rate = rate
-    if fibers.is_taut and abs(along + of_tendon) > SIGNIFICANT:
-        of_rate = along / (along + of_tendon) * rate
+    if fibers.is_taut and abs(fiber_stiffness + of_tendon) > SIGNIFICANT:
+        of_rate = fiber_stiffness / (fiber_stiffness + of_tendon) * rate
     velocity = (rate - of_rate) * fibers.cos / (m.fastest * m.optimal)
     return force_at_velocity(
         m, velocity, activation, activation * fibers.active, equilibrium_tolerance(m)
