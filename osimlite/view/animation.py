@@ -118,20 +118,28 @@ def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
     """Return the frames as a GIF, all with one palette, so that colours do not flicker."""
     # Colours of the first frame alone may lack those of active muscles.
     # A sheet of some of the frames, side by side, has all the colours.
-    some = frames[:: max(1, len(frames) // 6)]
+    sampled_frames = frames[:: max(1, len(frames) // 6)]
     width, height = frames[0].size
-    sheet = image.new("RGB", (width * len(some), height))
-    for index, frame in enumerate(some):
+    sheet = image.new("RGB", (width * len(sampled_frames), height))
+    for index, frame in enumerate(sampled_frames):
         sheet.paste(frame, (index * width, 0))
     palette = sheet.quantize(128, dither=image.Dither.NONE)
-    first, *others = (frame.quantize(palette=palette, dither=image.Dither.NONE) for frame in frames)
-    out = io.BytesIO()
+    first, *other_frames = (
+        frame.quantize(palette=palette, dither=image.Dither.NONE) for frame in frames
+    )
+    buffer = io.BytesIO()
     # A GIF counts time in hundredths of a second.
     duration = max(2, round(100 / fps)) * 10
     first.save(
-        out, "GIF", save_all=True, append_images=others, duration=duration, loop=0, optimize=False
+        buffer,
+        "GIF",
+        save_all=True,
+        append_images=other_frames,
+        duration=duration,
+        loop=0,
+        optimize=False,
     )
-    return out.getvalue()
+    return buffer.getvalue()
 
 
 class Film:
@@ -189,16 +197,20 @@ class Film:
         Static objects count only if they are not much larger than the moving ones: a walker's
         floor would make the walker tiny.
         """
-        moving = still = np.full(2, 0.05)
+        moving_reach = static = np.full(2, 0.05)
         for number, focus in enumerate(self.project_points(self.focus)):
-            for moves, corners in self._iterate_corners(number):
-                away = np.abs(corners - focus).max(axis=0)
-                if moves:
-                    moving = np.maximum(moving, away)
+            for is_moving, points in self._iterate_corners(number):
+                distances = np.abs(points - focus).max(axis=0)
+                if is_moving:
+                    moving_reach = np.maximum(moving_reach, distances)
                 # Static objects are measured apart.
                 else:
-                    still = np.maximum(still, away)
-        return np.maximum(moving, still) if (still <= SCENERY * moving.max()).all() else moving
+                    static = np.maximum(static, distances)
+        return (
+            np.maximum(moving_reach, static)
+            if (static <= SCENERY * moving_reach.max()).all()
+            else moving_reach
+        )
 
     def _iterate_corners(self, number: int) -> Iterator[tuple[bool, Array]]:
         """Yield for each drawn object whether it moves and its points (k, 2) in the picture.
@@ -209,17 +221,17 @@ class Film:
         for body, points in self.scene.iterate_extents(pose):
             if len(points):
                 yield body < -1 or bool(self.moving[body]), self.project_points(points)
-        for item in self.scene.iterate_visible_items():
-            if item.path in self.scene.half_spaces:
-                placed = pose.transform_frame(item.body, item.matrix)
+        for drawn_item in self.scene.iterate_visible_items():
+            if drawn_item.path in self.scene.half_spaces:
+                transform = pose.transform_frame(drawn_item.body, drawn_item.matrix)
                 # The direction into a half space is its X axis.
-                inward = placed[:3, 0]
+                inward = transform[:3, 0]
                 # A steep plane crosses the line below the focus far away.
                 if abs(inward @ self.up) > STEEPEST * np.linalg.norm(inward):
-                    below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (
+                    point_below = focus + self.up * ((transform[:3, 3] - focus) @ inward) / (
                         inward @ self.up
                     )
-                    yield False, self.project_points(below[None])
+                    yield False, self.project_points(point_below[None])
 
 
 class _Painter:
@@ -229,23 +241,29 @@ class _Painter:
         self.film, self.size = film, size
         self.pen = require("PIL.ImageDraw", extra="view", purpose="an animation")
         fonts = require("PIL.ImageFont", extra="view", purpose="an animation")
-        self.font, self.small = (fonts.load_default(size[1] / part) for part in (26.0, 32.0))
+        self.font, self.small = (fonts.load_default(size[1] / divisor) for divisor in (26.0, 32.0))
         # Half the width and half the height of the picture, in metres, with a margin around what
         # 12 % margin.
         # moves.
-        wide, high = (1.12 * film.reach).tolist()
+        half_width, half_height = (1.12 * film.reach).tolist()
         aspect = size[0] / size[1]
-        self.half = max(wide, high * aspect), max(high, wide / aspect)
-        largest = film.pushes.largest
-        self.meters_per_newton = LONGEST_ARROW * self.half[1] / largest if largest > 0.0 else 0.0
+        self.half = max(half_width, half_height * aspect), max(half_height, half_width / aspect)
+        largest_force = film.pushes.largest
+        self.meters_per_newton = (
+            LONGEST_ARROW * self.half[1] / largest_force if largest_force > 0.0 else 0.0
+        )
 
     def draw_frame(self, number: int) -> Any:
         """Frame `number` as a pillow image."""
         film, pose = self.film, self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)
-        pushes = film.pushes.locate_forces(number, pose)
-        arrows = [ForceArrow(point, force * self.meters_per_newton) for _, point, force in pushes]
-        loaded = frozenset(push.surface for push, _, force in pushes if force.any())
+        drawn_forces = film.pushes.locate_forces(number, pose)
+        arrows = [
+            ForceArrow(point, force * self.meters_per_newton) for _, point, force in drawn_forces
+        ]
+        loaded = frozenset(
+            drawn_force.surface for drawn_force, _, force in drawn_forces if force.any()
+        )
         colors = {
             path: activity_color(float(levels[number])) for path, levels in film.activity.items()
         }
@@ -267,15 +285,17 @@ class _Painter:
         self._draw_scale_bar(pen, 0.03 * width, length * pixels, f"{length:g} m", ink)
         if self.meters_per_newton > 0.0:
             newtons = round_down(0.4 * self.half[0] / self.meters_per_newton)
-            long = newtons * self.meters_per_newton * pixels
-            self._draw_scale_bar(pen, 0.97 * width - long, long, f"{newtons:g} N", force)
+            bar_length = newtons * self.meters_per_newton * pixels
+            self._draw_scale_bar(
+                pen, 0.97 * width - bar_length, bar_length, f"{newtons:g} N", force
+            )
 
     def _draw_scale_bar(self, pen: Any, x: float, length: float, text: str, color: str) -> None:
         y = 0.95 * self.size[1]
         pen.line((x, y, x + length, y), fill=color, width=max(3, round(self.size[1] / 120)))
-        middle = x + 0.5 * length, y - 0.015 * self.size[1]
+        text_position = x + 0.5 * length, y - 0.015 * self.size[1]
         pen.text(
-            middle,
+            text_position,
             text,
             anchor="mb",
             font=self.small,
@@ -287,7 +307,7 @@ class _Painter:
 
 def to_hex(color: tuple[float, ...]) -> str:
     """Return a colour as #rrggbb."""
-    return "#" + "".join(f"{round(255 * part):02x}" for part in color)
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in color)
 
 
 def round_down(value: float) -> float:

@@ -52,11 +52,13 @@ def read_bands(path: str | Path) -> dict[str, Band]:
     ]
     labels = [label.strip() for label in rows[0]] if rows else []
     names = [label.removesuffix(MEAN) for label in labels[1:] if label.endswith(MEAN)]
-    missing = [f"{name}{DEVIATION}" for name in names if f"{name}{DEVIATION}" not in labels]
-    if not names or missing or len(rows) < 3:
-        words = f"column '{missing[0]}' is missing" if missing else "there is no band"
+    missing_labels = [f"{name}{DEVIATION}" for name in names if f"{name}{DEVIATION}" not in labels]
+    if not names or missing_labels or len(rows) < 3:
+        problem = (
+            f"column '{missing_labels[0]}' is missing" if missing_labels else "there is no band"
+        )
         raise DocumentError(
-            f"{words}; write per cent, NAME{MEAN} and NAME{DEVIATION} in the first line, and one row "
+            f"{problem}; write per cent, NAME{MEAN} and NAME{DEVIATION} in the first line, and one row "
             "for each point of the gait cycle",
             file=file,
         )

@@ -125,13 +125,13 @@ class _SceneCollector:
                 # One component that cannot be drawn is no reason to draw none.
                 self._add_component(component, path)
         # A body without any shape is a stick to what it carries.
-        bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
-        for body, ends in draw_sticks(self.mechanism, bare):
+        undrawn = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
+        for body, ends in draw_sticks(self.mechanism, undrawn):
             self.lines.append(
                 Line(self.mechanism.bodies[body].path, "geometry", ends, STICK, 0.008)
             )
         hints = self.model.model_visual_preferences.model_display_hints
-        wanted: dict[Layer, bool] = {
+        layers: dict[Layer, bool] = {
             "geometry": True,
             "contact": hints.show_contact_geometry,
             "wrap": hints.show_wrap_geometry,
@@ -147,8 +147,8 @@ class _SceneCollector:
             self.lines,
             self.axes,
             self.force_anchors,
-            frozenset(layer for layer, shown in wanted.items() if shown),
-            frozenset(self.items[place].path for place in self.half_spaces),
+            frozenset(layer for layer, is_shown in layers.items() if is_shown),
+            frozenset(self.items[index].path for index in self.half_spaces),
             self.remarks,
         )
         # Half spaces are scaled last, when the size of the model is known.
@@ -189,37 +189,46 @@ class _SceneCollector:
         frame = frame_of(self.tree, shape)
         if frame is None or frame not in self.mechanism.frames:
             raise UnsupportedError("is in a frame that is not fixed to a body")
-        look, scale = shape.appearance, np.array(shape.scale_factors, dtype=float)
+        appearance, scale = shape.appearance, np.array(shape.scale_factors, dtype=float)
         # 0 is OpenSim's number for hidden shapes.
-        visible = look.visible and look.surface_properties.representation != 0
-        body, placed = self.mechanism.frames[frame]
+        visible = appearance.visible and appearance.surface_properties.representation != 0
+        body, frame_in_body = self.mechanism.frames[frame]
         if isinstance(shape, geometry.LineGeometry):
             ends = np.array((shape.start_point, shape.end_point), dtype=float) * scale
-            self._add_line(path, "geometry", body, placed, ends, look.color, visible)
+            self._add_line(path, "geometry", body, frame_in_body, ends, appearance.color, visible)
             return
-        own, size = self._make_shape(shape)
+        surface_index, size = self._make_shape(shape)
         self._add_item(
             path,
             "geometry",
             body,
-            own,
-            placed @ _make_stretch(scale) @ size,
-            look.color,
-            look.opacity,
+            surface_index,
+            frame_in_body @ _make_stretch(scale) @ size,
+            appearance.color,
+            appearance.opacity,
             visible,
         )
 
     def _add_contact(self, surface: contact.ContactGeometry, path: str) -> None:
-        body, placed = self._find_placement(surface, "socket_frame")
-        here = placed @ make_offset(surface.location, surface.orientation)
-        look = surface.appearance
-        opacity = CONTACT_OPACITY * look.opacity
-        visible = look.visible and look.surface_properties.representation != 0
+        body, frame_in_body = self._find_placement(surface, "socket_frame")
+        transform = frame_in_body @ make_offset(surface.location, surface.orientation)
+        appearance = surface.appearance
+        opacity = CONTACT_OPACITY * appearance.opacity
+        visible = appearance.visible and appearance.surface_properties.representation != 0
         if isinstance(surface, contact.ContactHalfSpace):
             self.half_spaces.append(len(self.items))
-            opacity = HALF_SPACE_OPACITY * look.opacity
-        own, size = self._make_shape(surface)
-        self._add_item(path, "contact", body, own, here @ size, look.color, opacity, visible)
+            opacity = HALF_SPACE_OPACITY * appearance.opacity
+        surface_index, size = self._make_shape(surface)
+        self._add_item(
+            path,
+            "contact",
+            body,
+            surface_index,
+            transform @ size,
+            appearance.color,
+            opacity,
+            visible,
+        )
 
     def _add_wrap(self, surface: wrapping.WrapObject, path: str) -> None:
         # A wrap object stands in a set of its body.
@@ -228,13 +237,24 @@ class _SceneCollector:
             frame = self.tree.parent_of(frame)
         if frame is None:
             raise UnsupportedError("is in no frame")
-        body, placed = self.mechanism.frames[self.tree.path_of(frame) or ""]
-        here = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
-        own, size = self._make_shape(surface)
-        look = surface.appearance
-        visible = look.visible and look.surface_properties.representation != 0 and surface.active
+        body, frame_in_body = self.mechanism.frames[self.tree.path_of(frame) or ""]
+        transform = frame_in_body @ make_offset(surface.translation, surface.xyz_body_rotation)
+        surface_index, size = self._make_shape(surface)
+        appearance = surface.appearance
+        visible = (
+            appearance.visible
+            and appearance.surface_properties.representation != 0
+            and surface.active
+        )
         self._add_item(
-            path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible
+            path,
+            "wrap",
+            body,
+            surface_index,
+            transform @ size,
+            appearance.color,
+            WRAP_OPACITY * appearance.opacity,
+            visible,
         )
 
     def _make_shape(self, shape: Component) -> tuple[Surface, Array]:
@@ -278,12 +298,12 @@ class _SceneCollector:
 
     def _add_path(self, path: AbstractGeometryPath, name: str) -> None:
         owner = self.tree.parent_of(path)
-        course = PATH.read(self.builder, owner)
-        if not isinstance(course, TraceablePath):
+        traced_path = PATH.read(self.builder, owner)
+        if not isinstance(traced_path, TraceablePath):
             raise UnsupportedError(
                 f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it"
             )
-        of = (self.tree.path_of(owner) if owner is not None else None) or name
+        owner_path = (self.tree.path_of(owner) if owner is not None else None) or name
         # Paths of disabled forces would look as if they pulled.
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
         result: list[Component | None] = []
@@ -295,7 +315,17 @@ class _SceneCollector:
         wraps = tuple(self.tree.path_of(surface) or "" for surface in result if surface is not None)
         belly, tendon = _measure_fibers(owner) if isinstance(owner, Muscle) else (0.0, 0.0)
         self.lines.append(
-            Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon)
+            Line(
+                owner_path,
+                "paths",
+                traced_path,
+                path.appearance.color,
+                0.0035,
+                visible,
+                wraps,
+                belly,
+                tendon,
+            )
         )
 
     def _add_force(self, force: Force, path: str) -> None:
@@ -320,9 +350,11 @@ class _SceneCollector:
             case HuntCrossleyForce() | contact_forces.ElasticFoundationForce():
                 spec = get_field_specs(type(force).ContactParameters)["geometry"]
                 for parameters in force.contact_parameters.objects:
-                    for index, word in enumerate(parameters.geometry):
+                    for index, geometry_name in enumerate(parameters.geometry):
                         # A HuntCrossleyForce names several surfaces.
-                        result = self.tree.resolve(Use(parameters, force, spec, word, index)).target
+                        result = self.tree.resolve(
+                            Use(parameters, force, spec, geometry_name, index)
+                        ).target
                         self._add_force_anchor(force.name, path, result, None)
             case contact_forces.SmoothSphereHalfSpaceForce():
                 sphere = self.tree.target(force, "socket_sphere", force.socket_sphere)
@@ -332,9 +364,12 @@ class _SceneCollector:
     def _add_line_between(self, path: str, force: Any, *ends: tuple[str, Any]) -> None:
         points = []
         for name, point in ends:
-            body, placed = self._find_placement(force, name)
+            body, frame_in_body = self._find_placement(force, name)
             points.append(
-                LinePoint(body, placed[:3, :3] @ np.array(point, dtype=float) + placed[:3, 3])
+                LinePoint(
+                    body,
+                    frame_in_body[:3, :3] @ np.array(point, dtype=float) + frame_in_body[:3, 3],
+                )
             )
         self.lines.append(
             Line(path, "springs", tuple(points), SPRING, 0.005, bool(force.appliesForce))
@@ -348,13 +383,15 @@ class _SceneCollector:
         ):
             return
         frame = self.tree.target(surface, "socket_frame", surface.socket_frame)
-        body, placed = self.mechanism.placement(self.tree.path_of(frame) or "")
+        body, frame_in_body = self.mechanism.placement(self.tree.path_of(frame) or "")
         # OpenSim's records are labelled by the frame, its body, or the surface.
         base = self.mechanism.bodies[body].name if body >= 0 else "ground"
         labels = (label,) if label else (frame.name, base, surface.name)
-        near = (placed @ make_offset(surface.location, surface.orientation))[:3, 3]
+        surface_center = (frame_in_body @ make_offset(surface.location, surface.orientation))[:3, 3]
         self.force_anchors.append(
-            ForceAnchor(element, path, body, labels, near, self.tree.path_of(surface) or "")
+            ForceAnchor(
+                element, path, body, labels, surface_center, self.tree.path_of(surface) or ""
+            )
         )
 
     # ----------------------------------------------------------------------------------------------- helpers
@@ -396,12 +433,14 @@ class _SceneCollector:
         path: str,
         layer: Layer,
         body: int,
-        placed: Array,
+        frame_in_body: Array,
         ends: Array,
         color: Color,
         visible: bool,
     ) -> None:
-        points = tuple(LinePoint(body, placed[:3, :3] @ end + placed[:3, 3]) for end in ends)
+        points = tuple(
+            LinePoint(body, frame_in_body[:3, :3] @ end + frame_in_body[:3, 3]) for end in ends
+        )
         self.lines.append(Line(path, layer, points, color, 0.003, visible))
 
     def _read_mesh(self, name: str) -> Surface:
@@ -429,10 +468,10 @@ class _SceneCollector:
     def _widen_half_spaces(self, scene: Scene) -> Scene:
         """Scale the half spaces of a scene to the size of the model, in place, and return the scene."""
         if self.half_spaces:
-            low, high = scene.compute_box(scene.mechanism.values({}))
-            width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(high - low)))
-            for place in self.half_spaces:
-                matrix = self.items[place].matrix
+            lowest, highest = scene.compute_box(scene.mechanism.values({}))
+            width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(highest - lowest)))
+            for index in self.half_spaces:
+                matrix = self.items[index].matrix
                 # Move the surface inwards: a floor mesh in the same plane would flicker through it
                 # (z-fighting).
                 matrix[:3, 3] += 0.002 * width * matrix[:3, 0]
@@ -448,8 +487,8 @@ def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
     return min(max(radius, 0.0035), THICKEST), tendon if math.isfinite(tendon) else 0.0
 
 
-def _make_stretch(size: Any, where: Any = (0.0, 0.0, 0.0)) -> Array:
+def _make_stretch(size: Any, translation: Any = (0.0, 0.0, 0.0)) -> Array:
     """Return the matrix (4, 4) that stretches along the axes and then moves."""
     matrix = np.diag((*np.asarray(size, dtype=float).tolist(), 1.0))
-    matrix[:3, 3] = where
+    matrix[:3, 3] = translation
     return matrix

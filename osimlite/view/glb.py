@@ -46,20 +46,22 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     if motion is not None:
         recorded = np.asarray(motion.times, dtype=float)
         # More moments than a player shows would only make the file larger.
-        usual = round((recorded[-1] - recorded[0]) * RATE) + 1
+        max_moments = round((recorded[-1] - recorded[0]) * RATE) + 1
         times = (
-            recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
+            recorded
+            if len(recorded) <= max_moments
+            else np.linspace(recorded[0], recorded[-1], max_moments)
         )
         values = get_values(motion, scene.mechanism)
         rows = interpolate_columns(motion, values, times)
     poses = [scene.compute_poses(row) for row in watch_items("posing the model", rows)]
     # glTF has Y up; the root turns the vertical of the model to it.
-    written = _GlbWriter(
+    writer = _GlbWriter(
         times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
     )
     names = [*(body.name for body in scene.mechanism.bodies), "ground"]
     bodies = [
-        written.add_node(
+        writer.add_node(
             name,
             _Track(
                 [p.origins[k] for p in poses],
@@ -71,14 +73,14 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         )
         for k, name in enumerate(names)
     ]
-    for item in scene.iterate_visible_items():
-        if item.layer != "frames":
-            surface = scene.surfaces[item.surface]
-            mesh = written.add_mesh(surface, item.color, item.opacity)
-            written.add_shape(bodies[item.body], item.path, mesh, item.matrix)
-    for name, color, radius, ends in _list_segments(scene, motion, times, rows, poses):
-        written.add_node(name, _lay_tubes(ends, radius), written.add_mesh(_ROUND, color, 1.0))
-    write_atomically(path, written.to_bytes(scene.mechanism.name))
+    for drawn_item in scene.iterate_visible_items():
+        if drawn_item.layer != "frames":
+            surface = scene.surfaces[drawn_item.surface]
+            mesh = writer.add_mesh(surface, drawn_item.color, drawn_item.opacity)
+            writer.add_shape(bodies[drawn_item.body], drawn_item.path, mesh, drawn_item.matrix)
+    for name, color, radius, end_points in _list_segments(scene, motion, times, rows, poses):
+        writer.add_node(name, _lay_tubes(end_points, radius), writer.add_mesh(_ROUND, color, 1.0))
+    write_atomically(path, writer.to_bytes(scene.mechanism.name))
     return Path(path)
 
 
@@ -99,39 +101,48 @@ def _list_segments(
     """
     for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
-            corners = [pose.lines[index] for pose in poses]
-            most = max(map(len, corners))
-            full = [
+            corners_by_pose = [pose.lines[index] for pose in poses]
+            corner_count = max(map(len, corners_by_pose))
+            padded_corners = [
                 # The last corner is repeated where a moment has fewer corners.
-                result[np.minimum(np.arange(most), len(result) - 1)]
-                for result in corners
+                result[np.minimum(np.arange(corner_count), len(result) - 1)]
+                for result in corners_by_pose
                 if len(result)
             ]
             # A path without corners at some moment is left out.
-            if len(full) == len(poses):
-                for k in range(most - 1):
-                    yield line.path, line.color, line.radius, np.array(full)[:, k : k + 2]
-    pushes = DrawnForces(()) if motion is None else DrawnForces.from_motion(scene, motion, times)
-    low, high = scene.compute_box(rows[0])
-    size = float(np.linalg.norm(high - low))
-    for push in pushes.forces:
+            if len(padded_corners) == len(poses):
+                for k in range(corner_count - 1):
+                    yield line.path, line.color, line.radius, np.array(padded_corners)[:, k : k + 2]
+    drawn_forces = (
+        DrawnForces(()) if motion is None else DrawnForces.from_motion(scene, motion, times)
+    )
+    lowest, highest = scene.compute_box(rows[0])
+    size = float(np.linalg.norm(highest - lowest))
+    for drawn_force in drawn_forces.forces:
         starts = np.array(
-            [push.locate_point(number, bodies) for number, bodies in enumerate(poses)]
+            [drawn_force.locate_point(number, bodies) for number, bodies in enumerate(poses)]
         )
-        arrows = push.forces * (LONGEST_ARROW * size / max(pushes.largest, 1e-300))
-        yield push.anchor.path, FORCE, 0.006 * size, np.stack((starts, starts + arrows), axis=1)
+        arrows = drawn_force.forces * (LONGEST_ARROW * size / max(drawn_forces.largest, 1e-300))
+        yield (
+            drawn_force.anchor.path,
+            FORCE,
+            0.006 * size,
+            np.stack((starts, starts + arrows), axis=1),
+        )
 
 
-def _lay_tubes(ends: Array, radius: float) -> _Track:
+def _lay_tubes(end_points: Array, radius: float) -> _Track:
     """Return the poses of a tube of length 1 along Z that is laid from one end to the other (n, 2, 3)."""
-    ways = ends[:, 1] - ends[:, 0]
-    lengths = np.linalg.norm(ways, axis=1)
-    ways = ways / np.maximum(lengths, 1e-300)[:, None]
-    turns = np.array([_make_turns(np.array((-y, x, 0.0)), z) for x, y, z in ways])
+    directions = end_points[:, 1] - end_points[:, 0]
+    lengths = np.linalg.norm(directions, axis=1)
+    directions = directions / np.maximum(lengths, 1e-300)[:, None]
+    rotations = np.array([_make_turns(np.array((-y, x, 0.0)), z) for x, y, z in directions])
     # A piece without length has no thickness either.
-    thick = np.where(lengths > 0.0, radius, 0.0)
+    radii = np.where(lengths > 0.0, radius, 0.0)
     return _Track(
-        ends.mean(axis=1), _make_continuous(turns), np.column_stack((thick, thick, lengths))
+        end_points.mean(axis=1),
+        _make_continuous(rotations),
+        np.column_stack((radii, radii, lengths)),
     )
 
 
@@ -149,9 +160,9 @@ def _make_continuous(quaternions: Array) -> Array:
 
     q and -q are the same rotation, but a player that interpolates components would make a detour.
     """
-    turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
+    is_opposite = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     # A change of sign also inverts all later quaternions: an odd number of changes is negative.
-    signs = np.where(np.cumsum(np.concatenate(((False,), turned))) % 2 == 1, -1.0, 1.0)
+    signs = np.where(np.cumsum(np.concatenate(((False,), is_opposite))) % 2 == 1, -1.0, 1.0)
     result: Array = quaternions * signs[:, None]
     return result
 
@@ -173,15 +184,20 @@ class _GlbWriter:
         self._times = self._add_accessor(times[:, None], bounds=True) if self._moves else 0
 
     def _add_accessor(
-        self, array: Array, kind: int = _FLOAT, *, bounds: bool = False, target: int | None = None
+        self,
+        array: Array,
+        component_type: int = _FLOAT,
+        *,
+        bounds: bool = False,
+        target: int | None = None,
     ) -> int:
-        data = np.ascontiguousarray(array, dtype="<f4" if kind == _FLOAT else "<u4")
+        data = np.ascontiguousarray(array, dtype="<f4" if component_type == _FLOAT else "<u4")
         view = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": data.nbytes}
         self.views.append(view if target is None else view | {"target": target})
         self.buffer += data.tobytes()
         entry = {
             "bufferView": len(self.views) - 1,
-            "componentType": kind,
+            "componentType": component_type,
             "count": len(data),
             "type": _KINDS[data.shape[1]],
         }
@@ -191,11 +207,11 @@ class _GlbWriter:
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
-    def _add_once(self, key: Any, into: list[dict[str, Any]], entry: dict[str, Any]) -> int:
+    def _add_once(self, key: Any, entries: list[dict[str, Any]], entry: dict[str, Any]) -> int:
         """Return the index of an entry, which is written at its first use."""
         if key not in self._known:
-            self._known[key] = len(into)
-            into.append(entry)
+            self._known[key] = len(entries)
+            entries.append(entry)
         return self._known[key]
 
     def add_mesh(self, surface: Any, color: Color, opacity: float) -> int:
@@ -204,7 +220,10 @@ class _GlbWriter:
         if key in self._known:
             return self._known[key]
         # glTF has colours as amounts of light.
-        light = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color]
+        light = [
+            channel / 12.92 if channel <= 0.04045 else ((channel + 0.055) / 1.055) ** 2.4
+            for channel in color
+        ]
         material = {
             "pbrMetallicRoughness": {
                 "baseColorFactor": [*light, opacity],
@@ -232,21 +251,21 @@ class _GlbWriter:
 
     def add_node(self, name: str, track: _Track, mesh: int | None = None) -> int:
         """Add a node in ground, which moves if it is not the same all the time."""
-        place = len(self.nodes)
+        index = len(self.nodes)
         node: dict[str, Any] = {"name": name} | ({} if mesh is None else {"mesh": mesh})
-        for what, values in track._asdict().items():
+        for property_name, values in track._asdict().items():
             if values is None:
                 continue
             array = np.asarray(values)
-            node[what] = array[0].tolist()
+            node[property_name] = array[0].tolist()
             # A node that never moves needs no channel.
             if self._moves and np.ptp(array, axis=0).max() > 0.0:
                 self.samplers.append({"input": self._times, "output": self._add_accessor(array)})
-                target = {"node": place, "path": what}
+                target = {"node": index, "path": property_name}
                 self.channels.append({"sampler": len(self.samplers) - 1, "target": target})
         self.nodes.append(node)
-        self.nodes[0]["children"].append(place)
-        return place
+        self.nodes[0]["children"].append(index)
+        return index
 
     def add_shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
         """Add a node that is fixed to another: `matrix` (4, 4) in its frame."""
@@ -257,7 +276,7 @@ class _GlbWriter:
     def to_bytes(self, name: str) -> bytes:
         """Return the bytes of the complete GLB file."""
         self.nodes[0]["name"] = name
-        parts = {
+        sections = {
             "asset": {"version": "2.0", "generator": f"osimlite {__version__}"},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
@@ -273,7 +292,8 @@ class _GlbWriter:
         }
         # glTF allows no empty lists.
         text = json.dumps(
-            {key: part for key, part in parts.items() if part != []}, separators=(",", ":")
+            {key: section for key, section in sections.items() if section != []},
+            separators=(",", ":"),
         ).encode()
         # Chunks have lengths that are multiples of four: text is filled with blanks, data with
         # zeros.

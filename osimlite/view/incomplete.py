@@ -68,11 +68,11 @@ def _take_out(model: Model, message: str) -> str | None:
 
 def _remove_component(model: Model, component: Component) -> bool:
     """Remove a component from the list that holds it, whatever else names it; return whether there is such a list."""
-    for holder in model.walk():
-        for spec, item in holder.list_owned_objects():
-            members = getattr(holder, spec.name)
-            if item is component and isinstance(members, list):
-                members.remove(component)
+    for owner in model.walk():
+        for spec, member in owner.list_owned_objects():
+            siblings = getattr(owner, spec.name)
+            if member is component and isinstance(siblings, list):
+                siblings.remove(component)
                 return True
     return False
 
@@ -84,19 +84,23 @@ def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]
         findings: of the validator.
         parts: paths of the omitted components, and the reason of each.
     """
-    known = [path for path, _ in parts]
+    omitted = [path for path, _ in parts]
     errors = [
         finding
         for finding in findings
         if finding.severity is Severity.ERROR
-        and not any(f"{finding.component}/".startswith(f"{path}/") for path in known)
+        and not any(f"{finding.component}/".startswith(f"{path}/") for path in omitted)
     ]
     lines = []
     for finding in errors[:MAX_REMARKS]:
         hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion else ""
         lines.append(f"error: {finding.component or 'the document'}: {finding.message}{hint}")
-    more = len(errors) - len(lines)
-    return [*lines, f"{more} more errors; 'osimlite validate' lists them"] if more else lines
+    hidden_count = len(errors) - len(lines)
+    return (
+        [*lines, f"{hidden_count} more errors; 'osimlite validate' lists them"]
+        if hidden_count
+        else lines
+    )
 
 
 def describe_left_out(parts: Sequence[tuple[str, str]]) -> Iterator[str]:
@@ -106,12 +110,12 @@ def describe_left_out(parts: Sequence[tuple[str, str]]) -> Iterator[str]:
         parts: path of each, and why.
     """
     meshes = [path for path, reason in parts if reason.startswith(_MISSING_MESH)]
-    others = [(path, reason) for path, reason in parts if not reason.startswith(_MISSING_MESH)]
-    for path, reason in others[:MAX_REMARKS]:
+    other_parts = [(path, reason) for path, reason in parts if not reason.startswith(_MISSING_MESH)]
+    for path, reason in other_parts[:MAX_REMARKS]:
         yield f"not shown: {path}: {reason}"
-    if len(others) > MAX_REMARKS:
-        yield f"not shown: {len(others) - MAX_REMARKS} more parts"
+    if len(other_parts) > MAX_REMARKS:
+        yield f"not shown: {len(other_parts) - MAX_REMARKS} more parts"
     if meshes:
         reason = next(reason for _, reason in parts if reason.startswith(_MISSING_MESH))
-        more = f" and {len(meshes) - 1} more" if len(meshes) > 1 else ""
-        yield f"not shown: {meshes[0]}{more}: {reason}"
+        mesh_count = f" and {len(meshes) - 1} more" if len(meshes) > 1 else ""
+        yield f"not shown: {meshes[0]}{mesh_count}: {reason}"

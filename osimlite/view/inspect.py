@@ -28,8 +28,8 @@ LONGEST = 400
 def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
     """Describe the components of a model file for the page, each after its owner.
 
-    A component has `path`, `name`, `kind`, `parent` (a place in the list, -1 for none), `values` of
-    its properties as text, and `given`: which of them are in the file or were assigned, and are no
+    A component has `path`, `name`, `class_tag`, `parent` (a place in the list, -1 for none), `values` of
+    its properties as text, and `is_given`: which of them are in the file or were assigned, and are no
     mere defaults. Where a component has other properties than the first of its class, it has `tags`
     of its own.
 
@@ -37,7 +37,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
         The components, and the names of the properties by class.
     """
     tree = model.tree()
-    places: dict[int, int] = {}
+    index_by_id: dict[int, int] = {}
     tags: dict[str, list[str]] = {}
     nodes: list[dict[str, Any]] = []
     for component in tree.components:
@@ -45,60 +45,60 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
         if tree.is_internal(component):
             continue
         path = tree.path_of(component) or "/"
-        above = tree.parent_of(component)
-        kind = component.class_name if isinstance(component, Unknown) else type(component).tag
+        parent = tree.parent_of(component)
+        class_tag = component.class_name if isinstance(component, Unknown) else type(component).tag
         rows = list(_list_properties(tree, component, ""))
         names = [name for name, _, _ in rows]
         node: dict[str, Any] = {
             "path": path,
             "name": path.rsplit("/", 1)[1] or model.name or "model",
-            "kind": kind,
-            "parent": -1 if above is None else places.get(id(above), -1),
+            "kind": class_tag,
+            "parent": -1 if parent is None else index_by_id.get(id(parent), -1),
             "values": [
                 text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows
             ],
-            "given": [index for index, (_, _, given) in enumerate(rows) if given],
+            "given": [index for index, (_, _, is_given) in enumerate(rows) if is_given],
         }
         # Most components of a class have the same properties, which are written once.
-        if tags.setdefault(kind, names) != names:
+        if tags.setdefault(class_tag, names) != names:
             node["tags"] = names
-        places[id(component)] = len(nodes)
+        index_by_id[id(component)] = len(nodes)
         nodes.append(node)
     return nodes, tags
 
 
-def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, str, bool]]:
+def _list_properties(tree: Tree, owner: Object, prefix: str) -> Iterator[tuple[str, str, bool]]:
     """Name, text and whether it was given, of every property; those of objects without a path follow their holder."""
-    if isinstance(item, Unknown):
-        yield f"{way}content", item.content, True
+    if isinstance(owner, Unknown):
+        yield f"{prefix}content", owner.content, True
         return
-    for spec in get_field_specs(type(item)).values():
-        value = getattr(item, spec.name)
-        given = spec.name in item.model_fields_set
+    for spec in get_field_specs(type(owner)).values():
+        value = getattr(owner, spec.name)
+        is_given = spec.name in owner.model_fields_set
         if isinstance(spec.kind, ObjectField):
-            for held in value if isinstance(value, list) else [value]:
-                if isinstance(held, Object) and not isinstance(held, Component):
+            for member in value if isinstance(value, list) else [value]:
+                if isinstance(member, Object) and not isinstance(member, Component):
                     name = (
-                        f"{spec.tag}.{held.name}."
-                        if isinstance(value, list) and held.name
+                        f"{spec.tag}.{member.name}."
+                        if isinstance(value, list) and member.name
                         else f"{spec.tag}."
                     )
-                    yield from _list_properties(tree, held, way + name)
+                    yield from _list_properties(tree, member, prefix + name)
         elif isinstance(spec.kind, Reference):
-            yield way + spec.tag, _name_values(tree, item, spec.kind, value), given
+            yield prefix + spec.tag, _name_values(tree, owner, spec.kind, value), is_given
         else:
-            yield way + spec.tag, make_formatter(spec.kind, "shortest")(value).strip(), given
+            yield prefix + spec.tag, make_formatter(spec.kind, "shortest")(value).strip(), is_given
 
 
-def _name_values(tree: Tree, item: Object, reference: Reference, value: Any) -> str:
+def _name_values(tree: Tree, owner: Object, reference: Reference, value: Any) -> str:
     if isinstance(value, Component):
         try:
-            return tree.format_reference(tree.owner_of(item), reference, value)
+            return tree.format_reference(tree.owner_of(owner), reference, value)
         # A reference to a component outside of the model has a name at least.
         except OsimliteError:
             return value.name
     if isinstance(value, tuple):
-        return " ".join(_name_values(tree, item, reference, word) for word in value)
+        return " ".join(_name_values(tree, owner, reference, member) for member in value)
     return "" if value is None else str(value)
 
 
@@ -106,13 +106,13 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
     """Findings as the page shows them."""
     return [
         {
-            "code": item.code,
-            "severity": item.severity.value,
-            "message": item.message,
-            "component": item.component,
-            "place": f"line {item.line}" if item.line is not None else "",
+            "code": finding.code,
+            "severity": finding.severity.value,
+            "message": finding.message,
+            "component": finding.component,
+            "place": f"line {finding.line}" if finding.line is not None else "",
         }
-        for item in findings
+        for finding in findings
     ]
 
 
@@ -120,22 +120,24 @@ def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[
     """Return one pin for each component with findings and a position: body, point, codes and worst severity."""
     tree, mechanism = model.tree(), scene.mechanism
     results: dict[str, list[Finding]] = {}
-    for item in findings:
+    for finding in findings:
         # Remarks have no pin: there may be hundreds.
-        if item.component in tree.by_path and item.severity.rank < 2:
-            results.setdefault(item.component, []).append(item)
+        if finding.component in tree.by_path and finding.severity.rank < 2:
+            results.setdefault(finding.component, []).append(finding)
     result = []
-    for path, items in results.items():
-        place = _find_point(tree, mechanism, scene, tree.by_path[path])
-        if place is not None:
-            worst = min(items, key=lambda item: item.severity.rank)
+    for path, component_findings in results.items():
+        body_and_point = _find_point(tree, mechanism, scene, tree.by_path[path])
+        if body_and_point is not None:
+            worst = min(component_findings, key=lambda finding: finding.severity.rank)
             result.append(
                 {
                     "path": path,
-                    "codes": ", ".join(dict.fromkeys(item.code for item in items)),
+                    "codes": ", ".join(
+                        dict.fromkeys(finding.code for finding in component_findings)
+                    ),
                     "severity": worst.severity.value,
-                    "body": place[0],
-                    "at": place[1].tolist(),
+                    "body": body_and_point[0],
+                    "at": body_and_point[1].tolist(),
                 }
             )
     return result
@@ -148,9 +150,11 @@ def _find_point(
     # 1. What is drawn of it; 2. its place in the mechanism; 3. its owner.
     while component is not None:
         path = tree.path_of(component) or ""
-        item = next((item for item in scene.items if item.path == path), None)
-        if item is not None:
-            return item.body, item.matrix[:3, 3]
+        drawn_item = next(
+            (drawn_item for drawn_item in scene.items if drawn_item.path == path), None
+        )
+        if drawn_item is not None:
+            return drawn_item.body, drawn_item.matrix[:3, 3]
         line = next((line for line in scene.lines if line.path == path), None)
         if line is not None:
             return line.start
@@ -161,11 +165,13 @@ def _find_point(
             return body, matrix[:3, 3]
         if isinstance(component, Coordinate | Joint):
             joint = component if isinstance(component, Joint) else tree.parent_of(component)
-            for index, mobile in enumerate(mechanism.bodies):
-                if joint is not None and mobile.mobilizer.joint == tree.path_of(joint):
+            for index, moving_body in enumerate(mechanism.bodies):
+                if joint is not None and moving_body.mobilizer.joint == tree.path_of(joint):
                     # The frame of the joint on the body that it moves.
-                    own = mobile.mobilizer
-                    return index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3]
+                    mobilizer = moving_body.mobilizer
+                    return index, (
+                        mobilizer.parent_frame if mobilizer.reversed else mobilizer.child_frame
+                    )[:3, 3]
         if isinstance(component, PathPoint):
             try:
                 frame = tree.target(component, "socket_parent_frame", component.socket_parent_frame)
@@ -173,11 +179,11 @@ def _find_point(
             except OsimliteError:
                 return None
             return body, matrix[:3, :3] @ np.array(component.location) + matrix[:3, 3]
-        above = tree.parent_of(component)
+        parent = tree.parent_of(component)
         component = (
-            above
+            parent
             # The model itself has no place.
-            if isinstance(component, AbstractGeometryPath) or not isinstance(above, Model)
+            if isinstance(component, AbstractGeometryPath) or not isinstance(parent, Model)
             else None
         )
     return None

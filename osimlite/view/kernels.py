@@ -32,18 +32,21 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
     Returns:
         Plain data for JSON; arrays of numbers are base64 text in little-endian order.
     """
-    program, s = paths.program, paths.structure
-    head = s[s[MODEL.CONSTRAINED] :]
-    records, errors = s[head[CONSTRAINED.CONSTRAINT_AT] :], head[CONSTRAINED.WORK_ERRORS]
+    program, structure = paths.program, paths.structure
+    constrained_record = structure[structure[MODEL.CONSTRAINED] :]
+    records, errors = (
+        structure[constrained_record[CONSTRAINED.CONSTRAINT_AT] :],
+        constrained_record[CONSTRAINED.WORK_ERRORS],
+    )
     # Of each its record, the degree of freedom that depends, and where its error is found.
     coupled = [
         (
-            records[program.constraints[id(item)]],
-            program.freedoms[item.dependent],
-            errors + program.equations_of(item)[0],
+            records[program.constraints[id(constraint)]],
+            program.freedoms[constraint.dependent],
+            errors + program.equations_of(constraint)[0],
         )
-        for item in constraints
-        if isinstance(item, Coupler)
+        for constraint in constraints
+        if isinstance(constraint, Coupler)
     ]
     return {
         # Of each body, and ground as the last, the link, and the frame in that by rows.
@@ -52,7 +55,7 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
                 program.links.tolist(), program.frames[:, :3].reshape(-1, 12).tolist(), strict=True
             )
         ],
-        "structure": text_of(s.astype("<i4")),
+        "structure": text_of(structure.astype("<i4")),
         "numbers": text_of(paths.numbers.astype("<f8")),
         "laws": paths.laws[1:],
         "items": paths.items,
@@ -60,10 +63,10 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
         "room": paths.room,
         "work": paths.work,
         "order": program.order,
-        "couplers": [list(map(int, item)) for item in coupled],
+        "couplers": [list(map(int, record)) for record in coupled],
         "bound": paths.bound,
         "layout": {
-            "links": int(s[MODEL.WORK_LINK]),
+            "links": int(structure[MODEL.WORK_LINK]),
             "link": LINK_WORK.SIZE,
             "position": LINK_WORK.POSITION,
             "laws": MODEL.LAWS,
@@ -76,12 +79,12 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
 def kernels_text(program: Mapping[str, Any]) -> str:
     """Return the JavaScript source of the kernels that the page needs."""
     laws = [find_function(name) for name in program["laws"]]
-    others = [
+    functions = [
         place_links,
         *(FOR_ARMS if program["items"] else ()),
         *(FOR_SPEEDS if program["bound"] else ()),
     ]
-    kernels = write_javascript(laws, others)
+    kernels = write_javascript(laws, functions)
     return f"window.osimlite = {{ kernels: {kernels} }};\n"
 
 

@@ -59,15 +59,15 @@ def contact_forces(motion: ShownMotion) -> list[ContactForce]:
     result = []
     for label in motion.forces:
         if label.endswith(".force.X"):
-            place = label.removesuffix(".force.X")
-            element, _, frame = place.partition(".")
+            prefix = label.removesuffix(".force.X")
+            element, _, frame = prefix.partition(".")
             torques = (
-                _find_columns(motion, f"{place}.torque")
-                if f"{place}.torque.X" in motion.forces
+                _find_columns(motion, f"{prefix}.torque")
+                if f"{prefix}.torque.X" in motion.forces
                 else None
             )
             result.append(
-                ContactForce(element, frame, _find_columns(motion, f"{place}.force"), torques)
+                ContactForce(element, frame, _find_columns(motion, f"{prefix}.force"), torques)
             )
     return result
 
@@ -86,13 +86,19 @@ def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
     Returns:
         Activations (n,), from 0 to 1, by component path; muscles without a column are missing.
     """
-    known = {}
+    activations = {}
     for label, column in motion.auxiliary.items():
         if result := re.fullmatch(r"(?:.*/)?(.+)[./]activation", label):
             # Unknown activations count as 0; rounding may leave the range.
-            known[result[1]] = np.clip(np.nan_to_num(np.asarray(column, dtype=float)), 0.0, 1.0)
+            activations[result[1]] = np.clip(
+                np.nan_to_num(np.asarray(column, dtype=float)), 0.0, 1.0
+            )
     paths = [line.path for line in scene.lines if line.layer == "paths"]
-    return {path: known[name] for path in paths if (name := path.rpartition("/")[2]) in known}
+    return {
+        path: activations[name]
+        for path in paths
+        if (name := path.rpartition("/")[2]) in activations
+    }
 
 
 def activity_color(activation: float) -> Color:
@@ -107,8 +113,8 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
         np.array([p.origins for p in poses]),
     )
     # Rotations and origins that change by rounding do not count.
-    change = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
-    result: Array = change > 1e-9
+    changes = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
+    result: Array = changes > 1e-9
     if not result.any():
         result[:-1] = True
     return result

@@ -58,7 +58,7 @@ def plot_muscles(
         OsimliteError: the folder cannot be written to.
     """
     base = make_folder(Path(folder))
-    written = []
+    paths = []
     for quantity, rows in curves.columns.items():
         # A quantity that no muscle has, such as forces without equilibrium, gets no page.
         if not np.isfinite(rows).any():
@@ -67,10 +67,10 @@ def plot_muscles(
         if len(curves.coordinates) == 2:
             pages = _draw_maps(curves, mechanism, rows, title)
         else:
-            beside = None if other is None else other.columns[quantity]
-            pages = _draw_lines(curves, mechanism, rows, title, beside, regions or {})
-        written += write_pages(pages, base, quantity)
-    return written
+            other_rows = None if other is None else other.columns[quantity]
+            pages = _draw_lines(curves, mechanism, rows, title, other_rows, regions or {})
+        paths += write_pages(pages, base, quantity)
+    return paths
 
 
 def _make_title(quantity: str) -> str:
@@ -86,8 +86,8 @@ def _make_title(quantity: str) -> str:
 def _get_abscissa(curves: MuscleCurves, mechanism: Mechanism, index: int) -> tuple[str, Array]:
     """Return label and values of a coordinate, angles in degrees."""
     name, values = curves.coordinates[index], curves.poses[:, index]
-    info = mechanism.coordinates[mechanism.coordinate_index(name)]
-    is_angle = info.motion_type == "rotational"
+    coordinate = mechanism.coordinates[mechanism.coordinate_index(name)]
+    is_angle = coordinate.motion_type == "rotational"
     label = f"{name.rpartition('/')[2]} ({'deg' if is_angle else 'm'})"
     return label, np.degrees(values) if is_angle else values
 
@@ -106,10 +106,10 @@ def _draw_lines(
     regions: Mapping[str, str],
 ) -> Iterator[Any]:
     """Yield the pages of one quantity over a coordinate."""
-    label, across = _get_abscissa(curves, mechanism, 0)
+    label, abscissa = _get_abscissa(curves, mechanism, 0)
     names = _get_names(curves)
     sides, columns = split_sides(names), dict(zip(names, rows.T, strict=True))
-    beside = {} if other is None else dict(zip(names, other.T, strict=True))
+    other_columns = {} if other is None else dict(zip(names, other.T, strict=True))
     # A pair is one entry of a panel, whatever the number of its sides.
     groups: dict[str, dict[str, list[str]]] = {}
     for name in names:
@@ -117,7 +117,9 @@ def _draw_lines(
             group = groups.setdefault(regions.get(name, ""), {})
             group.setdefault(sides[name][0], []).append(name)
     panels = [
-        (region, part) for region, pairs in groups.items() for part in divide_among_panels(pairs)
+        (region, panel_pairs)
+        for region, pairs in groups.items()
+        for panel_pairs in divide_among_panels(pairs)
     ]
     pages = ceil(len(panels) / MAX_LINE_PANELS)
     # Pages of equal size, not a full one and a rest.
@@ -125,51 +127,51 @@ def _draw_lines(
     for number, first in enumerate(range(0, len(panels), size), 1):
         page = panels[first : first + size]
         count = f" ({number} of {pages})" if pages > 1 else ""
-        across_page = min(2, len(page))
-        down = ceil(len(page) / across_page)
-        figure = make_figure(f"{title}{count}", (6.5 * across_page, 0.6 + 2.9 * down))
-        axes = figure.subplots(down, across_page, squeeze=False).ravel()
+        column_count = min(2, len(page))
+        row_count = ceil(len(page) / column_count)
+        figure = make_figure(f"{title}{count}", (6.5 * column_count, 0.6 + 2.9 * row_count))
+        axes = figure.subplots(row_count, column_count, squeeze=False).ravel()
         # Panels that are not needed leave the page.
-        for place in axes[len(page) :]:
-            place.remove()
-        for place, (region, pairs) in zip(axes, page, strict=False):
-            _draw_pairs(place, across, pairs, columns, beside, sides)
-            place.set_title(region, fontsize=10, loc="left")
-            style_axes(place, label)
-            _widen_constant(place)
+        for panel in axes[len(page) :]:
+            panel.remove()
+        for panel, (region, pairs) in zip(axes, page, strict=False):
+            _draw_pairs(panel, abscissa, pairs, columns, other_columns, sides)
+            panel.set_title(region, fontsize=10, loc="left")
+            style_axes(panel, label)
+            _widen_constant(panel)
         yield figure
 
 
-def _widen_constant(place: Any) -> None:
+def _widen_constant(panel: Any) -> None:
     """Give a panel whose curves are constant a range in which rounding errors do not show."""
-    low, high = place.dataLim.intervaly
-    size = max(abs(low), abs(high))
+    lowest, highest = panel.dataLim.intervaly
+    size = max(abs(lowest), abs(highest))
     # Matplotlib would show the noise of a constant in full height.
-    if high - low <= 1e-6 * size:
-        place.set_ylim(low - 0.1 * size, high + 0.1 * size)
+    if highest - lowest <= 1e-6 * size:
+        panel.set_ylim(lowest - 0.1 * size, highest + 0.1 * size)
 
 
 def _draw_pairs(
-    place: Any,
-    across: Array,
+    panel: Any,
+    abscissa: Array,
     pairs: Mapping[str, Sequence[str]],
     columns: Mapping[str, Array],
-    beside: Mapping[str, Array],
+    other_columns: Mapping[str, Array],
     sides: Mapping[str, tuple[str, str]],
 ) -> None:
     """Draw muscles in the colors of their pairs, and a legend beside the panel."""
     for number, names in enumerate(pairs.values()):
         for name in names:
-            looks = {
+            style = {
                 "color": COLORS[number % len(COLORS)],
                 "ls": "--" if sides[name][1] == "l" else "-",
             }
             # Matplotlib leaves a label that begins with an underscore out of the legend.
-            shown = f" {name}" if name.startswith("_") else name
-            place.plot(across, columns[name], lw=1.6, label=shown, **looks)
-            if name in beside:
-                place.plot(across, beside[name], lw=0.8, alpha=0.8, **looks)
-    place.legend(
+            legend_label = f" {name}" if name.startswith("_") else name
+            panel.plot(abscissa, columns[name], lw=1.6, label=legend_label, **style)
+            if name in other_columns:
+                panel.plot(abscissa, other_columns[name], lw=0.8, alpha=0.8, **style)
+    panel.legend(
         loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8
     )
 
@@ -178,21 +180,23 @@ def _draw_maps(
     curves: MuscleCurves, mechanism: Mechanism, rows: Array, title: str
 ) -> Iterator[Any]:
     """Yield the pages of one quantity over two coordinates, a map for each muscle."""
-    (label, x), (other, y) = (_get_abscissa(curves, mechanism, index) for index in (0, 1))
+    (label, x), (other_label, y) = (_get_abscissa(curves, mechanism, index) for index in (0, 1))
     xs, ys = np.unique(x), np.unique(y)
     names = _get_names(curves)
     pages = ceil(len(names) / MAX_MAPS)
     for number in range(pages):
         indices = range(number * MAX_MAPS, min(len(names), (number + 1) * MAX_MAPS))
-        across = min(MAPS_ACROSS, len(indices))
-        down = ceil(len(indices) / across)
+        column_count = min(MAPS_ACROSS, len(indices))
+        row_count = ceil(len(indices) / column_count)
         count = f" ({number + 1} of {pages})" if pages > 1 else ""
-        figure = make_figure(f"{title}{count}", (1.0 + 2.9 * across, 0.9 + 2.4 * down))
-        places = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
-        for place in places[len(indices) :]:
-            place.remove()
-        for index, place in zip(indices, places, strict=False):
-            drawn = place.pcolormesh(
+        figure = make_figure(f"{title}{count}", (1.0 + 2.9 * column_count, 0.9 + 2.4 * row_count))
+        panels_grid = figure.subplots(
+            row_count, column_count, sharex=True, sharey=True, squeeze=False
+        ).ravel()
+        for panel in panels_grid[len(indices) :]:
+            panel.remove()
+        for index, panel in zip(indices, panels_grid, strict=False):
+            color_mesh = panel.pcolormesh(
                 xs,
                 ys,
                 # pcolormesh wants rows by y.
@@ -200,8 +204,8 @@ def _draw_maps(
                 shading="nearest",
                 cmap="viridis",
             )
-            figure.colorbar(drawn, ax=place)
-            place.set_title(names[index], fontsize=9)
+            figure.colorbar(color_mesh, ax=panel)
+            panel.set_title(names[index], fontsize=9)
         figure.supxlabel(label)
-        figure.supylabel(other)
+        figure.supylabel(other_label)
         yield figure

@@ -55,42 +55,51 @@ new Response(new Blob([Uint8Array.from(atob("@PAGE@"), (c) => c.charCodeAt(0))])
 </script>"""
 
 
-def model(item: Model) -> str:
+def model(shown_model: Model) -> str:
     """Return the HTML of the component tree and of the model in space."""
-    tree = item.tree()
-    own = [component for component in tree.components if not tree.is_internal(component)]
-    below: dict[int, list[Component]] = {}
+    tree = shown_model.tree()
+    components = [component for component in tree.components if not tree.is_internal(component)]
+    children: dict[int, list[Component]] = {}
     # The first component is the model itself.
-    for component in own[1:MOST_COMPONENTS]:
-        below.setdefault(id(tree.parent_of(component)), []).append(component)
+    for component in components[1:MOST_COMPONENTS]:
+        children.setdefault(id(tree.parent_of(component)), []).append(component)
 
     def branch(component: Component) -> str:
-        words = f"{escape(component.name)} <i>{escape(type(component).tag)}</i>"
-        parts = below.get(id(component), [])
-        if not parts:
-            return f"<div style='margin-left:1.1em'>{words}</div>"
-        inner = "".join(map(branch, parts))
-        return f"<details style='margin-left:1.1em'><summary>{words} ({len(parts)})</summary>{inner}</details>"
+        heading = f"{escape(component.name)} <i>{escape(type(component).tag)}</i>"
+        members = children.get(id(component), [])
+        if not members:
+            return f"<div style='margin-left:1.1em'>{heading}</div>"
+        inner_html = "".join(map(branch, members))
+        return f"<details style='margin-left:1.1em'><summary>{heading} ({len(members)})</summary>{inner_html}</details>"
 
-    head = f"<b>{escape(item.name) or 'a model'}</b>: {format_count(len(own), 'component')}"
-    inner = "".join(map(branch, below.get(id(item), [])))
-    hidden = _describe_hidden_rows(len(own), MOST_COMPONENTS)
-    html = f"<details><summary>{head}</summary>{inner}{hidden}</details>"
-    return html + _embed_viewer(item)
+    summary = f"<b>{escape(shown_model.name) or 'a model'}</b>: {format_count(len(components), 'component')}"
+    inner_html = "".join(map(branch, children.get(id(shown_model), [])))
+    hidden = _describe_hidden_rows(len(components), MOST_COMPONENTS)
+    html = f"<details><summary>{summary}</summary>{inner_html}{hidden}</details>"
+    return html + _embed_viewer(shown_model)
 
 
-def trajectory(item: Trajectory) -> str:
+def trajectory(shown_trajectory: Trajectory) -> str:
     """Return a one-line summary and, if the model is known, a player of the motion as HTML."""
-    return f"<div>{escape(repr(item))}</div>" + (
-        "" if item.model is None else _embed_viewer(item.model, item)
+    return f"<div>{escape(repr(shown_trajectory))}</div>" + (
+        ""
+        if shown_trajectory.model is None
+        else _embed_viewer(shown_trajectory.model, shown_trajectory)
     )
 
 
-def findings(item: Report) -> str:
+def findings(report: Report) -> str:
     """Return the HTML of a table of findings, the worst first."""
-    rows = sorted(item.findings, key=lambda finding: finding.severity.rank)
-    parts = ("error", item.errors), ("warning", item.warnings), ("remark", item.infos)
-    counts = ", ".join(format_count(len(part), kind) for kind, part in parts)
+    rows = sorted(report.findings, key=lambda finding: finding.severity.rank)
+    severity_counts = (
+        ("error", report.errors),
+        ("warning", report.warnings),
+        ("remark", report.infos),
+    )
+    counts = ", ".join(
+        format_count(len(severity_findings), severity_name)
+        for severity_name, severity_findings in severity_counts
+    )
     cells = (
         [
             f"<b style='color:{COLORS[finding.severity]}'>{finding.severity}</b>",
@@ -102,17 +111,17 @@ def findings(item: Report) -> str:
         ]
         for finding in rows
     )
-    words = f"<div>{counts} in {format_count(item.checked, 'file')}</div>"
-    return words + (
+    heading = f"<div>{counts} in {format_count(report.checked, 'file')}</div>"
+    return heading + (
         _make_table(("", "code", "place", "message", "suggestion"), cells, len(rows))
         if rows
         else ""
     )
 
 
-def paths(item: Paths) -> str:
+def paths(model_paths: Paths) -> str:
     """Length and moment arms of each path in the default pose."""
-    lengths, arms = item.lengths({}), item.moment_arms({})
+    lengths, arms = model_paths.lengths({}), model_paths.moment_arms({})
     cells = (
         [
             escape(name),
@@ -121,80 +130,82 @@ def paths(item: Paths) -> str:
                 f"{escape(path.rpartition('/')[2])} {arm:.4g}" for path, arm in arms[name].items()
             ),
         ]
-        for name in item.names
+        for name in model_paths.names
     )
     return "<div>in the default pose</div>" + _make_table(
         ("path", "length (m)", "moment arms (m)"), cells, len(lengths)
     )
 
 
-def muscle_curves(item: MuscleCurves) -> str:
+def muscle_curves(curves: MuscleCurves) -> str:
     """Return a table of the least and greatest values of each muscle as HTML."""
     from osimlite.simulation.muscle_curves import QUANTITIES
 
-    spans = (
-        map(format_range, *item.get_bounds(name), [".4g"] * len(item.muscles))
-        for name in item.columns
+    ranges = (
+        map(format_range, *curves.get_bounds(name), [".4g"] * len(curves.muscles))
+        for name in curves.columns
     )
-    cells = zip(map(escape, item.muscles), *spans, strict=True)
-    over = f" over {escape(join_words(item.coordinates))}" if item.coordinates else ""
-    words = f"<div>{format_count(len(item.muscles), 'muscle')} in {format_count(len(item.poses), 'pose')}{over}</div>"
-    units = ((name, QUANTITIES.get(name, "m")) for name in item.columns)
-    heads = [escape(f"{name} ({unit})" if unit else name) for name, unit in units]
-    return words + _make_table(("muscle", *heads), cells, len(item.muscles))
+    cells = zip(map(escape, curves.muscles), *ranges, strict=True)
+    swept_note = f" over {escape(join_words(curves.coordinates))}" if curves.coordinates else ""
+    heading = f"<div>{format_count(len(curves.muscles), 'muscle')} in {format_count(len(curves.poses), 'pose')}{swept_note}</div>"
+    units = ((name, QUANTITIES.get(name, "m")) for name in curves.columns)
+    headings = [escape(f"{name} ({unit})" if unit else name) for name, unit in units]
+    return heading + _make_table(("muscle", *headings), cells, len(curves.muscles))
 
 
-def runs(item: Outcome) -> str:
+def runs(outcome: Outcome) -> str:
     """Return the HTML of the first rows of a sweep."""
-    table = item.to_arrow()
+    table = outcome.to_arrow()
     rows = table.slice(0, FIRST_ROWS).to_pylist()
     cells = ([_format_number(value) for value in row.values()] for row in rows)
-    words = (
-        f"<div>{format_count(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
-    )
-    return words + _make_table(
+    heading = f"<div>{format_count(table.num_rows, 'run')} in <code>{escape(str(outcome.path))}</code></div>"
+    return heading + _make_table(
         [escape(name) for name in table.column_names], cells, table.num_rows, FIRST_ROWS
     )
 
 
-def optimum(item: Optimum) -> str:
+def optimum(best: Optimum) -> str:
     """Return the HTML of the best result of a search."""
-    words = f"{_format_number(item.value)} in evaluation {item.evaluation} of {item.evaluations} ({escape(item.ended)})"
-    cells = ([escape(name), _format_number(value)] for name, value in item.values.items())
-    return f"<div>best: {words}</div>" + _make_table(("variable", "value"), cells, len(item.values))
+    summary = f"{_format_number(best.value)} in evaluation {best.evaluation} of {best.evaluations} ({escape(best.ended)})"
+    cells = ([escape(name), _format_number(value)] for name, value in best.values.items())
+    return f"<div>best: {summary}</div>" + _make_table(
+        ("variable", "value"), cells, len(best.values)
+    )
 
 
-def _embed_viewer(item: Model, motion: Trajectory | None = None) -> str:
+def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
     """Return an iframe with the viewer, or a sentence with the reason why it cannot be shown."""
-    file = None if item.layout is None else item.layout.file
+    file = None if shown_model.layout is None else shown_model.layout.file
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
     try:
         require("numpy", extra="view", purpose="the picture")
         from osimlite.view.shown import Shown
 
-        shown = Shown.of(item, None if motion is None else motion.mechanism, folders, motion=motion)
+        viewed = Shown.of(
+            shown_model, None if motion is None else motion.mechanism, folders, motion=motion
+        )
         # mtime=0: equal pages give equal notebooks.
-        packed = base64.b64encode(gzip.compress(shown.page_text().encode(), 6, mtime=0)).decode()
+        encoded = base64.b64encode(gzip.compress(viewed.page_text().encode(), 6, mtime=0)).decode()
     except OsimliteError as error:
         return f"<div>no picture: {escape(error.message)}</div>"
     # Notebooks with larger outputs become slow to open.
-    if len(packed) > MOST_BYTES:
+    if len(encoded) > MOST_BYTES:
         return (
-            f"<div>a page of {len(packed) / 1e6:.0f} MB is too large for a notebook; write it to a file: "
+            f"<div>a page of {len(encoded) / 1e6:.0f} MB is too large for a notebook; write it to a file: "
             "<code>osimlite.view.Shown.of(model, motion=trajectory).write_page('page.html')</code></div>"
         )
-    remarks = "".join(f"<div>{escape(remark)}</div>" for remark in shown.remarks)
+    remarks = "".join(f"<div>{escape(remark)}</div>" for remark in viewed.remarks)
     return (
         # sandbox: the page may run its scripts, and nothing else.
-        f"<iframe srcdoc='{escape(_UNPACK.replace('@PAGE@', packed))}' sandbox='allow-scripts' loading='lazy' "
+        f"<iframe srcdoc='{escape(_UNPACK.replace('@PAGE@', encoded))}' sandbox='allow-scripts' loading='lazy' "
         f"style='width:100%;height:{HEIGHT}px;border:1px solid #d9dfe6;border-radius:6px'></iframe>{remarks}"
     )
 
 
 def _make_table(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, most: int = MOST_ROWS
+    headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, max_rows: int = MOST_ROWS
 ) -> str:
-    """Return an HTML table of the first `most` rows, followed by the number of omitted ones."""
+    """Return an HTML table of the first `max_rows` rows, followed by the number of omitted ones."""
 
     def line(tag: str, cells: Sequence[str]) -> str:
         return (
@@ -203,13 +214,13 @@ def _make_table(
             + "</tr>"
         )
 
-    body = "".join(line("td", row) for row in islice(rows, most))
+    body = "".join(line("td", row) for row in islice(rows, max_rows))
     table = f"<table><thead>{line('th', headings)}</thead><tbody>{body}</tbody></table>"
-    return f"<div style='max-height:{HEIGHT}px;overflow:auto'>{table}</div>{_describe_hidden_rows(count, most)}"
+    return f"<div style='max-height:{HEIGHT}px;overflow:auto'>{table}</div>{_describe_hidden_rows(count, max_rows)}"
 
 
-def _describe_hidden_rows(count: int, most: int) -> str:
-    return f"<div>… and {count - most} more</div>" if count > most else ""
+def _describe_hidden_rows(count: int, max_rows: int) -> str:
+    return f"<div>… and {count - max_rows} more</div>" if count > max_rows else ""
 
 
 def _format_number(value: Any) -> str:

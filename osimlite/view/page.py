@@ -58,19 +58,19 @@ def page_text(data: Mapping[str, Any]) -> str:
         return web.joinpath(name).read_text(encoding="utf-8")
 
     # No "</script" may end the data early; in JSON the sign can be written by its number.
-    words = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace(
-        "<", "\\u003c"
-    )
-    parts = {
+    data_text = json.dumps(
+        data, ensure_ascii=False, separators=(",", ":"), allow_nan=False
+    ).replace("<", "\\u003c")
+    replacements = {
         "@TITLE@": html.escape(str(data["name"]) or "osimlite"),
         "@STYLE@": read("page.css"),
         "@LIBRARY@": read("three.js"),
         "@SCRIPT@": "".join((kernels_text(data["program"]), *map(read, SCRIPTS))),
-        "@DATA@": words,
+        "@DATA@": data_text,
     }
     # All at once: a model may be called "@DATA@", and a part that is in place already is no
     # template.
-    return re.sub("|".join(parts), lambda match: parts[match[0]], read("page.html"))
+    return re.sub("|".join(replacements), lambda match: replacements[match[0]], read("page.html"))
 
 
 @any_numbers
@@ -100,18 +100,20 @@ def page_data(
         Plain data for JSON, without NaN and infinite numbers.
     """
     mechanism = scene.mechanism
-    recorded = None if motion is None else _describe_motion(scene, motion)
+    motion_data = None if motion is None else _describe_motion(scene, motion)
     # With a motion the page starts at its first moment.
     start = q if motion is None else get_values(motion, mechanism)[0]
-    low, high = np.array(scene.compute_box(q) if recorded is None else recorded["box"])
+    lowest, highest = np.array(scene.compute_box(q) if motion_data is None else motion_data["box"])
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
     # Couplers are solved in the page; others are listed.
-    couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
-    others = [
-        item.name
-        for item in mechanism.constraints
-        if not isinstance(item, Coupler | Lock | PrescribedCoordinate)
+    couplers = [
+        constraint for constraint in mechanism.constraints if isinstance(constraint, Coupler)
+    ]
+    other_constraints = [
+        constraint.name
+        for constraint in mechanism.constraints
+        if not isinstance(constraint, Coupler | Lock | PrescribedCoordinate)
     ]
     data: dict[str, Any] = replace_non_finite(
         {
@@ -127,11 +129,11 @@ def page_data(
             "up": scene.up.tolist(),
             "gravity": mechanism.gravity.tolist(),
             "floor": _place_floor(scene, start),
-            "center": (0.5 * (low + high)).tolist(),
-            "size": float(np.linalg.norm(high - low)),
+            "center": (0.5 * (lowest + highest)).tolist(),
+            "size": float(np.linalg.norm(highest - lowest)),
             "directions": _list_directions(scene.up),
             "coordinates": _describe_coordinates(
-                mechanism, {item.dependent for item in couplers}, q, recorded
+                mechanism, {constraint.dependent for constraint in couplers}, q, motion_data
             ),
             "q": q.tolist(),
             "bodies": [
@@ -143,9 +145,9 @@ def page_data(
                 for body in mechanism.bodies
             ],
             "program": program_data(scene.polylines, mechanism.constraints),
-            "constraints": others,
+            "constraints": other_constraints,
             **_describe_items(scene),
-            "motion": recorded,
+            "motion": motion_data,
             "tree": tree,
             "tags": tags,
             "findings": finding_rows(findings),
@@ -161,8 +163,12 @@ def _describe_items(scene: Scene) -> dict[str, Any]:
     return {
         "surfaces": [_describe_surface(surface) for surface in scene.surfaces],
         "items": [
-            {**vars(item), "matrix": _flatten_rows(item.matrix), "scenery": index in scene.large}
-            for index, item in enumerate(scene.items)
+            {
+                **vars(drawn_item),
+                "matrix": _flatten_rows(drawn_item.matrix),
+                "scenery": index in scene.large,
+            }
+            for index, drawn_item in enumerate(scene.items)
         ],
         "lines": [
             {
@@ -199,32 +205,32 @@ def _describe_surface(surface: Surface) -> dict[str, str]:
 
 
 def _describe_coordinates(
-    mechanism: Mechanism, dependent: set[int], q: Array, recorded: Mapping[str, Any] | None
+    mechanism: Mechanism, dependent: set[int], q: Array, motion_data: Mapping[str, Any] | None
 ) -> list[dict[str, Any]]:
     rows = []
-    for index, info in enumerate(mechanism.coordinates):
-        low, high = info.range
+    for index, coordinate in enumerate(mechanism.coordinates):
+        lowest, highest = coordinate.range
         # A slider needs finite ends.
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            low, high = -10.0, 10.0
+        if not (math.isfinite(lowest) and math.isfinite(highest) and lowest < highest):
+            lowest, highest = -10.0, 10.0
         # Motions may leave the range of a coordinate.
-        ends = [float(q[index])] if recorded is None else recorded["ends"][index]
-        still = (
+        extreme_values = [float(q[index])] if motion_data is None else motion_data["ends"][index]
+        fixed_reason = (
             "locked"
-            if info.locked
+            if coordinate.locked
             else "follows other coordinates by a coupler"
             if index in dependent
             else "prescribed over time"
-            if info.prescribed is not None
+            if coordinate.prescribed is not None
             else ""
         )
         rows.append(
             {
-                "name": info.name,
-                "path": info.path,
-                "unit": info.unit,
-                "range": [min(low, *ends), max(high, *ends)],
-                "still": still,
+                "name": coordinate.name,
+                "path": coordinate.path,
+                "unit": coordinate.unit,
+                "range": [min(lowest, *extreme_values), max(highest, *extreme_values)],
+                "still": fixed_reason,
             }
         )
     return rows
@@ -234,17 +240,21 @@ def _describe_motion(scene: Scene, motion: ShownMotion) -> dict[str, Any]:
     mechanism = scene.mechanism
     times = np.asarray(motion.times, dtype=float)
     values = get_values(motion, mechanism)
-    pushes = DrawnForces.from_motion(scene, motion, times).forces
+    drawn_forces = DrawnForces.from_motion(scene, motion, times).forces
     forces = []
-    for push in pushes:
-        torques = np.zeros_like(push.forces) if push.torques is None else push.torques
+    for drawn_force in drawn_forces:
+        torques = (
+            np.zeros_like(drawn_force.forces)
+            if drawn_force.torques is None
+            else drawn_force.torques
+        )
         forces.append(
             {
-                "path": push.anchor.path,
-                "surface": push.anchor.surface,
-                "body": push.anchor.body,
-                "near": push.anchor.near.tolist(),
-                "values": text_of(np.hstack((push.forces, torques)).astype("<f4")),
+                "path": drawn_force.anchor.path,
+                "surface": drawn_force.anchor.surface,
+                "body": drawn_force.anchor.body,
+                "near": drawn_force.anchor.near.tolist(),
+                "values": text_of(np.hstack((drawn_force.forces, torques)).astype("<f4")),
             }
         )
     return {
@@ -265,10 +275,11 @@ def _describe_measured_markers(markers: MeasuredMarkers | None) -> dict[str, Any
     """Return the measured positions of markers and the body and point of each; None without markers."""
     if markers is None:
         return None
-    pairs = zip(markers.names, markers.stations, strict=True)
+    named_stations = zip(markers.names, markers.stations, strict=True)
     return {
         "markers": [
-            {"name": name, "body": body, "at": place.tolist()} for name, (body, place) in pairs
+            {"name": name, "body": body, "at": point.tolist()}
+            for name, (body, point) in named_stations
         ],
         "places": text_of(markers.places.astype("<f4")),
     }
@@ -282,20 +293,20 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
     # A few moments suffice to find the extent.
     rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
     poses = [scene.compute_poses(row) for row in rows]
-    moves = find_moving_bodies(poses)[:-1]
-    middles = np.array([pose.origins[:-1][moves].mean(axis=0) for pose in poses])
+    is_moving = find_moving_bodies(poses)[:-1]
+    centers = np.array([pose.origins[:-1][is_moving].mean(axis=0) for pose in poses])
     boxes = np.array([scene.compute_box_of(pose) for pose in poses])
-    travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(
+    is_travelling = np.linalg.norm(centers[-1] - centers[0]) > TRAVELS * np.linalg.norm(
         boxes[0, 1] - boxes[0, 0]
     )
     # A following camera moves with the bodies, so their travel must not widen the view.
-    if travels:
-        boxes -= (middles - middles[0])[:, None]
+    if is_travelling:
+        boxes -= (centers - centers[0])[:, None]
     return {
-        "moves": np.flatnonzero(moves).tolist(),
-        "middle": middles[0].tolist(),
-        "travels": bool(travels),
-        "way": float(np.linalg.norm(middles[-1] - middles[0])),
+        "moves": np.flatnonzero(is_moving).tolist(),
+        "middle": centers[0].tolist(),
+        "travels": bool(is_travelling),
+        "way": float(np.linalg.norm(centers[-1] - centers[0])),
         "box": [boxes[:, 0].min(axis=0).tolist(), boxes[:, 1].max(axis=0).tolist()],
     }
 
@@ -313,15 +324,15 @@ def _choose_directions(up: Array) -> tuple[Array, Array]:
 def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
     """Return the frame whose X-Z plane is the grid: the model's contact half space, or a level floor."""
     bodies = scene.compute_poses(q)
-    for item in scene.iterate_visible_items():
-        outward = -bodies.transform_frame(item.body, item.matrix)[:3, 0]
+    for drawn_item in scene.iterate_visible_items():
+        outward = -bodies.transform_frame(drawn_item.body, drawn_item.matrix)[:3, 0]
         size = float(np.linalg.norm(outward))
         # A steep half space is a wall.
-        if item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
-            matrix = item.matrix.copy()
+        if drawn_item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
+            matrix = drawn_item.matrix.copy()
             # The plane's X axis points into the half space; the grid has Y upwards.
             matrix[:3, :3] = np.column_stack((matrix[:3, 1], -matrix[:3, 0], matrix[:3, 2])) / size
-            return {"body": item.body, "matrix": _flatten_rows(matrix)}
+            return {"body": drawn_item.body, "matrix": _flatten_rows(matrix)}
     front, side = _choose_directions(scene.up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack((front, scene.up, side, scene.find_floor_height(q) * scene.up))

@@ -119,28 +119,28 @@ def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
     Returns:
         For each name, the name without its side, and the side: "r", "l" or "".
     """
-    known = dict.fromkeys(names)
-    return {name: _split_side(name, known) for name in known}
+    unique_names = dict.fromkeys(names)
+    return {name: _split_side(name, unique_names) for name in unique_names}
 
 
-def _split_side(name: str, known: Collection[str]) -> tuple[str, str]:
+def _split_side(name: str, names: Collection[str]) -> tuple[str, str]:
     """Return a name without its side, and the side."""
     # Letters such as "r" are in many words; a name has a side only if its opposite exists.
     matches = [
         (match, opposite) for token, opposite in _SIDE_TOKENS for match in token.finditer(name)
     ]
     for match, opposite in matches:
-        other = name[: match.start()] + opposite[match[0]] + name[match.end() :]
+        opposite_name = name[: match.start()] + opposite[match[0]] + name[match.end() :]
         # "_r" and "_l" at the end are taken for sides in any case.
-        if other in known or name[max(0, match.start() - 1) :] in ("_r", "_l"):
-            stem = _trim(name[: match.start()] + name[match.end() :])
-            return stem or name, match[0][0].lower()
-    if matches and _mirror(name) in known:
-        stem = name
+        if opposite_name in names or name[max(0, match.start() - 1) :] in ("_r", "_l"):
+            base_name = _trim(name[: match.start()] + name[match.end() :])
+            return base_name or name, match[0][0].lower()
+    if matches and _mirror(name) in names:
+        base_name = name
         # Several letters for sides, as in "calcn_r_right".
         for token, _ in _SIDE_TOKENS:
-            stem = token.sub("", stem)
-        return _trim(stem) or name, matches[0][0][0][0].lower()
+            base_name = token.sub("", base_name)
+        return _trim(base_name) or name, matches[0][0][0][0].lower()
     return name, ""
 
 
@@ -148,24 +148,24 @@ def _mirror(name: str) -> str:
     """Return a name with every side replaced by the opposite one, as in ``calcn_r_right``."""
 
     def replace(match: re.Match[str]) -> str:
-        return next(words[match[0]] for _, words in _SIDE_TOKENS if match[0] in words)
+        return next(opposites[match[0]] for _, opposites in _SIDE_TOKENS if match[0] in opposites)
 
     for token, _ in _SIDE_TOKENS:
         name = token.sub(replace, name)
     return name
 
 
-def _trim(stem: str) -> str:
+def _trim(name: str) -> str:
     """Remove the separators that a side has left."""
-    return re.sub(r"(?<=[._/ ])[._ ]+|^[._/ ]|[._/ ]$", "", stem)
+    return re.sub(r"(?<=[._/ ])[._ ]+|^[._/ ]|[._/ ]$", "", name)
 
 
 def is_constant(values: Array) -> bool:
     """Return whether known values do not change, or none is known."""
     # Rounding errors of a constant are no curve.
-    known = values[np.isfinite(values)]
-    return not known.size or bool(
-        np.ptp(known) <= RELATIVE_CHANGE * max(1e-3, float(np.abs(known).max()))
+    finite_values = values[np.isfinite(values)]
+    return not finite_values.size or bool(
+        np.ptp(finite_values) <= RELATIVE_CHANGE * max(1e-3, float(np.abs(finite_values).max()))
     )
 
 
@@ -192,20 +192,20 @@ def group_columns(
         The panels, with those of one group one after the other, and the note, "" without constant
         columns.
     """
-    listed = list(columns)
-    sides = split_sides(column.name for column in listed)
+    all_columns = list(columns)
+    sides = split_sides(column.name for column in all_columns)
     panels: dict[tuple[str, str, str], Panel] = {}
     constant = []
-    for column in listed:
-        stem, side = sides[column.name]
+    for column in all_columns:
+        base_name, side = sides[column.name]
         values = np.asarray(column.values, dtype=float)
         if is_constant(values):
             constant.append(_describe_constant(column, values))
             continue
         # A quantity without a curve on the other side keeps its name.
         panel = panels.setdefault(
-            (stem, column.unit, column.section),
-            Panel(stem, column.unit, [], column.group, column.section, column.limits),
+            (base_name, column.unit, column.section),
+            Panel(base_name, column.unit, [], column.group, column.section, column.limits),
         )
         panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
     # Panels of a group stay together.
@@ -216,27 +216,31 @@ def group_columns(
 
 
 def _describe_constant(column: Column, values: Array) -> str:
-    known = values[np.isfinite(values)]
-    if not known.size:
+    finite_values = values[np.isfinite(values)]
+    if not finite_values.size:
         return f"{column.name} (no values)"
     unit = f" {column.unit}" if column.unit else ""
     # Adding 0.0 turns -0.0 into 0.0.
-    return f"{column.name} {0.0 + round(float(known[0]), 9):.4g}{unit}"
+    return f"{column.name} {0.0 + round(float(finite_values[0]), 9):.4g}{unit}"
 
 
-def _describe_constants(words: Sequence[str]) -> str:
-    if not words:
+def _describe_constants(descriptions: Sequence[str]) -> str:
+    if not descriptions:
         return ""
-    more = f", and {len(words) - MAX_CONSTANTS} more" if len(words) > MAX_CONSTANTS else ""
-    return f"Constant: {', '.join(words[:MAX_CONSTANTS])}{more}"
+    hidden_note = (
+        f", and {len(descriptions) - MAX_CONSTANTS} more"
+        if len(descriptions) > MAX_CONSTANTS
+        else ""
+    )
+    return f"Constant: {', '.join(descriptions[:MAX_CONSTANTS])}{hidden_note}"
 
 
 def merge_panels(panels: Iterable[Panel]) -> list[Panel]:
     """Put the curves of panels with the same title and unit into one panel."""
     result: dict[tuple[str, str], Panel] = {}
     for panel in panels:
-        known = result.setdefault((panel.title, panel.unit), panel._replace(curves=[]))
-        known.curves.extend(panel.curves)
+        merged = result.setdefault((panel.title, panel.unit), panel._replace(curves=[]))
+        merged.curves.extend(panel.curves)
     return list(result.values())
 
 
@@ -260,16 +264,16 @@ def draw_pages(
         sections.setdefault(panel.section, []).append(panel)
     pages = [
         (section, number, page)
-        for section, part in sections.items()
-        for number, page in enumerate(_divide_into_pages(part), 1)
+        for section, section_panels in sections.items()
+        for number, page in enumerate(_divide_into_pages(section_panels), 1)
     ]
     counts = Counter(section for section, _, _ in pages)
     for index, (section, number, page) in enumerate(pages, 1):
-        words = f"{title}: {section}" if title and section else title
-        if words and counts[section] > 1:
-            words += f" ({number} of {counts[section]})"
+        page_title = f"{title}: {section}" if title and section else title
+        if page_title and counts[section] > 1:
+            page_title += f" ({number} of {counts[section]})"
         yield _draw_page(
-            words,
+            page_title,
             page,
             "gait cycle (%)" if cyclic else abscissa,
             note if index == len(pages) else "",
@@ -309,10 +313,10 @@ def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
         groups.setdefault(panel.group, []).append(panel)
     for group in groups.values():
         for index, panel in enumerate(group):
-            room = width - len(rows[-1]) if rows else 0
-            splits = index == 0 and len(group) > 1 and room < len(group) <= width
+            free_columns = width - len(rows[-1]) if rows else 0
+            splits = index == 0 and len(group) > 1 and free_columns < len(group) <= width
             # A group that fits in a row is not divided.
-            if not room or splits:
+            if not free_columns or splits:
                 rows.append([])
             rows[-1].append(panel)
     height = MAX_PANELS // MAX_COLUMNS
@@ -329,11 +333,11 @@ def _draw_page(
     width = 11.0 if columns == MAX_COLUMNS else 4.5 + 4.0 * (columns - 1)
     figure = make_figure(title, (width, 0.75 + 2.35 * len(rows) + (0.25 if note else 0.0)))
     axes = figure.subplots(len(rows), columns, squeeze=False)
-    for row, places in zip(rows, axes, strict=True):
-        for panel, place in zip(row, places, strict=False):
-            draw_panel(place, panel, abscissa, cyclic=cyclic)
-        for place in places[len(row) :]:
-            place.remove()
+    for row, row_axes in zip(rows, axes, strict=True):
+        for panel, panel_axes in zip(row, row_axes, strict=False):
+            draw_panel(panel_axes, panel, abscissa, cyclic=cyclic)
+        for panel_axes in row_axes[len(row) :]:
+            panel_axes.remove()
     add_legend(figure, [curve for row in rows for panel in row for curve in panel.curves])
     if note:
         text = textwrap.fill(note, round(13 * width), break_on_hyphens=False)
@@ -341,36 +345,36 @@ def _draw_page(
     return figure
 
 
-def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False) -> None:
+def draw_panel(panel_axes: Any, panel: Panel, abscissa: str, *, cyclic: bool = False) -> None:
     """Draw a panel into axes of matplotlib."""
     for index, curve in enumerate(panel.curves):
         if any(_coincide(curve, other) for other in panel.curves[:index]):
             # The curve below shows through, as in a symmetric motion.
             curve = curve._replace(style=DASHES)
-        _draw_curve(place, curve, cyclic=cyclic)
-    _draw_limits(place, panel)
+        _draw_curve(panel_axes, curve, cyclic=cyclic)
+    _draw_limits(panel_axes, panel)
     if cyclic and panel.band is not None:
         percent, mean, deviation = panel.band
-        place.fill_between(percent, mean - deviation, mean + deviation, color="0.85", lw=0.0)
-        place.plot(percent, mean, color="0.6", lw=1.0, zorder=1.0)
-    style_axes(place, abscissa)
-    words = panel.title.replace("_", " ")
+        panel_axes.fill_between(percent, mean - deviation, mean + deviation, color="0.85", lw=0.0)
+        panel_axes.plot(percent, mean, color="0.6", lw=1.0, zorder=1.0)
+    style_axes(panel_axes, abscissa)
+    title = panel.title.replace("_", " ")
     unit = f" ({panel.unit})" if panel.unit else ""
-    height = find_title_height(place)
-    place.set_title(f"{words}{unit}", fontsize=10, loc="left", y=height)
+    height = find_title_height(panel_axes)
+    panel_axes.set_title(f"{title}{unit}", fontsize=10, loc="left", y=height)
     group = panel.group.replace("_", " ")
-    if group and group not in words and len(words + unit + group) < 40:
-        place.set_title(group, fontsize=8, loc="right", color="0.5", y=height)
+    if group and group not in title and len(title + unit + group) < 40:
+        panel_axes.set_title(group, fontsize=8, loc="right", color="0.5", y=height)
 
 
-def _draw_limits(place: Any, panel: Panel) -> None:
+def _draw_limits(panel_axes: Any, panel: Panel) -> None:
     """Draw limits near the curves as lines; a distant limit would flatten the curves."""
-    known = np.concatenate([[0.0], *(curve.values for curve in panel.curves)])
-    low, high = float(np.nanmin(known)), float(np.nanmax(known))
-    room = MAX_LIMIT_DISTANCE * (high - low)
+    values = np.concatenate([[0.0], *(curve.values for curve in panel.curves)])
+    lowest, highest = float(np.nanmin(values)), float(np.nanmax(values))
+    max_distance = MAX_LIMIT_DISTANCE * (highest - lowest)
     for limit in panel.limits:
-        if low - room <= limit <= high + room:
-            place.axhline(limit, color=LIMIT_COLOR, ls=DASHES, lw=1.0)
+        if lowest - max_distance <= limit <= highest + max_distance:
+            panel_axes.axhline(limit, color=LIMIT_COLOR, ls=DASHES, lw=1.0)
 
 
 def _coincide(curve: PanelCurve, other: PanelCurve) -> bool:
@@ -378,21 +382,23 @@ def _coincide(curve: PanelCurve, other: PanelCurve) -> bool:
     # Curves of different trials may have other times.
     if len(curve.values) != len(other.values):
         return False
-    near = 1e-3 * np.nanmax(np.abs(curve.values), initial=0.0)
-    return bool(np.allclose(curve.values, other.values, rtol=0.0, atol=near, equal_nan=True))
+    tolerance = 1e-3 * np.nanmax(np.abs(curve.values), initial=0.0)
+    return bool(np.allclose(curve.values, other.values, rtol=0.0, atol=tolerance, equal_nan=True))
 
 
-def _draw_curve(place: Any, curve: PanelCurve, *, cyclic: bool) -> None:
+def _draw_curve(panel_axes: Any, curve: PanelCurve, *, cyclic: bool) -> None:
     """Draw a curve over time, or each gait cycle and their mean."""
     color, _ = SIDES[curve.side]
     if not cyclic:
-        place.plot(curve.times, curve.values, color=color, ls=curve.style, lw=1.5)
+        panel_axes.plot(curve.times, curve.values, color=color, ls=curve.style, lw=1.5)
         for side, steps in curve.steps.items():
             if side == (curve.side or side):
                 for style, moments in (("-", steps.strikes), (":", steps.offs)):
                     for moment in moments:
                         if curve.times[0] <= moment <= curve.times[-1]:
-                            place.axvline(moment, color=SIDES[side][0], ls=style, lw=0.6, alpha=0.6)
+                            panel_axes.axvline(
+                                moment, color=SIDES[side][0], ls=style, lw=0.6, alpha=0.6
+                            )
         return
     cycles = [
         np.interp(first + (last - first) * PERCENT / 100.0, curve.times, curve.values)
@@ -401,8 +407,8 @@ def _draw_curve(place: Any, curve: PanelCurve, *, cyclic: bool) -> None:
     ]
     if len(cycles) > 1:
         for cycle in cycles:
-            place.plot(PERCENT, cycle, color=color, ls=curve.style, lw=0.7, alpha=0.5)
-    place.plot(PERCENT, np.mean(cycles, axis=0), color=color, ls=curve.style, lw=1.8)
+            panel_axes.plot(PERCENT, cycle, color=color, ls=curve.style, lw=0.7, alpha=0.5)
+    panel_axes.plot(PERCENT, np.mean(cycles, axis=0), color=color, ls=curve.style, lw=1.8)
 
 
 def add_legend(figure: Any, curves: Sequence[PanelCurve]) -> None:
@@ -426,19 +432,19 @@ def add_legend(figure: Any, curves: Sequence[PanelCurve]) -> None:
         )
 
 
-def style_axes(place: Any, label: str) -> None:
+def style_axes(panel_axes: Any, label: str) -> None:
     """Set grid, ticks and abscissa of a panel."""
-    place.grid(True, color="0.92", lw=0.8)
-    place.set_axisbelow(True)
-    place.spines[["top", "right"]].set_visible(False)
-    place.tick_params(labelsize=8)
+    panel_axes.grid(True, color="0.92", lw=0.8)
+    panel_axes.set_axisbelow(True)
+    panel_axes.spines[["top", "right"]].set_visible(False)
+    panel_axes.tick_params(labelsize=8)
     # No common offset at the axis: it is easily overlooked.
-    place.ticklabel_format(axis="y", useOffset=False, scilimits=EXPONENTS)
-    place.margins(x=0.0)
-    place.set_xlabel(label, fontsize=8)
+    panel_axes.ticklabel_format(axis="y", useOffset=False, scilimits=EXPONENTS)
+    panel_axes.margins(x=0.0)
+    panel_axes.set_xlabel(label, fontsize=8)
 
 
-def find_title_height(place: Any) -> float | None:
+def find_title_height(panel_axes: Any) -> float | None:
     """Return the height of the title of axes that `style_axes` has styled, in axes coordinates.
 
     Matplotlib measures all labels of the axes several times to find a height, which takes a third of the time
@@ -447,10 +453,12 @@ def find_title_height(place: Any) -> float | None:
     Returns:
         1, or None where matplotlib must find the height.
     """
-    largest = max(map(abs, place.get_ylim()))
+    largest_limit = max(map(abs, panel_axes.get_ylim()))
     # Ticks may be smaller than the limits by a digit.
-    low, high = EXPONENTS
-    return 1.0 if 10.0 ** (low + 2) <= largest < 10.0**high else None
+    smallest_exponent, largest_exponent = EXPONENTS
+    return (
+        1.0 if 10.0 ** (smallest_exponent + 2) <= largest_limit < 10.0**largest_exponent else None
+    )
 
 
 def make_figure(title: str, size: tuple[float, float]) -> Any:
@@ -471,19 +479,19 @@ def make_figure(title: str, size: tuple[float, float]) -> Any:
     return figure
 
 
-def name_pages(stem: str, figures: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+def name_pages(file_stem: str, figures: Iterable[Any]) -> Iterator[tuple[str, Any]]:
     """Yield figures with their file names: ``stem.png``, ``stem-2.png`` and so on."""
     for number, figure in enumerate(figures, 1):
-        yield f"{stem}.png" if number == 1 else f"{stem}-{number}.png", figure
+        yield f"{file_stem}.png" if number == 1 else f"{file_stem}-{number}.png", figure
 
 
-def write_pages(figures: Iterable[Any], folder: Path, stem: str) -> list[Path]:
+def write_pages(figures: Iterable[Any], folder: Path, file_stem: str) -> list[Path]:
     """Write figures into a folder as ``stem.png``, ``stem-2.png`` and so on.
 
     Args:
         figures: figures of matplotlib; they may be drawn while they are written.
         folder: existing folder to write into.
-        stem: name of the first file, without its suffix.
+        file_stem: name of the first file, without its suffix.
 
     Returns:
         The files.
@@ -494,15 +502,15 @@ def write_pages(figures: Iterable[Any], folder: Path, stem: str) -> list[Path]:
     with plain_lettering():
         return [
             write_into(folder, name, render_png(figure))
-            for name, figure in name_pages(stem, figures)
+            for name, figure in name_pages(file_stem, figures)
         ]
 
 
 def render_png(figure: Any, dpi: float = DPI) -> bytes:
     """Return a figure of matplotlib as a PNG file."""
     agg = require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
-    out = io.BytesIO()
+    buffer = io.BytesIO()
     # `savefig` draws everything once more, only to lay the page out.
     figure.set_dpi(dpi)
-    agg.FigureCanvasAgg(figure).print_png(out)
-    return out.getvalue()
+    agg.FigureCanvasAgg(figure).print_png(buffer)
+    return buffer.getvalue()

@@ -84,13 +84,15 @@ class Camera(NamedTuple):
             right = np.cross(np.roll(up, 1), back)
         right = right / np.linalg.norm(right)
         upward = np.cross(back, right)
-        flat = points @ np.array((right, upward)).T
-        middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
-        wide, high = np.maximum(margin * 0.5 * np.ptp(flat, axis=0), 1e-3).tolist()
+        in_picture = points @ np.array((right, upward)).T
+        middle = 0.5 * (in_picture.min(axis=0) + in_picture.max(axis=0))
+        half_width, half_height = np.maximum(
+            margin * 0.5 * np.ptp(in_picture, axis=0), 1e-3
+        ).tolist()
         # The larger of both extents decides, by the shape of the picture.
-        half = max(wide, high * aspect), max(high, wide / aspect)
+        half_size = max(half_width, half_height * aspect), max(half_height, half_width / aspect)
         depth = float((points @ back).mean())
-        return cls(right, upward, middle[0] * right + middle[1] * upward + depth * back, half)
+        return cls(right, upward, middle[0] * right + middle[1] * upward + depth * back, half_size)
 
 
 class ForceArrow(NamedTuple):
@@ -139,27 +141,33 @@ def draw_scene(
         )
     width, height = _FINE * size[0], _FINE * size[1]
     canvas = Canvas(width, height, np.array(SKY))
-    heap = _Heap(camera, width, height)
-    _fill_background(heap, scene, scene.compute_poses(q), arrows, style or Style())
-    heap.draw_on(canvas)
+    triangles = _TriangleList(camera, width, height)
+    _fill_background(triangles, scene, scene.compute_poses(q), arrows, style or Style())
+    triangles.draw_on(canvas)
     return image.fromarray(canvas.to_pixels(_FINE))
 
 
 def _fill_background(
-    heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[ForceArrow], style: Style
+    triangles: _TriangleList,
+    scene: Scene,
+    bodies: Bodies,
+    arrows: Iterable[ForceArrow],
+    style: Style,
 ) -> None:
     if style.floor is not None:
-        _lay_floor(heap, scene, style.floor)
-    for item in scene.iterate_visible_items():
-        if item.path in scene.half_spaces:
-            _cut_half_space(heap, bodies.transform_frame(item.body, item.matrix))
-        loaded = item.path in style.loaded
+        _lay_floor(triangles, scene, style.floor)
+    for drawn_item in scene.iterate_visible_items():
+        if drawn_item.path in scene.half_spaces:
+            _cut_half_space(triangles, bodies.transform_frame(drawn_item.body, drawn_item.matrix))
+        loaded = drawn_item.path in style.loaded
         color, opacity = (
-            (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
+            (TOUCHING, max(drawn_item.opacity, 0.75))
+            if loaded
+            else (drawn_item.color, drawn_item.opacity)
         )
-        heap.add_surface(
-            scene.surfaces[item.surface],
-            bodies.transform_frame(item.body, item.matrix),
+        triangles.add_surface(
+            scene.surfaces[drawn_item.surface],
+            bodies.transform_frame(drawn_item.body, drawn_item.matrix),
             color,
             opacity,
         )
@@ -168,89 +176,110 @@ def _fill_background(
             color = style.colors.get(line.path, line.color)
             # Corners of a line are balls, which close the gaps between cylinders.
             for start, end in pairwise(corners):
-                heap.add_surface(
+                triangles.add_surface(
                     unit_shapes.make_cylinder(8), _make_cylinder(start, end, line.radius), color
                 )
             for corner in corners:
-                heap.add_surface(
+                triangles.add_surface(
                     unit_shapes.make_ball(8, 4), _scale_shape(corner, line.radius), color
                 )
     if "frames" in scene.shown:
         for axes in scene.axes:
-            placed = bodies.transform_frame(axes.body, axes.matrix)
+            transform = bodies.transform_frame(axes.body, axes.matrix)
             for axis in range(3):
-                end = placed[:3, 3] + axes.length * placed[:3, axis]
-                heap.add_surface(
+                end = transform[:3, 3] + axes.length * transform[:3, axis]
+                triangles.add_surface(
                     unit_shapes.make_cylinder(8),
-                    _make_cylinder(placed[:3, 3], end, 0.002),
+                    _make_cylinder(transform[:3, 3], end, 0.002),
                     tuple(np.eye(3)[axis].tolist()),
                 )
-    thick = 0.012 * heap.camera.half[1]
+    thickness = 0.012 * triangles.camera.half[1]
     for arrow in arrows:
         length = float(np.linalg.norm(arrow.vector))
         # An arrow shorter than its head would be a blot.
-        if length < 2.0 * thick:
+        if length < 2.0 * thickness:
             continue
         tip, end = (
             arrow.point + arrow.vector,
-            arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length),
+            arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thickness / length),
         )
-        heap.add_surface(
-            unit_shapes.make_cylinder(), _make_cylinder(arrow.point, end, thick), FORCE, front=True
+        triangles.add_surface(
+            unit_shapes.make_cylinder(),
+            _make_cylinder(arrow.point, end, thickness),
+            FORCE,
+            in_front=True,
         )
-        head = _make_cylinder(end, tip, 2.6 * thick)
-        head[:3, 3] = end
-        heap.add_surface(unit_shapes.make_cone(), head, FORCE, front=True)
+        tip_matrix = _make_cylinder(end, tip, 2.6 * thickness)
+        tip_matrix[:3, 3] = end
+        triangles.add_surface(unit_shapes.make_cone(), tip_matrix, FORCE, in_front=True)
 
 
-def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
+def _lay_floor(triangles: _TriangleList, scene: Scene, height: float) -> None:
     """Add a square mesh at a height over ground's origin, its lines half a metre apart."""
-    up, half = scene.up, max(heap.camera.half)
-    across = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
-    across /= np.linalg.norm(across)
-    along = np.cross(across, up)
+    up, half_size = scene.up, max(triangles.camera.half)
+    first_axis = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
+    first_axis /= np.linalg.norm(first_axis)
+    second_axis = np.cross(first_axis, up)
     # Lines at half a metre, at wider views at powers of ten.
-    step = 0.5 if half < 4.0 else 10.0 ** np.ceil(np.log10(half / 8.0))
-    reach = step * np.ceil(1.2 * half / step)
-    middle = heap.camera.center
+    step = 0.5 if half_size < 4.0 else 10.0 ** np.ceil(np.log10(half_size / 8.0))
+    floor_extent = step * np.ceil(1.2 * half_size / step)
+    center = triangles.camera.center
     # Lines are at multiples of the step, so that the floor stands still when the camera moves.
-    first, second = (step * np.round(middle @ axis / step) for axis in (across, along))
-    for k in np.arange(-reach, reach + 0.5 * step, step):
-        one = (first - reach, second + k), (first + reach, second + k)
-        other = (first + k, second - reach), (first + k, second + reach)
-        for ends in (one, other):
-            start, end = (x * across + z * along + height * up for x, z in ends)
-            heap.add_surface(
+    first_center, second_center = (
+        step * np.round(center @ axis / step) for axis in (first_axis, second_axis)
+    )
+    for k in np.arange(-floor_extent, floor_extent + 0.5 * step, step):
+        line_along_first = (
+            (first_center - floor_extent, second_center + k),
+            (first_center + floor_extent, second_center + k),
+        )
+        line_along_second = (
+            (first_center + k, second_center - floor_extent),
+            (first_center + k, second_center + floor_extent),
+        )
+        for end_coordinates in (line_along_first, line_along_second):
+            start, end = (
+                x * first_axis + z * second_axis + height * up for x, z in end_coordinates
+            )
+            triangles.add_surface(
                 unit_shapes.make_cylinder(4),
-                _make_cylinder(start, end, 0.0012 * half),
+                _make_cylinder(start, end, 0.0012 * half_size),
                 FLOOR,
-                lit=False,
+                is_lit=False,
             )
 
 
-def _cut_half_space(heap: _Heap, placed: Array) -> None:
+def _cut_half_space(triangles: _TriangleList, transform: Array) -> None:
     """Add a half space seen from its edge: its line, and what is below it, behind everything else."""
-    camera, inward = heap.camera, placed[:3, 0] / np.linalg.norm(placed[:3, 0])
+    camera, inward = triangles.camera, transform[:3, 0] / np.linalg.norm(transform[:3, 0])
     # Seen from above or below, the square of the half space is enough.
     if abs(float(inward @ camera.towards)) > _FROM_THE_EDGE:
         return
-    along = np.cross(inward, camera.towards)
-    along /= np.linalg.norm(along)
-    far = 4.0 * max(camera.half)
-    start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
-    heap.add_surface(
-        unit_shapes.make_cylinder(4),
-        _make_cylinder(start - far * along, start + far * along, 0.004 * camera.half[1]),
-        INK,
-        lit=False,
+    edge_direction = np.cross(inward, camera.towards)
+    edge_direction /= np.linalg.norm(edge_direction)
+    distance = 4.0 * max(camera.half)
+    start = transform[:3, 3] + edge_direction * float(
+        edge_direction @ (camera.center - transform[:3, 3])
     )
-    below = np.eye(4)
-    below[:3, :3] = np.column_stack((camera.towards, far * inward, 2.0 * far * along))
-    below[:3, 3] = start + 0.5 * far * inward - 1e3 * camera.towards
-    heap.add_surface(unit_shapes.make_square(), below, EARTH, lit=False)
+    triangles.add_surface(
+        unit_shapes.make_cylinder(4),
+        _make_cylinder(
+            start - distance * edge_direction,
+            start + distance * edge_direction,
+            0.004 * camera.half[1],
+        ),
+        INK,
+        is_lit=False,
+    )
+    square_matrix = np.eye(4)
+    square_matrix[:3, :3] = np.column_stack(
+        (camera.towards, distance * inward, 2.0 * distance * edge_direction)
+    )
+    square_matrix[:3, 3] = start + 0.5 * distance * inward - 1e3 * camera.towards
+    triangles.add_surface(unit_shapes.make_square(), square_matrix, EARTH, is_lit=False)
 
 
-class _Heap:
+class _TriangleList:
     """Triangles as they appear to a camera, lit, until all are drawn at once."""
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:
@@ -266,20 +295,20 @@ class _Heap:
         color: Color | tuple[float, ...],
         opacity: float = 1.0,
         *,
-        lit: bool = True,
-        front: bool = False,
+        is_lit: bool = True,
+        in_front: bool = False,
     ) -> None:
-        """Add a surface placed in ground by `matrix` (4, 4); `front`: in front of all that is further than 1 km."""
+        """Add a surface placed in ground by `matrix` (4, 4); `in_front`: in front of all that is further than 1 km."""
         points = surface.points @ matrix[:3, :3].T + matrix[:3, 3]
-        places = self.camera.project_points(points, self.width, self.height)
-        if front:
+        vertices = self.camera.project_points(points, self.width, self.height)
+        if in_front:
             # 1 km towards the viewer.
-            places[:, 2] += 1e3
+            vertices[:, 2] += 1e3
         shades = np.tile(np.array(color, dtype=float), (len(points), 1))
-        if lit:
+        if is_lit:
             # Normals follow the cofactors, which also serve what is stretched or flat.
-            turn = matrix[:3, :3]
-            cofactors = np.cross(turn[[1, 2, 0]], turn[[2, 0, 1]])
+            linear_part = matrix[:3, :3]
+            cofactors = np.cross(linear_part[[1, 2, 0]], linear_part[[2, 0, 1]])
             normals = unit_shapes.compute_normals(surface) @ cofactors.T @ self._axes.T
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
@@ -291,15 +320,15 @@ class _Heap:
                 + _FROM_FILL * (normals @ _FILL).clip(0.0)
             )
             shades *= light[:, None]
-        corners, colors = places[surface.triangles], shades[surface.triangles]
+        corners, colors = vertices[surface.triangles], shades[surface.triangles]
         # The far side is not drawn where it is hidden, nor of what shines through unless it is all
         # there is of a sheet.
         is_hidden = surface.is_closed and np.linalg.det(matrix[:3, :3]) > 0.0
         if is_hidden or (opacity < 1.0 and len(corners) > 2):
             (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))
             # The sign of the area says which side is seen; the y axis of pictures points down.
-            seen = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
-            corners, colors = corners[seen], colors[seen]
+            faces_viewer = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
+            corners, colors = corners[faces_viewer], colors[faces_viewer]
         if opacity >= 1.0:
             self._solid.append((corners, colors))
         elif opacity > 0.0:
@@ -319,9 +348,9 @@ class _Heap:
 
 def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
     """Return the matrix (4, 4) that puts a unit cylinder along Z between two points."""
-    along = end - start
-    length = float(np.linalg.norm(along))
-    z = along / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    z = axis / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
     # An axis that is far from parallel to Z of the cylinder.
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)

@@ -66,13 +66,15 @@ def plot_simulation(
     """
     if len(trajectory.times) == 0:
         raise OsimliteError("the motion has no moments; nothing can be drawn")
-    known = mechanism if mechanism is not None else getattr(trajectory, "mechanism", None)
+    plotted_mechanism = (
+        mechanism if mechanism is not None else getattr(trajectory, "mechanism", None)
+    )
     base = Path(folder)
     make_folder(base)
     with plain_lettering():
         return [
             write_into(base, name, render_png(figure))
-            for name, figure in draw_figures(trajectory, known)
+            for name, figure in draw_figures(trajectory, plotted_mechanism)
         ]
 
 
@@ -86,18 +88,18 @@ def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, 
         Times (m,), s, and the energies (m,), J, by name.
     """
     times = np.asarray(motion.times, dtype=float)
-    known = getattr(motion, "energy", None)
+    recorded = getattr(motion, "energy", None)
     # A simulated trajectory has its energies; other motions need them computed at fewer moments.
-    if known is not None:
-        kinetic, height = np.asarray(known["kinetic"]), np.asarray(known["gravity"])
-        parts = {"kinetic": kinetic, "potential of gravity": height}
-        return times, {**parts, STORED: np.asarray(known["stored"])}
-    places = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_ENERGIES)).astype(int))
-    q = order_columns(motion, mechanism, np.asarray(motion.values)[places])
-    u = order_columns(motion, mechanism, np.asarray(motion.speeds)[places])
+    if recorded is not None:
+        kinetic, height = np.asarray(recorded["kinetic"]), np.asarray(recorded["gravity"])
+        energies = {"kinetic": kinetic, "potential of gravity": height}
+        return times, {**energies, STORED: np.asarray(recorded["stored"])}
+    indices = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_ENERGIES)).astype(int))
+    q = order_columns(motion, mechanism, np.asarray(motion.values)[indices])
+    u = order_columns(motion, mechanism, np.asarray(motion.speeds)[indices])
     kinetic = np.array([mechanism.kinetic_energy(*state) for state in zip(q, u, strict=True)])
     height = np.array([mechanism.potential_energy(row) for row in q])
-    return times[places], {"kinetic": kinetic, "potential of gravity": height}
+    return times[indices], {"kinetic": kinetic, "potential of gravity": height}
 
 
 def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
@@ -113,12 +115,12 @@ def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[t
     contacts = list(_one_of_each_pair(contact_forces(motion)))
     if contacts:
         yield "contact_forces.png", _plot_contacts(times, contacts)
-    others = {
+    other_forces = {
         label: column
         for label, column in motion.forces.items()
         if ".force." not in label and ".torque." not in label and "PotentialEnergy" not in label
     }
-    yield from _draw_table("Other forces", times, others, names, "ModelForces")
+    yield from _draw_table("Other forces", times, other_forces, names, "ModelForces")
     yield from _draw_table("Probes", times, getattr(motion, "probes", {}), names, "ModelProbes")
     if mechanism is not None:
         yield "energy.png", _plot_energy(*compute_energies(motion, mechanism))
@@ -133,8 +135,8 @@ def _draw_table(
     rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
     table = StoTable(name or title, times, tuple(columns), rows)
     panels, note = group_columns(describe_columns(table, names), times)
-    stem = title.lower().replace(" ", "_")
-    yield from name_pages(stem, draw_pages(title, panels, note=note))
+    file_stem = title.lower().replace(" ", "_")
+    yield from name_pages(file_stem, draw_pages(title, panels, note=note))
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
@@ -155,32 +157,42 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     }
     # Noise of contacts that do not touch.
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
-    acting = {label: size for label, size in sizes.items() if size.max() > threshold}
-    figure, (above, below) = make_sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
-    draw_lines(above, times, acting)
-    above.set_ylabel("force (N)")
-    above.set_ylim(bottom=0.0)
-    for row, size in enumerate(acting.values()):
-        spans = [
+    active_sizes = {label: size for label, size in sizes.items() if size.max() > threshold}
+    figure, (force_panel, contact_panel) = make_sheet(
+        "Contact forces", [3.4, 0.5 + 0.25 * max(1, len(active_sizes))]
+    )
+    draw_lines(force_panel, times, active_sizes)
+    force_panel.set_ylabel("force (N)")
+    force_panel.set_ylim(bottom=0.0)
+    for row, size in enumerate(active_sizes.values()):
+        intervals = [
             # A contact of one moment still gets a visible bar.
             (times[first], max(times[last] - times[first], 1e-3))
             for first, last in _find_spans(size > threshold)
         ]
-        below.broken_barh(spans, (row - 0.35, 0.7), facecolors=_choose_style(row)["color"])
-    below.set_yticks(range(len(acting)), [label.split(" on ")[0] for label in acting])
-    below.set_ylim(len(acting) - 0.5, -0.5)
-    below.set_ylabel("in contact")
-    idle = [label.split(" on ")[0] for label in sizes if label not in acting]
-    finish_panels((above, below), times, f"never in contact: {', '.join(idle)}" if idle else "")
+        contact_panel.broken_barh(
+            intervals, (row - 0.35, 0.7), facecolors=_choose_style(row)["color"]
+        )
+    contact_panel.set_yticks(
+        range(len(active_sizes)), [label.split(" on ")[0] for label in active_sizes]
+    )
+    contact_panel.set_ylim(len(active_sizes) - 0.5, -0.5)
+    contact_panel.set_ylabel("in contact")
+    idle_labels = [label.split(" on ")[0] for label in sizes if label not in active_sizes]
+    finish_panels(
+        (force_panel, contact_panel),
+        times,
+        f"never in contact: {', '.join(idle_labels)}" if idle_labels else "",
+    )
     return figure
 
 
-def _plot_energy(times: Array, parts: Mapping[str, Array]) -> Any:
+def _plot_energy(times: Array, energies: Mapping[str, Array]) -> Any:
     figure, (panel,) = make_sheet("Energy", [3.6])
-    draw_lines(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
+    draw_lines(panel, times, {**energies, "sum": np.sum(list(energies.values()), axis=0)})
     panel.set_ylabel("energy (J)")
     note = "gravity: zero at the origin of the ground"
-    if STORED not in parts:
+    if STORED not in energies:
         note += "; energy stored in contacts and limit springs is not in the sum"
     finish_panels((panel,), times, note)
     return figure
@@ -204,10 +216,10 @@ def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
 
 def divide_among_panels(lines: Mapping[str, Line]) -> list[dict[str, Line]]:
     """Return the lines of each panel: equal numbers, at most `LINES_IN_PANEL` in one."""
-    items = list(lines.items())
+    named_lines = list(lines.items())
     # Panels of equal size, not a full one and a rest.
-    size = ceil(len(items) / ceil(len(items) / LINES_IN_PANEL))
-    return [dict(items[first : first + size]) for first in range(0, len(items), size)]
+    size = ceil(len(named_lines) / ceil(len(named_lines) / LINES_IN_PANEL))
+    return [dict(named_lines[first : first + size]) for first in range(0, len(named_lines), size)]
 
 
 def _choose_style(number: int) -> dict[str, Any]:
@@ -215,37 +227,43 @@ def _choose_style(number: int) -> dict[str, Any]:
     return {"color": COLORS[number % len(COLORS)], "ls": style, "lw": 1.6}
 
 
-def draw_lines(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any) -> None:
+def draw_lines(panel: Any, abscissa: Array, lines: Mapping[str, Array], **style: Any) -> None:
     """Draw lines over times, or whatever is across; with a style of their own they are not in the legend."""
-    drawn: list[Array] = []
+    drawn_columns: list[Array] = []
     for number, (label, column) in enumerate(lines.items()):
-        looks = _choose_style(number)
-        near = 1e-3 * np.nanmax(np.abs(column), initial=0.0)
-        if below := sum(
-            np.allclose(column, other, rtol=0.0, atol=near, equal_nan=True) for other in drawn
+        line_style = _choose_style(number)
+        tolerance = 1e-3 * np.nanmax(np.abs(column), initial=0.0)
+        if hidden_count := sum(
+            np.allclose(column, other_column, rtol=0.0, atol=tolerance, equal_nan=True)
+            for other_column in drawn_columns
         ):
             # What lies below shows through.
             # The more curves are below, the shorter the dashes.
-            looks["ls"] = (0.0, (6.0 / (below + 1), 6.0 * below / (below + 1)))
-        drawn.append(column)
+            line_style["ls"] = (
+                0.0,
+                (6.0 / (hidden_count + 1), 6.0 * hidden_count / (hidden_count + 1)),
+            )
+        drawn_columns.append(column)
         # Matplotlib leaves a label that begins with an underscore out of the legend.
-        shown = f" {label}" if label.startswith("_") else label
-        panel.plot(across, column, label=None if style else shown, **(looks | style))
+        legend_label = f" {label}" if label.startswith("_") else label
+        panel.plot(abscissa, column, label=None if style else legend_label, **(line_style | style))
     # Beside the panel, where it covers no data.
     panel.legend(
         loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9
     )
 
 
-def finish_panels(panels: Sequence[Any], across: Array, note: str, label: str = "time (s)") -> None:
+def finish_panels(
+    panels: Sequence[Any], abscissa: Array, note: str, label: str = "time (s)"
+) -> None:
     """Give panels their grids, the lowest its label, and a note below."""
     for panel in panels:
         panel.grid(True, color="0.9", lw=0.8)
         panel.set_axisbelow(True)
         panel.spines[["top", "right"]].set_visible(False)
         panel.margins(x=0.0)
-    if across[-1] > across[0]:
-        panels[-1].set_xlim(across[0], across[-1])
+    if abscissa[-1] > abscissa[0]:
+        panels[-1].set_xlim(abscissa[0], abscissa[-1])
     panels[-1].set_xlabel(label)
     if note:
         style = {"fontsize": 8, "color": "0.35", "va": "top"}

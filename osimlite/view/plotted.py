@@ -60,35 +60,39 @@ class Pages(list[tuple[str, Any]]):
             return [write_into(base, name, render_png(figure)) for name, figure in self]
 
 
-def plot_trajectory(item: Trajectory) -> Pages:
+def plot_trajectory(trajectory: Trajectory) -> Pages:
     """Return the pages of a simulation: coordinates, states, forces, probes and energies."""
-    _require_times(len(item.times))
+    _require_times(len(trajectory.times))
     with plain_lettering():
-        return Pages(draw_figures(item, item.mechanism))
+        return Pages(draw_figures(trajectory, trajectory.mechanism))
 
 
-def plot_movement(item: Movement) -> Pages:
+def plot_movement(movement: Movement) -> Pages:
     """Return the pages of the coordinates of a motion."""
     from osimlite.io.tables.storage import StoTable
 
-    table = StoTable("Coordinates", item.times, item.coordinates, item.in_degrees, in_degrees=True)
-    names = ColumnNames.from_model(getattr(item, "model", None), item.mechanism)
+    table = StoTable(
+        "Coordinates", movement.times, movement.coordinates, movement.in_degrees, in_degrees=True
+    )
+    names = ColumnNames.from_model(getattr(movement, "model", None), movement.mechanism)
     return _plot_columns(table, names)
 
 
-def plot_table(item: StoTable) -> Pages:
+def plot_table(table: StoTable) -> Pages:
     """Return the pages of a table over time."""
-    motion = getattr(item, "motion", None)
-    return _plot_columns(item, ColumnNames.from_model(None, getattr(motion, "mechanism", None)))
+    motion = getattr(table, "motion", None)
+    return _plot_columns(table, ColumnNames.from_model(None, getattr(motion, "mechanism", None)))
 
 
 def _plot_columns(table: StoTable, names: ColumnNames) -> Pages:
     _require_times(len(table.times))
     panels, note = group_columns(describe_columns(table, names), table.times)
-    stem = Path(table.file).stem if table.file else table.name.lower().replace(" ", "_") or "table"
+    file_stem = (
+        Path(table.file).stem if table.file else table.name.lower().replace(" ", "_") or "table"
+    )
 
     def draw() -> Iterator[tuple[str, Any]]:
-        yield from name_pages(stem, draw_pages(make_title(stem), panels, note=note))
+        yield from name_pages(file_stem, draw_pages(make_title(file_stem), panels, note=note))
 
     with plain_lettering():
         return Pages(draw())

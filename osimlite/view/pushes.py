@@ -31,15 +31,19 @@ class DrawnForce:
 
         A force F with the moment M about the origin acts along the line through F × M / F².
         """
-        near: Array = bodies.transform_points(self.anchor.body, self.anchor.near[None, :])[0]
+        surface_point: Array = bodies.transform_points(self.anchor.body, self.anchor.near[None, :])[
+            0
+        ]
         force = self.forces[number]
-        square = float(force @ force)
-        if self.torques is None or square == 0.0:
-            return near
-        on_line: Array = (
-            bodies.origins[self.anchor.body] + np.cross(force, self.torques[number]) / square
+        squared_force = float(force @ force)
+        if self.torques is None or squared_force == 0.0:
+            return surface_point
+        line_point: Array = (
+            bodies.origins[self.anchor.body] + np.cross(force, self.torques[number]) / squared_force
         )
-        result: Array = on_line + force * (float(force @ (near - on_line)) / square)
+        result: Array = line_point + force * (
+            float(force @ (surface_point - line_point)) / squared_force
+        )
         return result
 
 

@@ -72,39 +72,51 @@ def read_recording(
     Raises:
         OsimliteError: a file is missing or no motion; see :meth:`.RecordedMotion.read`.
     """
-    recorded = RecordedMotion.read(mechanism, path)
+    recorded_motion = RecordedMotion.read(mechanism, path)
     # The caller's values replace those of the file.
-    rows = recorded.values
+    rows = recorded_motion.values
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value
-    _follow_couplers(mechanism, rows, set(recorded.missing))
+    _follow_couplers(mechanism, rows, set(recorded_motion.missing))
     table = read_sto(path)
     speeds = _read_speeds(mechanism, table)
     remarks = []
     columns: Mapping[str, Array] = {}
     if forces is not None:
-        columns = _find_columns(read_sto(forces), recorded.times)
+        columns = _find_columns(read_sto(forces), recorded_motion.times)
     elif speeds is not None:
         try:
-            columns = compute_forces(model, mechanism, recorded.times, rows, speeds, folder)
+            columns = compute_forces(model, mechanism, recorded_motion.times, rows, speeds, folder)
         except OsimliteError as error:
             remarks.append(f"no forces are shown: {error.message}")
     # Without speeds there are no forces that depend on them.
-    still = np.zeros_like(rows) if speeds is None else speeds
+    known_speeds = np.zeros_like(rows) if speeds is None else speeds
     states = {label: table[label] for label in table.columns if label.endswith("activation")}
     return Recording(
-        recorded.times, mechanism.coordinate_names, rows, still, columns, states, tuple(remarks)
+        recorded_motion.times,
+        mechanism.coordinate_names,
+        rows,
+        known_speeds,
+        columns,
+        states,
+        tuple(remarks),
     )
 
 
-def _follow_couplers(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
+def _follow_couplers(mechanism: Mechanism, rows: Array, missing_names: set[str]) -> None:
     """Give coordinates that are not on record the values that their couplers want; those may depend on each other."""
-    couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
-    couplers = [item for item in couplers if mechanism.coordinates[item.dependent].name in missing]
+    couplers = [
+        constraint for constraint in mechanism.constraints if isinstance(constraint, Coupler)
+    ]
+    couplers = [
+        constraint
+        for constraint in couplers
+        if mechanism.coordinates[constraint.dependent].name in missing_names
+    ]
     # A chain of couplers is complete after as many rounds as it is long.
     for coupler in couplers * len(couplers):
-        own = list(coupler.independent)
-        rows[:, coupler.dependent] = [coupler.function.evaluate(row[own])[0] for row in rows]
+        arguments = list(coupler.independent)
+        rows[:, coupler.dependent] = [coupler.function.evaluate(row[arguments])[0] for row in rows]
 
 
 def compute_forces(
@@ -149,13 +161,13 @@ def compute_forces(
 def _read_speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
     """Generalized speeds (n, k) on record; None if those of a coordinate that is not locked are not."""
     speeds = np.zeros((len(table.times), len(mechanism.coordinates)))
-    for index, info in enumerate(mechanism.coordinates):
-        label = f"{info.path}/speed"
+    for index, coordinate in enumerate(mechanism.coordinates):
+        label = f"{coordinate.path}/speed"
         if label in table.columns:
             # Files in degrees have angular speeds in degrees per second.
-            turned = table.in_degrees and info.motion_type == "rotational"
-            speeds[:, index] = np.radians(table[label]) if turned else table[label]
-        elif not info.locked:
+            in_degrees = table.in_degrees and coordinate.motion_type == "rotational"
+            speeds[:, index] = np.radians(table[label]) if in_degrees else table[label]
+        elif not coordinate.locked:
             return None
     return speeds
 

@@ -44,12 +44,21 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     recording = rr.RecordingStream(scene.mechanism.name or "osimlite")
     stream = recording.binary_stream()
 
-    def make_entity(*parts: str) -> str:
+    def make_entity(*path_parts: str) -> str:
         # Paths of components begin with a slash, which would make an empty part.
-        return str(rr.new_entity_path([word for part in parts for word in part.split("/") if word]))
+        return str(
+            rr.new_entity_path(
+                [
+                    name_part
+                    for path_part in path_parts
+                    for name_part in path_part.split("/")
+                    if name_part
+                ]
+            )
+        )
 
-    def log_static(name: str, *what: Any) -> None:
-        recording.log(name, *what, static=True)
+    def log_static(name: str, *values: Any) -> None:
+        recording.log(name, *values, static=True)
 
     def log_columns(name: str, columns: Any) -> None:
         recording.send_columns(name, [rr.TimeColumn("time", duration=times)], columns)
@@ -71,16 +80,18 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
             [pose.origins[k] for pose in poses],
         )
         log_columns(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
-    for item in scene.iterate_visible_items():
-        surface = scene.surfaces[item.surface]
+    for drawn_item in scene.iterate_visible_items():
+        surface = scene.surfaces[drawn_item.surface]
         points, corners, color = (
             surface.points,
             surface.triangles,
-            _make_colour(item.color, item.opacity),
+            _make_colour(drawn_item.color, drawn_item.opacity),
         )
         shape = rr.Mesh3D(vertex_positions=points, triangle_indices=corners, albedo_factor=color)
-        placed = rr.Transform3D(translation=item.matrix[:3, 3], mat3x3=item.matrix[:3, :3])
-        log_static(bodies[item.body] + make_entity(item.path), placed, shape)
+        transform = rr.Transform3D(
+            translation=drawn_item.matrix[:3, 3], mat3x3=drawn_item.matrix[:3, :3]
+        )
+        log_static(bodies[drawn_item.body] + make_entity(drawn_item.path), transform, shape)
 
     levels = {} if motion is None else read_activations(scene, motion)
     for index, line in enumerate(scene.lines):
@@ -98,28 +109,29 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     if motion is not None:
         for path_of, level in levels.items():
             log_scalars(make_entity("activations", path_of), level)
-        for info, column in zip(scene.mechanism.coordinates, rows.T, strict=True):
-            log_scalars(make_entity("coordinates", info.name), column)
-        pushes = DrawnForces.from_motion(scene, motion, times)
-        low, high = scene.compute_box(rows[0])
-        size = float(np.linalg.norm(high - low))
+        for coordinate, column in zip(scene.mechanism.coordinates, rows.T, strict=True):
+            log_scalars(make_entity("coordinates", coordinate.name), column)
+        drawn_forces = DrawnForces.from_motion(scene, motion, times)
+        lowest, highest = scene.compute_box(rows[0])
+        size = float(np.linalg.norm(highest - lowest))
         # 1e-300 prevents a division by zero.
-        scale = LONGEST_ARROW * size / max(pushes.largest, 1e-300)
-        for push in pushes.forces:
-            name = make_entity("forces", push.anchor.path, push.anchor.labels[0])
-            starts = [push.locate_point(number, pose) for number, pose in enumerate(poses)]
+        scale = LONGEST_ARROW * size / max(drawn_forces.largest, 1e-300)
+        for drawn_force in drawn_forces.forces:
+            name = make_entity("forces", drawn_force.anchor.path, drawn_force.anchor.labels[0])
+            starts = [drawn_force.locate_point(number, pose) for number, pose in enumerate(poses)]
             log_static(
                 f"/model{name}",
                 rr.Arrows3D.from_fields(radii=0.006 * size, colors=_make_colour(FORCE)),
             )
             log_columns(
-                f"/model{name}", rr.Arrows3D.columns(vectors=scale * push.forces, origins=starts)
+                f"/model{name}",
+                rr.Arrows3D.columns(vectors=scale * drawn_force.forces, origins=starts),
             )
-            log_scalars(name, np.linalg.norm(push.forces, axis=1))
+            log_scalars(name, np.linalg.norm(drawn_force.forces, axis=1))
     layout = require("rerun.blueprint", extra="rerun", purpose="a recording for Rerun")
     curves = [
-        layout.TimeSeriesView(origin=kind, name=kind)
-        for kind in ("coordinates", "activations", "forces")
+        layout.TimeSeriesView(origin=entity, name=entity)
+        for entity in ("coordinates", "activations", "forces")
     ]
     space = layout.Spatial3DView(origin="model", name=scene.mechanism.name)
     recording.send_blueprint(
@@ -130,4 +142,4 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
 
 
 def _make_colour(color: Color, opacity: float = 1.0) -> list[int]:
-    return [round(255.0 * part) for part in (*color, opacity)]
+    return [round(255.0 * channel) for channel in (*color, opacity)]

@@ -135,12 +135,12 @@ class Bodies:
         """Points (k, 3) of a body's frame, in ground."""
         return cast("Array", points @ self.rotations[body].T + self.origins[body])
 
-    def transform_frame(self, body: int, placed: Array) -> Array:
+    def transform_frame(self, body: int, transform: Array) -> Array:
         """Return a transform (4, 4) from a body's frame to ground; it may contain a scale."""
-        result = placed.copy()
+        result = transform.copy()
         # The scale in the upper part is kept.
-        result[:3, :3] = self.rotations[body] @ placed[:3, :3]
-        result[:3, 3] = self.transform_points(body, placed[None, :3, 3])[0]
+        result[:3, :3] = self.rotations[body] @ transform[:3, :3]
+        result[:3, 3] = self.transform_points(body, transform[None, :3, 3])[0]
         return result
 
 
@@ -176,13 +176,17 @@ class Scene:
     @cached_property
     def up(self) -> Array:
         """Unit vector (3,) against gravity; ground's Y axis without gravity."""
-        g = self.mechanism.gravity
-        size = float(np.linalg.norm(g))
-        return -g / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
+        gravity = self.mechanism.gravity
+        size = float(np.linalg.norm(gravity))
+        return -gravity / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
 
     def iterate_visible_items(self) -> Iterator[Item]:
         """Return the items that the model does not hide."""
-        return (item for item in self.items if item.visible and item.layer in self.shown)
+        return (
+            drawn_item
+            for drawn_item in self.items
+            if drawn_item.visible and drawn_item.layer in self.shown
+        )
 
     @cached_property
     def large(self) -> frozenset[int]:
@@ -193,32 +197,36 @@ class Scene:
                 for corners in map(self.compute_corners, self.items)
             ]
         )
-        usual = np.array(
-            [item.visible and item.layer == "geometry" for item in self.items], dtype=bool
+        is_geometry = np.array(
+            [drawn_item.visible and drawn_item.layer == "geometry" for drawn_item in self.items],
+            dtype=bool,
         )
         # The median is the usual size, which a few large shapes do not change.
-        limit = SCENERY * float(np.median(sizes[usual])) if usual.any() else np.inf
+        limit = SCENERY * float(np.median(sizes[is_geometry])) if is_geometry.any() else np.inf
         return frozenset(
             k
-            for k, item in enumerate(self.items)
-            if item.path in self.half_spaces or sizes[k] > limit
+            for k, drawn_item in enumerate(self.items)
+            if drawn_item.path in self.half_spaces or sizes[k] > limit
         )
 
-    def compute_corners(self, item: Item) -> Array:
+    def compute_corners(self, drawn_item: Item) -> Array:
         """Points (k, 3) around an item, in the body's frame: its own if they are few, else corners of a box."""
-        points = self.surfaces[item.surface].points
+        points = self.surfaces[drawn_item.surface].points
         # Eight corners of a box instead of all points: an outline is enough here.
         if len(points) > _FEW:
             points = _box_corners(points.min(axis=0), points.max(axis=0))
-        placed: Array = points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
-        return placed
+        in_body: Array = points @ drawn_item.matrix[:3, :3].T + drawn_item.matrix[:3, 3]
+        return in_body
 
     def iterate_extents(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
         """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
         # -2 is no body: lines go from body to body.
-        for index, item in enumerate(self.items):
-            if item.visible and item.layer in self.shown and index not in self.large:
-                yield item.body, bodies.transform_points(item.body, self.compute_corners(item))
+        for index, drawn_item in enumerate(self.items):
+            if drawn_item.visible and drawn_item.layer in self.shown and index not in self.large:
+                yield (
+                    drawn_item.body,
+                    bodies.transform_points(drawn_item.body, self.compute_corners(drawn_item)),
+                )
         for line, corners in zip(self.lines, bodies.lines, strict=True):
             if line.visible and line.layer in self.shown:
                 yield -2 if line.body is None else line.body, corners
@@ -239,29 +247,34 @@ class Scene:
         """
         result: list[Array] = [points for _, points in self.iterate_extents(bodies) if len(points)]
         points = np.concatenate(result or [bodies.origins])
-        low, high = points.min(axis=0), points.max(axis=0)
-        little = (
+        lowest, highest = points.min(axis=0), points.max(axis=0)
+        margin = (
             # A point gets a box of some size, so that nothing is divided by zero.
             0.05 * max(1.0, float(np.abs(points).max()))
-            if float((high - low).max()) < 1e-6
+            if float((highest - lowest).max()) < 1e-6
             else 0.0
         )
-        return low - little, high + little
+        return lowest - margin, highest + margin
 
     def find_floor_height(self, q: Array) -> float:
         """Height of the floor over ground's origin: 0, or under what is drawn if that reaches lower."""
-        low, high = self.compute_box(q)
+        box_minimum, box_maximum = self.compute_box(q)
         lowest, size = (
-            float((_box_corners(low, high) @ self.up).min()),
-            float(np.linalg.norm(high - low)),
+            float((_box_corners(box_minimum, box_maximum) @ self.up).min()),
+            float(np.linalg.norm(box_maximum - box_minimum)),
         )
         # A floor slightly below 0 is an effect of shapes that sink in.
         return 0.0 if lowest >= -0.05 * size else lowest
 
 
-def _box_corners(low: Array, high: Array) -> Array:
+def _box_corners(lower: Array, upper: Array) -> Array:
     return np.array(
-        [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+        [
+            (x, y, z)
+            for x in (lower[0], upper[0])
+            for y in (lower[1], upper[1])
+            for z in (lower[2], upper[2])
+        ]
     )
 
 
@@ -273,14 +286,20 @@ def draw_sticks(
     They run from the body's own joint to the joints of what it carries, or to its mass centre if it
     carries nothing.
     """
-    everyone = mechanism.bodies
+    all_bodies = mechanism.bodies
 
     def find_joint(index: int) -> LinePoint:
-        own = everyone[index].mobilizer
-        return LinePoint(index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3])
+        mobilizer = all_bodies[index].mobilizer
+        return LinePoint(
+            index, (mobilizer.parent_frame if mobilizer.reversed else mobilizer.child_frame)[:3, 3]
+        )
 
     # Sticks go to the joints of all bodies that it carries.
     for index in bodies:
-        ends = [find_joint(place) for place, other in enumerate(everyone) if other.parent == index]
-        for end in ends or [LinePoint(index, everyone[index].mass_properties.center)]:
+        ends = [
+            find_joint(child_index)
+            for child_index, child in enumerate(all_bodies)
+            if child.parent == index
+        ]
+        for end in ends or [LinePoint(index, all_bodies[index].mass_properties.center)]:
             yield index, (find_joint(index), end)

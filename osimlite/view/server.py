@@ -86,17 +86,17 @@ class _QuietServer(ThreadingHTTPServer):
 class _BadQuestion(Exception):
     """A question that cannot be answered, and with what status."""
 
-    def __init__(self, status: HTTPStatus, why: str) -> None:
-        super().__init__(why)
+    def __init__(self, status: HTTPStatus, reason: str) -> None:
+        super().__init__(reason)
         self.status = status
 
 
 def _make_handler(
-    page: bytes, mechanism: Mechanism, patience: float
+    page: bytes, mechanism: Mechanism, timeout_s: float
 ) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
-        timeout = patience
+        timeout = timeout_s
 
         def do_GET(self) -> None:
             if not self._is_for_us():
@@ -132,9 +132,9 @@ def _make_handler(
             # read the model.
             return (self.headers.get("Host") or "").partition(":")[0] in (HOST, "localhost")
 
-        def _answer(self, status: HTTPStatus, body: bytes, kind: str) -> None:
+        def _answer(self, status: HTTPStatus, body: bytes, content_type: str) -> None:
             self.send_response(status)
-            self.send_header("Content-Type", kind)
+            self.send_header("Content-Type", content_type)
             self.send_header("Content-Length", str(len(body)))
             self.send_header("Cache-Control", "no-store")
             self.end_headers()

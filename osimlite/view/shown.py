@@ -96,12 +96,12 @@ class Shown:
         """
         if mechanism is None:
             model, mechanism, left_out = build_showable(model)
-        places = MeshFolders(None if file is None else file.parent, folders)
-        scene = build_scene(model, mechanism, places, wrapping)
+        mesh_folders = MeshFolders(None if file is None else file.parent, folders)
+        scene = build_scene(model, mechanism, mesh_folders, wrapping)
         # What is measured of paths and muscles takes longer than a page to open.
         config = Config(
             ignore=("OSIM63",),
-            mesh_paths=tuple(str(folder.resolve()) for folder in places.searched),
+            mesh_paths=tuple(str(folder.resolve()) for folder in mesh_folders.searched),
         )
         findings = validate(model if file is None else file, config=config).findings
         # What could not be built is said before what could not be drawn.
@@ -157,12 +157,12 @@ class Shown:
         scene, up = self.scene, self.scene.up
         q, arrows, loaded, colors = self._describe_moment(time)
         bodies = scene.compute_poses(q)
-        seen = [
+        visible_points = [
             *(p for _, p in scene.iterate_extents(bodies) if len(p)),
-            *(a.point[None] for a in arrows),
+            *(arrow.point[None] for arrow in arrows),
         ]
         # Of a model without bodies there is ground to see.
-        points = np.concatenate(seen or [np.array(scene.compute_box(q))])
+        points = np.concatenate(visible_points or [np.array(scene.compute_box(q))])
         # Any direction across the vertical will do if it is the X axis.
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
@@ -170,12 +170,12 @@ class Shown:
         picture = draw_scene(
             scene, q, camera, size, arrows, Style(scene.find_floor_height(q), loaded, colors)
         )
-        out = io.BytesIO()
+        buffer = io.BytesIO()
         try:
-            picture.save(out, Path(path).suffix[1:].upper() or "PNG")
+            picture.save(buffer, Path(path).suffix[1:].upper() or "PNG")
         except (KeyError, ValueError, OSError):
             raise OsimliteError("pictures are written as .png", file=str(path)) from None
-        write_atomically(path, out.getvalue())
+        write_atomically(path, buffer.getvalue())
         return Path(path)
 
     def _describe_moment(
@@ -197,20 +197,29 @@ class Shown:
         q = interpolate_columns(motion, values, moment)[0]
         # The scale of arrows follows the largest force of the whole motion, so that pictures
         # compare.
-        largest = DrawnForces.from_motion(
+        largest_force = DrawnForces.from_motion(
             self.scene, motion, np.asarray(motion.times, dtype=float)
         ).largest
-        low, high = self.scene.compute_box(q)
+        lowest, highest = self.scene.compute_box(q)
         scale = (
-            LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
+            LONGEST_ARROW * float(np.linalg.norm(highest - lowest)) / largest_force
+            if largest_force > 0.0
+            else 0.0
         )
-        pushes = DrawnForces.from_motion(self.scene, motion, moment).locate_forces(
+        drawn_forces = DrawnForces.from_motion(self.scene, motion, moment).locate_forces(
             0, self.scene.compute_poses(q)
         )
-        loaded = frozenset(push.surface for push, _, force in pushes if force.any())
+        loaded = frozenset(
+            drawn_force.surface for drawn_force, _, force in drawn_forces if force.any()
+        )
         levels = read_activations(self.scene, motion).items()
         colors = {
             path: activity_color(float(np.interp(moment[0], motion.times, level)))
             for path, level in levels
         }
-        return q, [ForceArrow(point, scale * force) for _, point, force in pushes], loaded, colors
+        return (
+            q,
+            [ForceArrow(point, scale * force) for _, point, force in drawn_forces],
+            loaded,
+            colors,
+        )

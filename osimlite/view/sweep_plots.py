@@ -22,7 +22,7 @@ def plot_runs(
     variables: Sequence[str],
     measures: Sequence[str],
     folder: str | Path,
-    stem: str,
+    file_stem: str,
 ) -> list[Path]:
     """Draw each measure over the varied quantities: as a map over two of them, else as points.
 
@@ -31,7 +31,7 @@ def plot_runs(
         variables: names of the varied quantities.
         measures: names of the measures.
         folder: folder to write into; it is made if it does not exist.
-        stem: name of the first file, without its suffix.
+        file_stem: name of the first file, without its suffix.
 
     Returns:
         The PNG files; none if no measure has a number.
@@ -41,20 +41,22 @@ def plot_runs(
         OsimliteError: the folder or a file cannot be written.
     """
     # Failed runs have no measure.
-    known = {
+    numbers = {
         name: _to_numbers(columns[name]) for name in (*variables, *measures) if name in columns
     }
-    drawn = [name for name in measures if name in known and np.isfinite(known[name]).any()]
-    varied = [name for name in variables if name in known]
+    drawn_measures = [
+        name for name in measures if name in numbers and np.isfinite(numbers[name]).any()
+    ]
+    varied = [name for name in variables if name in numbers]
     if len(varied) == 2:
-        panels = [(varied[0], varied[1], name) for name in drawn]
+        panels = [(varied[0], varied[1], name) for name in drawn_measures]
     else:
         panels = [
             (name, measure, "")
-            for measure in drawn
-            for name in _rank_variables(known, varied, measure)
+            for measure in drawn_measures
+            for name in _rank_variables(numbers, varied, measure)
         ]
-    return write_pages(_draw_pages(known, panels), make_folder(Path(folder)), stem)
+    return write_pages(_draw_pages(numbers, panels), make_folder(Path(folder)), file_stem)
 
 
 def _to_numbers(column: Any) -> Array:
@@ -62,14 +64,14 @@ def _to_numbers(column: Any) -> Array:
     return np.array([np.nan if value is None else value for value in column], dtype=float)
 
 
-def _rank_variables(known: Mapping[str, Array], varied: Sequence[str], measure: str) -> list[str]:
+def _rank_variables(numbers: Mapping[str, Array], varied: Sequence[str], measure: str) -> list[str]:
     """Return the variables of a measure, without the least correlated ones if there are too many."""
     if len(varied) <= MAX_VARIABLES:
         return list(varied)
-    finite = np.isfinite(known[measure])
+    finite = np.isfinite(numbers[measure])
 
     def correlate(name: str) -> float:
-        x, y = known[name][finite], known[measure][finite]
+        x, y = numbers[name][finite], numbers[measure][finite]
         # A constant has no correlation.
         if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
             return 0.0
@@ -79,47 +81,47 @@ def _rank_variables(known: Mapping[str, Array], varied: Sequence[str], measure: 
 
 
 def _draw_pages(
-    known: Mapping[str, Array], panels: Sequence[tuple[str, str, str]]
+    numbers: Mapping[str, Array], panels: Sequence[tuple[str, str, str]]
 ) -> Iterator[Any]:
     """Yield pages of panels, each with abscissa, ordinate, and what the color shows."""
     pages = ceil(len(panels) / MAX_PANELS)
     for number in range(pages):
         page = panels[number * MAX_PANELS : (number + 1) * MAX_PANELS]
-        across = min(MAX_COLUMNS, len(page)) if len(page) != 4 else 2
-        down = ceil(len(page) / across)
+        column_count = min(MAX_COLUMNS, len(page)) if len(page) != 4 else 2
+        row_count = ceil(len(page) / column_count)
         count = f" ({number + 1} of {pages})" if pages > 1 else ""
-        size = (1.0 + 3.6 * across, 0.7 + 2.8 * down)
-        figure = make_figure(f"{len(known[page[0][0]])} runs{count}", size)
-        places = figure.subplots(down, across, squeeze=False).ravel()
-        for place in places[len(page) :]:
-            place.remove()
-        for place, (x, y, color) in zip(places, page, strict=False):
+        size = (1.0 + 3.6 * column_count, 0.7 + 2.8 * row_count)
+        figure = make_figure(f"{len(numbers[page[0][0]])} runs{count}", size)
+        panels_grid = figure.subplots(row_count, column_count, squeeze=False).ravel()
+        for panel in panels_grid[len(page) :]:
+            panel.remove()
+        for panel, (x, y, color) in zip(panels_grid, page, strict=False):
             if color:
-                _draw_map(figure, place, known[x], known[y], known[color])
+                _draw_map(figure, panel, numbers[x], numbers[y], numbers[color])
             else:
-                place.plot(known[x], known[y], ".", color=COLORS[0], ms=4, alpha=0.7)
-            place.set_title(color or y, fontsize=10, loc="left")
-            place.set_xlabel(x, fontsize=8)
+                panel.plot(numbers[x], numbers[y], ".", color=COLORS[0], ms=4, alpha=0.7)
+            panel.set_title(color or y, fontsize=10, loc="left")
+            panel.set_xlabel(x, fontsize=8)
             if color:
-                place.set_ylabel(y, fontsize=8)
+                panel.set_ylabel(y, fontsize=8)
             if not color:
-                place.grid(color="0.92", lw=0.8)
-            place.set_axisbelow(True)
-            place.tick_params(labelsize=8)
-            place.spines[["top", "right"]].set_visible(False)
+                panel.grid(color="0.92", lw=0.8)
+            panel.set_axisbelow(True)
+            panel.tick_params(labelsize=8)
+            panel.spines[["top", "right"]].set_visible(False)
         yield figure
 
 
-def _draw_map(figure: Any, place: Any, x: Array, y: Array, color: Array) -> None:
+def _draw_map(figure: Any, panel: Any, x: Array, y: Array, color: Array) -> None:
     """Draw a measure over two quantities: cells of a grid, or points; runs without it are crosses."""
     xs, ys = np.unique(x), np.unique(y)
     # Every combination was run: cells of a grid.
     if len(xs) * len(ys) == len(x) and len(xs) > 1 and len(ys) > 1:
         cells = np.full((len(ys), len(xs)), np.nan)
         cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = color
-        drawn = place.pcolormesh(xs, ys, cells, shading="nearest", cmap="viridis")
+        mappable = panel.pcolormesh(xs, ys, cells, shading="nearest", cmap="viridis")
     else:
         finite = np.isfinite(color)
-        drawn = place.scatter(x[finite], y[finite], c=color[finite], s=14, cmap="viridis")
-        place.plot(x[~finite], y[~finite], "x", color="0.6", ms=4)
-    figure.colorbar(drawn, ax=place)
+        mappable = panel.scatter(x[finite], y[finite], c=color[finite], s=14, cmap="viridis")
+        panel.plot(x[~finite], y[~finite], "x", color="0.6", ms=4)
+    figure.colorbar(mappable, ax=panel)

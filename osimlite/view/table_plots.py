@@ -126,44 +126,48 @@ class ColumnNames(NamedTuple):
             model: the model, with the actuators that a tool has added.
             mechanism: mechanism of the model, for the coordinates.
         """
-        infos = {info.name: info for info in mechanism.coordinates} if mechanism else {}
+        infos = (
+            {coordinate.name: coordinate for coordinate in mechanism.coordinates}
+            if mechanism
+            else {}
+        )
         units, regions = dict[str, str](), dict[str, str]()
         controls, forces = dict[str, tuple[float, ...]](), dict[str, tuple[float, ...]]()
-        for item in model.components(Actuator) if model is not None else ():
-            if isinstance(item, ScalarActuator):
-                bounds = item.min_control, item.max_control
-                controls[item.name] = tuple(bound for bound in bounds if isfinite(bound))
+        for actuator in model.components(Actuator) if model is not None else ():
+            if isinstance(actuator, ScalarActuator):
+                bounds = actuator.min_control, actuator.max_control
+                controls[actuator.name] = tuple(limit for limit in bounds if isfinite(limit))
                 # The force at full activation also depends on length and speed of the fibers.
-                strongest = getattr(item, "max_isometric_force", None)
-                scale = getattr(item, "optimal_force", 0.0)
-                forces[item.name] = (
+                strongest = getattr(actuator, "max_isometric_force", None)
+                scale = getattr(actuator, "optimal_force", 0.0)
+                forces[actuator.name] = (
                     (strongest,)
                     if strongest is not None
-                    else tuple(scale * bound for bound in controls[item.name] if scale * bound)
+                    else tuple(scale * limit for limit in controls[actuator.name] if scale * limit)
                 )
-            if isinstance(item, PathActuator):
-                units[item.name] = FORCE
-                regions[item.name] = _describe_region(item)
-            elif isinstance(item, CoordinateActuator):
-                info = infos.get(str(item.coordinate))
+            if isinstance(actuator, PathActuator):
+                units[actuator.name] = FORCE
+                regions[actuator.name] = _describe_region(actuator)
+            elif isinstance(actuator, CoordinateActuator):
+                coordinate = infos.get(str(actuator.coordinate))
                 # An unknown coordinate is taken for an angle.
-                turns = info is None or info.motion_type == "rotational"
-                units[item.name] = MOMENT if turns else FORCE
+                is_rotational = coordinate is None or coordinate.motion_type == "rotational"
+                units[actuator.name] = MOMENT if is_rotational else FORCE
             else:
-                units[item.name] = MOMENT if isinstance(item, TorqueActuator) else FORCE
+                units[actuator.name] = MOMENT if isinstance(actuator, TorqueActuator) else FORCE
         return cls(infos, units, regions, controls, forces)
 
 
-def _describe_region(item: PathActuator) -> str:
+def _describe_region(actuator: PathActuator) -> str:
     """Return the bodies between which a muscle runs, without their side; "" without points."""
-    path = item.geometry_path
+    path = actuator.geometry_path
     if not isinstance(path, GeometryPath) or not path.path_point_set.objects:
         return ""
     points = path.path_point_set.objects
     frames = [points[index].socket_parent_frame for index in (0, -1)]
-    ends = [str(getattr(frame, "name", frame)).rpartition("/")[2] for frame in frames]
+    body_names = [str(getattr(frame, "name", frame)).rpartition("/")[2] for frame in frames]
     # Muscles of both legs belong to one region, though the names of bodies say a side.
-    stems = [next(iter(split_sides([end]).values()))[0] for end in ends]
+    stems = [next(iter(split_sides([end]).values()))[0] for end in body_names]
     return " – ".join(dict.fromkeys(stems)).replace("_", " ")
 
 
@@ -178,41 +182,43 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
     for label, values in table.table[1].items():
         column = _describe_column(label, np.asarray(values, dtype=float), table, names)
         # Values, speeds, activations and so on of a table of states come one after the other.
-        kind = _find_kind(label)
-        section = SECTIONS.get(kind, kind.replace("_", " "))
-        columns.setdefault(kind, []).append(column._replace(section=section))
-    listed = [column for group in columns.values() for column in group]
-    groups = split_sides(column.group for column in listed)
-    return [column._replace(group=groups[column.group][0]) for column in listed]
+        quantity = _find_kind(label)
+        section = SECTIONS.get(quantity, quantity.replace("_", " "))
+        columns.setdefault(quantity, []).append(column._replace(section=section))
+    all_columns = [column for group in columns.values() for column in group]
+    groups = split_sides(column.group for column in all_columns)
+    return [column._replace(group=groups[column.group][0]) for column in all_columns]
 
 
 def _find_kind(label: str) -> str:
     """Return the kind of a state by its label; "" for columns that are no states."""
-    owner, _, kind = label.rpartition("/")
+    owner, _, quantity = label.rpartition("/")
     # Labels of states are paths; those of older files have dots.
     if owner:
-        return kind
-    word = label.partition(".")[2]
-    return word if word in SECTIONS or word in STATE_UNITS else ""
+        return quantity
+    ending = label.partition(".")[2]
+    return ending if ending in SECTIONS or ending in STATE_UNITS else ""
 
 
 def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNames) -> Column:
     owner, _, last = label.rpartition("/")
     if owner:
-        item = owner.rpartition("/")[2]
+        component = owner.rpartition("/")[2]
         if last in ("value", "speed"):
-            return _describe_coordinate(item, values, table, names, last == "speed")
+            return _describe_coordinate(component, values, table, names, last == "speed")
         return Column(
-            item if last in SECTIONS else f"{item} {last.replace('_', ' ')}",
+            component if last in SECTIONS else f"{component} {last.replace('_', ' ')}",
             STATE_UNITS.get(last, ""),
             values,
-            names.regions.get(item, ""),
+            names.regions.get(component, ""),
         )
     # Files of OpenSim 3 have "soleus_r.activation".
-    item, _, last = label.partition(".")
+    component, _, last = label.partition(".")
     if last in ("activation", *STATE_UNITS):
-        words = item if last in SECTIONS else f"{item} {last.replace('_', ' ')}"
-        return Column(words, STATE_UNITS.get(last, ""), values, names.regions.get(item, ""))
+        column_name = component if last in SECTIONS else f"{component} {last.replace('_', ' ')}"
+        return Column(
+            column_name, STATE_UNITS.get(last, ""), values, names.regions.get(component, "")
+        )
     # Labels that end with a component are vectors even in tables of actuators.
     is_vector = any(pattern.fullmatch(label) for pattern in _VECTORS)
     if table.name in ACTUATOR_TABLES and not is_vector:
@@ -226,13 +232,13 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
     for pattern, describe in _ENDINGS:
         if match := pattern.fullmatch(label):
             unit = describe(match["end"], table)
-            stem = match["stem"]
-            group = _find_group(stem, names)
-            words = f"{stem} {match['end']}" if pattern in _VECTORS else stem
+            base_name = match["stem"]
+            group = _find_group(base_name, names)
+            column_name = f"{base_name} {match['end']}" if pattern in _VECTORS else base_name
             factor = 1.0
             if unit.startswith("rad"):
                 factor, unit = np.degrees(1.0), unit.replace("rad", "deg", 1)
-            return Column(words, unit, factor * values, group)
+            return Column(column_name, unit, factor * values, group)
     unit = TABLE_UNITS.get(table.name, "")
     if table.name.startswith("MomentArm_"):
         unit = "m"
@@ -245,10 +251,10 @@ def _describe_actuator(label: str, values: Array, table: StoTable, names: Column
     """Return the column of an actuator or another force, by the name of the actuator."""
     group = names.regions.get(label, "")
     # Reserve actuators are named after their coordinate.
-    info = names.coordinates.get(re.sub(r"_reserve$|^reserve_", "", label))
-    group = group or ("" if info is None else _find_group(info.name, names))
-    turns = info is None or info.motion_type == "rotational"
-    force = names.units.get(label, "" if info is None else MOMENT if turns else FORCE)
+    coordinate = names.coordinates.get(re.sub(r"_reserve$|^reserve_", "", label))
+    group = group or ("" if coordinate is None else _find_group(coordinate.name, names))
+    is_rotational = coordinate is None or coordinate.motion_type == "rotational"
+    force = names.units.get(label, "" if coordinate is None else MOMENT if is_rotational else FORCE)
     unit = TABLE_UNITS[table.name]
     if unit == FORCE_OR_MOMENT:
         unit = force or unit
@@ -261,21 +267,21 @@ def _describe_coordinate(
     name: str, values: Array, table: StoTable, names: ColumnNames, is_speed: bool
 ) -> Column:
     """Return the column of a coordinate, in degrees if it is an angle."""
-    info = names.coordinates.get(name)
+    coordinate = names.coordinates.get(name)
     end = RATE_UNITS[1 if is_speed else _RATES.get(table.name, 0)]
-    kind = info.motion_type if info is not None else ""
-    unit = {"rotational": "deg", "translational": "m"}.get(kind, "")
-    if kind == "rotational" and not table.in_degrees:
+    motion_type = coordinate.motion_type if coordinate is not None else ""
+    unit = {"rotational": "deg", "translational": "m"}.get(motion_type, "")
+    if motion_type == "rotational" and not table.in_degrees:
         values = np.degrees(values)
     return Column(name, f"{unit}{end}" if unit else "", values, _find_group(name, names))
 
 
 def _find_group(name: str, names: ColumnNames) -> str:
     """Return the joint of a coordinate, or the body of a vector."""
-    info = names.coordinates.get(name)
-    if info is None:
+    coordinate = names.coordinates.get(name)
+    if coordinate is None:
         return name
-    return re.sub(r"^ground_|_[rl]$", "", info.joint.rpartition("/")[2])
+    return re.sub(r"^ground_|_[rl]$", "", coordinate.joint.rpartition("/")[2])
 
 
 def _describe_vector(end: str, table: StoTable) -> str:
@@ -334,25 +340,27 @@ def plot_tables(
         OsimliteError: the folder or a file cannot be written.
         SettingError: no panel has a band, or none is over the gait cycle.
     """
-    written, titles, is_cyclic = [], list[str](), False
+    paths, titles, is_cyclic = [], list[str](), False
     base = make_folder(Path(folder))
     for number, (name, table) in enumerate(tables.items(), 1):
         # A dot in the name of a tool is no ending.
-        stem = re.sub(r"\.(sto|mot|xml|trc)$", "", PurePath(name).name)
+        file_stem = re.sub(r"\.(sto|mot|xml|trc)$", "", PurePath(name).name)
         if len(table.times) > 1:
             panels, note = group_columns(describe_columns(table, names), table.times, steps=steps)
             panels = [panel._replace(band=(bands or {}).get(panel.title)) for panel in panels]
             titles += [panel.title for panel in panels]
             is_cyclic = is_cyclic or has_cycles(panels)
-            written += write_pages(draw_pages(make_title(stem), panels, note=note), base, stem)
+            paths += write_pages(
+                draw_pages(make_title(file_stem), panels, note=note), base, file_stem
+            )
         if report is not None:
             report(number, len(tables))
     if bands:
         check_bands(bands, titles, cyclic=is_cyclic)
-    return written
+    return paths
 
 
-def make_title(stem: str) -> str:
+def make_title(file_stem: str) -> str:
     """Return the title of a picture from the name of its file."""
-    words = stem.strip("_").replace("_", " ")
-    return words[:1].upper() + words[1:]
+    title = file_stem.strip("_").replace("_", " ")
+    return title[:1].upper() + title[1:]
