@@ -179,10 +179,10 @@ def _run(words: list[str]) -> None:
                 watch_command(words[0])
         with warnings.catch_warnings():
             default = warnings.showwarning
-            warnings.showwarning = lambda message, category, *place: (
+            warnings.showwarning = lambda message, category, *location: (
                 complain(str(message))
                 if issubclass(category, DoubtfulWarning)
-                else default(message, category, *place)
+                else default(message, category, *location)
             )
             warnings.simplefilter("once", DoubtfulWarning)
             # Options report suspicious numbers themselves, as errors.
@@ -257,7 +257,7 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
     path = context.command_path if context is not None else command
     synonym = SYNONYMS.get(getattr(error, "option_name", ""))
     if synonym and context is not None:
-        options = {word for item in context.command.params for word in item.opts}
+        options = {word for parameter in context.command.params for word in parameter.opts}
         if synonym in options:
             error.possibilities = [synonym]  # type: ignore[attr-defined]
     complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")

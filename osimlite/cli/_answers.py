@@ -19,7 +19,7 @@ from osimlite.lint.config import Config
 
 
 def compute_or_load(
-    question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]
+    question: str, file: str, data: bytes, compute: Callable[[], tuple[str, bool]]
 ) -> str:
     """Return a cached result for a file, or compute and cache it.
 
@@ -27,21 +27,21 @@ def compute_or_load(
         question: name of the result.
         file: path of the file.
         data: its content.
-        find: computes the result, and returns it with whether it depends on the content alone.
+        compute: computes the result, and returns it with whether it depends on the content alone.
             Only such results are cached.
     """
     key = [question, make_key(file, Config()), blake2b(data).hexdigest()]
     checksum = crc32(f"{question} {os.path.abspath(file)}".encode(errors="surrogateescape"))
     folder = user_cache_folder()
     if folder is None:
-        return find()[0]
+        return compute()[0]
     path = folder / __version__ / "answers" / f"{checksum:08x}.json"
     with suppress(OsimliteError, ValueError, RecursionError):
         match json.loads(read_file(path)):
-            case [known, str(answer)] if known == key:
+            case [cached_key, str(cached_result)] if cached_key == key:
                 mark_used(path)
-                return answer
-    answer, is_cacheable = find()
+                return cached_result
+    result, is_cacheable = compute()
     if is_cacheable:
-        write_cached(path, json.dumps([key, answer]))
-    return answer
+        write_cached(path, json.dumps([key, result]))
+    return result

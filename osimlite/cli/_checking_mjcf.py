@@ -54,7 +54,7 @@ def _make_table(result: Any, name: str) -> Any:
         "slack length, mm",
     ):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
-    for muscle in sorted(result.muscles, key=lambda each: -each.worst_arm.rms):
+    for muscle in sorted(result.muscles, key=lambda muscle_check: -muscle_check.worst_arm.rms):
         add_row(
             table,
             muscle.name,

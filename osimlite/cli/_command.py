@@ -84,10 +84,10 @@ class _BoundParameter(NamedTuple):
                 names = (*names[:-1], f"{names[-1]}/--no-{names[-1][2:]}")
         result = {}
         for name in names:
-            yes, _, no = name.partition("/")
-            result[yes] = True
-            if no:
-                result[no] = False
+            on_spelling, _, off_spelling = name.partition("/")
+            result[on_spelling] = True
+            if off_spelling:
+                result[off_spelling] = False
         return result
 
     def scalar(self) -> tuple[Any, bool]:
@@ -96,23 +96,29 @@ class _BoundParameter(NamedTuple):
         Returns:
             The type, for example float, and True for a list of such values.
         """
-        kinds = [kind for kind in get_args(self.type) if kind is not type(None)]
-        kind = kinds[0] if get_origin(self.type) is UnionType else self.type
-        return (get_args(kind)[0], True) if get_origin(kind) is list else (kind, False)
+        value_types = [
+            value_type for value_type in get_args(self.type) if value_type is not type(None)
+        ]
+        value_type = value_types[0] if get_origin(self.type) is UnionType else self.type
+        return (
+            (get_args(value_type)[0], True)
+            if get_origin(value_type) is list
+            else (value_type, False)
+        )
 
-    def value(self, kind: Any, word: str) -> Any:
+    def value(self, value_type: Any, word: str) -> Any:
         """Convert a word; return None if typer has to convert it or to report the error.
 
         Args:
-            kind: type of the value.
+            value_type: type of the value.
             word: the word of the command line.
         """
-        if kind is str or kind is Path:
-            return kind(word)
-        if kind not in _NUMBERS or not _NUMBERS[kind].fullmatch(word):
+        if value_type is str or value_type is Path:
+            return value_type(word)
+        if value_type not in _NUMBERS or not _NUMBERS[value_type].fullmatch(word):
             return None
         # Numbers outside of their limits are left to typer, which words the error.
-        value = kind(word)
+        value = value_type(word)
         settings = self.declared.settings
         return value if settings.get("min", value) <= value <= settings.get("max", value) else None
 
@@ -126,9 +132,11 @@ class Command:
     """
 
     def __init__(
-        self, function: Callable[..., None], more: Callable[[], Iterable[OptionSpec]] = tuple
+        self,
+        function: Callable[..., None],
+        list_further_options: Callable[[], Iterable[OptionSpec]] = tuple,
     ) -> None:
-        self.function, self._more = function, more
+        self.function, self._more = function, list_further_options
         self.__name__, self.__doc__, self.__module__ = (
             function.__name__,
             function.__doc__,
@@ -136,8 +144,10 @@ class Command:
         )
         self._parameters: list[_BoundParameter] | None = None
 
-    def __call__(self, *values: Any, **named: Any) -> None:
-        self.function(*values, **{each.name: each.default for each in self._more()} | named)
+    def __call__(self, *values: Any, **named_values: Any) -> None:
+        self.function(
+            *values, **{option.name: option.default for option in self._more()} | named_values
+        )
 
     def parameters(self) -> list[_BoundParameter]:
         """Return the parameters of the command in the order of its help."""
@@ -160,16 +170,16 @@ class Command:
             # Annotations are texts (`from __future__ import annotations`) that are evaluated when a
             # command is read.
             annotation = eval(function.__annotations__[name], function.__globals__)
-            kind, declared = annotation.__origin__, annotation.__metadata__[0]
-            result.append(_BoundParameter(name, kind, declared, defaults.get(name, ...)))
+            value_type, declared = annotation.__origin__, annotation.__metadata__[0]
+            result.append(_BoundParameter(name, value_type, declared, defaults.get(name, ...)))
         return result + [
-            _BoundParameter(each.name, each.type, _make_spec(each), each.default)
-            for each in self._more()
+            _BoundParameter(option.name, option.type, _make_spec(option), option.default)
+            for option in self._more()
         ]
 
     @property
     def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]
-        return {each.name: each.type for each in self.parameters()}
+        return {parameter.name: parameter.type for parameter in self.parameters()}
 
     @property
     def __signature__(self) -> Any:
@@ -180,14 +190,14 @@ class Command:
         import typer
 
         parameters = []
-        for name, kind, declared, default in self.parameters():
-            info = getattr(typer, declared.maker)(*declared.names, **declared.settings)
+        for name, value_type, declared, default in self.parameters():
+            typer_parameter = getattr(typer, declared.maker)(*declared.names, **declared.settings)
             parameters.append(
                 Parameter(
                     name,
                     Parameter.POSITIONAL_OR_KEYWORD,
                     default=Parameter.empty if default is ... else default,
-                    annotation=Annotated[kind, info],
+                    annotation=Annotated[value_type, typer_parameter],
                 )
             )
         return Signature(parameters)
@@ -201,10 +211,10 @@ class Command:
         ):
             return [*words]
         bare_values = {
-            spelling: each.declared.bare_value
-            for each in self.parameters()
-            if each.declared.bare_value is not None
-            for spelling in each.spellings
+            spelling: parameter.declared.bare_value
+            for parameter in self.parameters()
+            if parameter.declared.bare_value is not None
+            for spelling in parameter.spellings
         }
         result: list[str] = []
         # The added "-" makes the last word a word with a successor.
@@ -221,24 +231,30 @@ class Command:
             Values by parameter; None if typer has to parse the words, in particular if they are invalid.
         """
         parameters = self.parameters()
-        values: dict[str, Any] = {each.name: each.default for each in parameters}
+        values: dict[str, Any] = {
+            bound_parameter.name: bound_parameter.default for bound_parameter in parameters
+        }
         options = {
             # Switches and options by spelling, each with the value that a switch has.
-            spelling: (each, flag)
-            for each in parameters
-            if each.declared.maker == "Option"
-            for spelling, flag in each.spellings.items()
+            spelling: (bound_parameter, flag)
+            for bound_parameter in parameters
+            if bound_parameter.declared.maker == "Option"
+            for spelling, flag in bound_parameter.spellings.items()
         }
-        arguments = [each for each in parameters if each.declared.maker == "Argument"]
-        seen: set[str] = set()
-        rest = iter(words)
-        for word in rest:
+        arguments = [
+            bound_parameter
+            for bound_parameter in parameters
+            if bound_parameter.declared.maker == "Argument"
+        ]
+        names_with_value: set[str] = set()
+        remaining = iter(words)
+        for word in remaining:
             # "-" alone means standard input, and is no option.
             if word == "-" or not word.startswith("-"):
                 if not arguments:
                     return None
                 parameter, flag = arguments[0], True
-                kind, is_list = parameter.scalar()
+                value_type, is_list = parameter.scalar()
                 if not is_list:
                     arguments.pop(0)
             else:
@@ -247,24 +263,24 @@ class Command:
                 if spelling not in options or (equals and not spelling.startswith("--")):
                     return None
                 parameter, flag = options[spelling]
-                kind, is_list = parameter.scalar()
-                if not equals and kind is not bool:
-                    word = next(rest, "-")
+                value_type, is_list = parameter.scalar()
+                if not equals and value_type is not bool:
+                    word = next(remaining, "-")
                 # A value that starts with "-" may be a negative number or a forgotten value; typer decides.
-                if word.startswith("-") or (equals and kind is bool):
+                if word.startswith("-") or (equals and value_type is bool):
                     return None
             # Typer refuses an option that is given twice, unless it is a list.
-            value = flag if kind is bool else parameter.value(kind, word)
-            if value is None or (parameter.name in seen and not is_list):
+            value = flag if value_type is bool else parameter.value(value_type, word)
+            if value is None or (parameter.name in names_with_value and not is_list):
                 return None
             if is_list:
                 values[parameter.name] = [
-                    *(values[parameter.name] if parameter.name in seen else ()),
+                    *(values[parameter.name] if parameter.name in names_with_value else ()),
                     value,
                 ]
             else:
                 values[parameter.name] = value
-            seen.add(parameter.name)
+            names_with_value.add(parameter.name)
         # A parameter without a value is required, and typer words the error.
         return None if any(value is ... for value in values.values()) else values
 
@@ -283,7 +299,7 @@ def _make_spec(option: OptionSpec) -> ParameterSpec:
         "rich_help_panel": option.group,
     }
     return Option(
-        *option.spelled, **{word: value for word, value in settings.items() if value != ""}
+        *option.spelled, **{name: value for name, value in settings.items() if value != ""}
     )
 
 
@@ -293,7 +309,7 @@ def command(function: Callable[..., None]) -> Command:
 
 
 def command_with(
-    more: Callable[[], Iterable[OptionSpec]],
+    list_further_options: Callable[[], Iterable[OptionSpec]],
 ) -> Callable[[Callable[..., None]], Command]:
     """Decorate a function as a command with further options, which it takes as keyword arguments."""
-    return lambda function: Command(function, more)
+    return lambda function: Command(function, list_further_options)

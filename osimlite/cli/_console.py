@@ -103,25 +103,25 @@ def show_rows(
     """
     from textwrap import wrap
 
-    clean = [[escape_unprintable(cell) for cell in row] for row in rows]
+    escaped = [[escape_unprintable(cell) for cell in row] for row in rows]
     heads = [*headings]
     last = len(heads) - 1
-    widths = [max(len(row[index]) for row in [heads, *clean]) for index in range(last)]
+    widths = [max(len(row[index]) for row in [heads, *escaped]) for index in range(last)]
     indent = sum(widths) + 2 * last
-    is_beside = count_columns() - indent >= MIN_TEXT_WIDTH
-    start = indent if is_beside else 4
+    fits_beside = count_columns() - indent >= MIN_TEXT_WIDTH
+    start = indent if fits_beside else 4
     bold, end = ("\033[1m", "\033[0m") if wants_colour() else ("", "")
-    for number, row in enumerate([heads, *clean]):
+    for number, row in enumerate([heads, *escaped]):
         cells = [
             f"{cell:>{width}}" if index in right else f"{cell:{width}}"
             for index, (cell, width) in enumerate(zip(row[:last], widths, strict=True))
         ]
-        left = "  ".join(cells if is_beside else filter(None, row[:last]))
-        room = max(count_columns() - start, 10)
-        lines = wrap(row[last], room, break_on_hyphens=False, break_long_words=False)
-        if is_beside:
-            left = f"{left}  {lines.pop(0) if lines else ''}"
-        text = "\n".join([left.rstrip(), *(f"{'':{start}}{line}" for line in lines)])
+        beginning = "  ".join(cells if fits_beside else filter(None, row[:last]))
+        text_width = max(count_columns() - start, 10)
+        lines = wrap(row[last], text_width, break_on_hyphens=False, break_long_words=False)
+        if fits_beside:
+            beginning = f"{beginning}  {lines.pop(0) if lines else ''}"
+        text = "\n".join([beginning.rstrip(), *(f"{'':{start}}{line}" for line in lines)])
         show((f"{bold}{text}{end}" if number == 0 else text) + "\n")
 
 
@@ -148,21 +148,21 @@ def show(lines: str, *, err: bool = False) -> None:
     (sys.stderr if err else sys.stdout).write(lines)
 
 
-def print_diff(before: str, after: str, old: str, new: str) -> None:
+def print_diff(old_text: str, new_text: str, old_name: str, new_name: str) -> None:
     """Print a unified diff of two texts.
 
     Args:
-        before: first text.
-        after: second text.
-        old: name of the first text.
-        new: name of the second text.
+        old_text: first text.
+        new_text: second text.
+        old_name: name of the first text.
+        new_name: name of the second text.
     """
     import difflib
     import io
 
     # ``str.splitlines`` would also split at form feeds and other characters; a diff splits at \\n.
-    first, second = (list(io.StringIO(text, newline="\n")) for text in (before, after))
-    for line in difflib.unified_diff(first, second, old, new):
+    old_lines, new_lines = (list(io.StringIO(text, newline="\n")) for text in (old_text, new_text))
+    for line in difflib.unified_diff(old_lines, new_lines, old_name, new_name):
         body = line.rstrip("\r\n")
         end = line[len(body) :] if line.endswith("\n") else "\n\\ No newline at end of file\n"
         show("\t".join(map(escape_unprintable, body.split("\t"))) + end)
@@ -298,23 +298,23 @@ def _choose_widths(rows: Sequence[Sequence[str]], width: int) -> list[int] | Non
         width: width of the terminal.
     """
     cells = [*zip(*rows, strict=True)]
-    longest = [max(len(cell) for cell in column) for column in cells]
-    least = [
+    widest = [max(len(cell) for cell in column) for column in cells]
+    narrowest = [
         max((len(word) for cell in column for word in cell.split()), default=0) for column in cells
     ]
-    left = width - TEXT_COLUMN_GAP * (len(cells) - 1)
-    if sum(longest) <= left:
-        return longest
-    left -= sum(least)
-    if left < 0:
+    remaining = width - TEXT_COLUMN_GAP * (len(cells) - 1)
+    if sum(widest) <= remaining:
+        return widest
+    remaining -= sum(narrowest)
+    if remaining < 0:
         return None
     # Each column gets an equal part of the remaining width, and leaves what it does not need to the next.
-    widths = [*least]
-    order = sorted(range(len(cells)), key=lambda index: longest[index] - least[index])
+    widths = [*narrowest]
+    order = sorted(range(len(cells)), key=lambda index: widest[index] - narrowest[index])
     for number, index in enumerate(order):
-        part = min(longest[index] - least[index], left // (len(order) - number))
-        widths[index] += part
-        left -= part
+        extra = min(widest[index] - narrowest[index], remaining // (len(order) - number))
+        widths[index] += extra
+        remaining -= extra
     return widths
 
 
@@ -336,24 +336,24 @@ def _list_row_lines(
     for text, width in zip(row, widths, strict=True):
         cells.append(_wrap_words(text, max(width, 1)))
     lines = []
-    for parts in zip_longest(*cells, fillvalue=""):
-        words = []
-        for part, width, right in zip(parts, widths, is_right, strict=True):
-            padded = f"{part:>{width}}" if right else f"{part:{width}}"
-            colour = "\033[1m" if bold else CELL_COLOURS.get(part, "")
-            words.append(f"{colour}{padded}\033[0m" if is_coloured and colour else padded)
-        lines.append((" " * TEXT_COLUMN_GAP).join(words))
+    for cell_lines in zip_longest(*cells, fillvalue=""):
+        formatted = []
+        for cell_line, width, to_right in zip(cell_lines, widths, is_right, strict=True):
+            padded = f"{cell_line:>{width}}" if to_right else f"{cell_line:{width}}"
+            colour = "\033[1m" if bold else CELL_COLOURS.get(cell_line, "")
+            formatted.append(f"{colour}{padded}\033[0m" if is_coloured and colour else padded)
+        lines.append((" " * TEXT_COLUMN_GAP).join(formatted))
     return lines
 
 
-def _list_block_lines(heads: Sequence[str], row: Sequence[str]) -> list[str]:
+def _list_block_lines(headings: Sequence[str], row: Sequence[str]) -> list[str]:
     """Return the lines of a row that does not fit beside each other."""
     width = max(count_columns() - 4, 10)
     lines = _wrap_words(row[0], max(count_columns() - 1, 10))
-    for head, text in zip(heads[1:], row[1:], strict=True):
+    for heading, text in zip(headings[1:], row[1:], strict=True):
         if text:
-            words = f"{head}: {text}" if head else text
-            lines += [f"    {line}" for line in _wrap_words(words, width)]
+            labelled = f"{heading}: {text}" if heading else text
+            lines += [f"    {line}" for line in _wrap_words(labelled, width)]
     return lines
 
 
@@ -371,25 +371,25 @@ class FactTable:
         self.title = title
         self.rows = [*rows]
 
-    def add(self, name: str, words: str) -> None:
+    def add(self, name: str, text: str) -> None:
         """Add a row.
 
         Args:
             name: first column.
-            words: second column.
+            text: second column.
         """
-        self.rows.append((name, words))
+        self.rows.append((name, text))
 
     def show(self) -> None:
         """Print the table; text that is too long for its column is wrapped between words.
 
         Words are never broken, so that a file path can be copied and searched for.
         """
-        rows = [(escape_unprintable(name), escape_unprintable(words)) for name, words in self.rows]
+        rows = [(escape_unprintable(name), escape_unprintable(text)) for name, text in self.rows]
         width = max((len(name) for name, _ in rows), default=0)
         width_left = count_columns() - width - 2
         # Narrow columns need broken words, and characters of other scripts can be two columns wide.
-        if width_left < 30 or not all(name.isascii() and words.isascii() for name, words in rows):
+        if width_left < 30 or not all(name.isascii() and text.isascii() for name, text in rows):
             self._show_any(rows)
             return
         from textwrap import wrap
@@ -397,8 +397,8 @@ class FactTable:
         italic, bold, end = ("\033[3m", "\033[1m", "\033[0m") if wants_colour() else ("", "", "")
         if self.title:
             show(f"{italic}{escape_unprintable(self.title)}{end}\n")
-        for name, words in rows:
-            for line in wrap(words, width_left, break_on_hyphens=False, break_long_words=False) or [
+        for name, text in rows:
+            for line in wrap(text, width_left, break_on_hyphens=False, break_long_words=False) or [
                 ""
             ]:
                 show(f"{bold}{name:{width}}{end}  {line}".rstrip() + "\n")

@@ -83,76 +83,78 @@ class Request:
         sources = {OSIM, *importers}
         if source is not None and source not in sources:
             raise SettingError(f"--from: unknown format '{source}'{suggest_name(source, sources)}")
-        found = find_format(file) if source is None else source
-        if found is None:
+        source_format = find_format(file) if source is None else source
+        if source_format is None:
             raise SettingError(
                 f"the format of '{file.name}' is unknown; name it with --from: {', '.join(sorted(sources))}"
             )
         targets = {OSIM, MARKERS, PROJECT, *(exporter.name for exporter in EXPORTERS)}
         if target is not None and target not in targets:
             raise SettingError(f"--to: unknown format '{target}'{suggest_name(target, targets)}")
-        by_suffix = None if output is None else _find_target(output, found)
-        default = importers[found].target if found in importers else None
-        goal = target or by_suffix or default
+        by_suffix = None if output is None else _find_target(output, source_format)
+        default = importers[source_format].target if source_format in importers else None
+        target_format = target or by_suffix or default
         # An existing folder may have a name that looks like a file with a suffix.
         if None not in (target, by_suffix) and target != by_suffix and not _is_folder(output):
             raise SettingError(
                 f"-o names a file of the format '{by_suffix}', but --to is '{target}'; leave out one of them"
             )
-        if output is not None and _names_other_file(output, by_suffix, goal):
+        if output is not None and _names_other_file(output, by_suffix, target_format):
             advice = (
                 "name another file with -o, such as robot.urdf, or a format with --to; --formats lists the formats"
-                if goal is None
-                else f"name a file with the suffix '{_get_suffix(goal)}', or a folder without a suffix"
-                if _get_suffix(goal)
+                if target_format is None
+                else f"name a file with the suffix '{_get_suffix(target_format)}', or a folder without a suffix"
+                if _get_suffix(target_format)
                 else "name a folder without a suffix"
             )
             raise SettingError(
                 f"'{output.suffix}' is the suffix of no format that can be written; {advice}"
             )
-        if goal is None:
+        if target_format is None:
             raise SettingError(
                 "the format to write is unknown; name a file with -o, such as robot.urdf, or a format with --to"
             )
         # Only importers of models lead to other formats than their own.
         no_models = {MARKERS, PROJECT}
-        if {goal, default} & no_models and goal != default:
-            usual = f", only as '{default}'" if default in no_models else ""
+        if {target_format, default} & no_models and target_format != default:
+            only_target = f", only as '{default}'" if default in no_models else ""
             raise SettingError(
-                f"a file of the format '{found}' cannot be written as '{goal}'{usual}"
+                f"a file of the format '{source_format}' cannot be written as '{target_format}'{only_target}"
             )
         # 3. Where to write.
-        if goal == found:
+        if target_format == source_format:
             raise SettingError(
-                f"'{file.name}' already has the format '{goal}'; to bring a model to the current version, use "
+                f"'{file.name}' already has the format '{target_format}'; to bring a model to the current version, use "
                 "'osimlite upgrade'"
             )
         # A suffix that belongs to the format makes `-o` the name of the file, else it is a folder.
-        is_file = output is not None and output.suffix.lower() == _get_suffix(goal) != ""
+        is_file = output is not None and output.suffix.lower() == _get_suffix(target_format) != ""
         folder = output.parent if output is not None and is_file else output
         name = output.stem if output is not None and is_file else file.stem
         folder = options.choose_output_folder(file, folder)
-        written = folder / f"{name}{_get_suffix(goal)}"
+        main_path = folder / f"{name}{_get_suffix(target_format)}"
         # `samefile` sees through links and letter case, which text comparisons do not.
-        if written.exists() and file.exists() and written.samefile(file):
+        if main_path.exists() and file.exists() and main_path.samefile(file):
             raise SettingError(
                 f"'{file}' would be replaced by its conversion; name another file with -o"
             )
-        return cls(file, found, goal, folder, name)
+        return cls(file, source_format, target_format, folder, name)
 
     @property
     def main(self) -> str:
         """Name of the main file; "" if the conversion writes a folder."""
         if self.target in (OSIM, MARKERS):
             return f"{self.name}.{self.target}"
-        suffix = next((each.suffix for each in EXPORTERS if each.name == self.target), "")
+        suffix = next(
+            (exporter.suffix for exporter in EXPORTERS if exporter.name == self.target), ""
+        )
         return f"{self.name}{suffix}" if suffix else ""
 
     def carry_out(
         self,
         motion: Path | None,
         geometry: Sequence[Path] | None,
-        chosen: Mapping[str, Any],
+        option_values: Mapping[str, Any],
         *,
         overwrite: bool = False,
     ) -> Conversion:
@@ -161,7 +163,7 @@ class Request:
         Args:
             motion: file of coordinates over time; None without a motion.
             geometry: folders in which mesh files are searched.
-            chosen: options of the formats that were set.
+            option_values: options of the formats that were set.
             overwrite: whether files of other conversions and programs may be replaced.
 
         Raises:
@@ -173,23 +175,27 @@ class Request:
         guard = OutputGuard(self.folder, self.main, self.file.name, overwrite=overwrite)
         guard.protect_records()
         importer = list_importers().get(self.source)
-        exporter = next((each for each in EXPORTERS if each.name == self.target), None)
-        used = [each for each in (importer, exporter) if each is not None]
-        known = {choice.name for each in used for choice in each.choices}
+        exporter = next(
+            (converter for converter in EXPORTERS if converter.name == self.target), None
+        )
+        converters = [converter for converter in (importer, exporter) if converter is not None]
+        known_names = {option.name for converter in converters for option in converter.choices}
         # All options of all formats are on the command line; only those of these two formats may be
         # given.
-        for name in chosen:
-            if name not in known:
+        for name in option_values:
+            if name not in known_names:
                 raise SettingError(
                     f"--{name.replace('_', '-')} is no option of a conversion from '{self.source}' to '{self.target}'"
                 )
         if motion is not None and (exporter is None or not exporter.takes_motion):
             raise SettingError(f"the format '{self.target}' has no motion; leave out --motion")
         values = {
-            each.name: {
-                choice.name: chosen[choice.name] for choice in each.choices if choice.name in chosen
+            converter.name: {
+                option.name: option_values[option.name]
+                for option in converter.choices
+                if option.name in option_values
             }
-            for each in used
+            for converter in converters
         }
         # OpenSim's own files are read by the reader of documents, not by an importer.
         if importer is None:
@@ -215,19 +221,27 @@ class Request:
                 result.fidelity.records[:0] = imported.fidelity.records
                 result.summary.update(imported.summary)
         # Both files are written last, since they describe the others.
-        same, changed, dropped = result.fidelity.counts()
+        exact_count, changed_count, dropped_count = result.fidelity.counts()
         summary = {
             "source": self.file.name,
             "from": self.source,
             "to": self.target,
             "files": [_get_relative(path, self.folder) for path in result.files],
-            "parts": {"exact": same, "approximated": changed, "left_out": dropped},
+            "parts": {
+                "exact": exact_count,
+                "approximated": changed_count,
+                "left_out": dropped_count,
+            },
             **result.summary,
         }
         fidelity = write_into(self.folder, FIDELITY_FILE, result.fidelity.to_json())
-        written = write_into(self.folder, SUMMARY_FILE, format_json(summary))
+        summary_path = write_into(self.folder, SUMMARY_FILE, format_json(summary))
         # Some exporters write their own record, which the complete one replaces.
-        files = [*(path for path in result.files if path.name != FIDELITY_FILE), fidelity, written]
+        files = [
+            *(path for path in result.files if path.name != FIDELITY_FILE),
+            fidelity,
+            summary_path,
+        ]
         return Conversion(files, result.fidelity, summary)
 
     def _export(
@@ -236,19 +250,24 @@ class Request:
         exporter: Exporter,
         motion: Path | None,
         geometry: Sequence[Path] | None,
-        choices: Mapping[str, Any],
+        option_values: Mapping[str, Any],
         guard: OutputGuard,
     ) -> Conversion:
         """Write a model in the format of an exporter."""
         folders = options.list_mesh_folders(self.file, geometry)
         # Exporters of pages and pictures take what the viewer shows; the others take the model.
         if exporter.command != "view":
-            moved = {"motion": motion} if exporter.takes_motion else {}
-            made = exporter.write(
-                model, folder=self.file.parent, name=self.name, geometry=folders, **moved, **choices
+            motion_argument = {"motion": motion} if exporter.takes_motion else {}
+            exported = exporter.write(
+                model,
+                folder=self.file.parent,
+                name=self.name,
+                geometry=folders,
+                **motion_argument,
+                **option_values,
             )
-            guard.protect_files(made)
-            return Conversion(made.write(self.folder), made.fidelity)
+            guard.protect_files(exported)
+            return Conversion(exported.write(self.folder), exported.fidelity)
         guard.protect_files(None)
         from osimlite.schema.forces import Force
         from osimlite.schema.frames import Body
@@ -257,7 +276,7 @@ class Request:
         from osimlite.view.shown import Shown
 
         model, mechanism, left_out = build_showable(model)
-        shown = Shown.of(
+        viewed = Shown.of(
             model, mechanism, folders, file=self.file, motion=motion, left_out=left_out
         )
         fidelity = Fidelity(mechanism.name, exporter.name)
@@ -271,11 +290,11 @@ class Request:
                 "what a force does",
                 f"{LEFT_OUT}; its path is drawn if it has one",
             )
-        for remark in shown.remarks:
+        for remark in viewed.remarks:
             fidelity.add("view", "/", remark, LEFT_OUT)
         path = make_folder(self.folder) / f"{self.name}{exporter.suffix}"
-        defaults = {choice.name: choice.default for choice in exporter.choices}
-        exporter.write(shown, path, **{**defaults, **choices})
+        defaults = {option.name: option.default for option in exporter.choices}
+        exporter.write(viewed, path, **{**defaults, **option_values})
         return Conversion([path], fidelity)
 
 
@@ -352,19 +371,19 @@ class OutputGuard:
         if not self.is_repeated and (self.folder / FIDELITY_FILE).is_file():
             self._refuse(FIDELITY_FILE, "is the record of another conversion")
 
-    def protect_files(self, made: Any) -> None:
+    def protect_files(self, conversion: Any) -> None:
         """Raise SettingError if a file would be replaced that no conversion of this name wrote.
 
         Args:
-            made: result with the names of further files as keys of its attribute `files`; None
+            conversion: result with the names of further files as keys of its attribute `files`; None
                 without further files.
         """
         if self.overwrite or self.is_repeated:
             return
         # URDF and bioMod have this file beside them.
         sidecar = f"{Path(self.main).stem}.coordinates.json"
-        own = [self.main, sidecar] if self.main else []
-        for name in [*own, *getattr(made, "files", ())]:
+        main_files = [self.main, sidecar] if self.main else []
+        for name in [*main_files, *getattr(conversion, "files", ())]:
             if (self.folder / name).is_file():
                 self._refuse(name, "exists already")
 
@@ -390,7 +409,7 @@ def _get_suffix(target: str) -> str:
     """Return the suffix of the main file of a format, in lower case; "" for a folder."""
     if target in (OSIM, MARKERS):
         return f".{target}"
-    return next((each.suffix.lower() for each in EXPORTERS if each.name == target), "")
+    return next((exporter.suffix.lower() for exporter in EXPORTERS if exporter.name == target), "")
 
 
 def _get_relative(path: Path, folder: Path) -> str:
@@ -403,8 +422,10 @@ def report(request: Request, result: Conversion) -> None:
     """Print what was lost, and which files were written."""
     if len(result.fidelity):
         print_table(tabulate(result.fidelity, request.target))
-    same, changed, dropped = result.fidelity.counts()
-    say(f"parts: {same} exact, {changed} approximated or converted, {dropped} left out")
+    exact_count, changed_count, dropped_count = result.fidelity.counts()
+    say(
+        f"parts: {exact_count} exact, {changed_count} approximated or converted, {dropped_count} left out"
+    )
     say("wrote " + join_words([str(path) for path in result.files], max_count=4))
 
 

@@ -26,19 +26,19 @@ def tabulate(fidelity: Fidelity, target: str) -> Any:
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("translation", overflow="fold", ratio=3)
     table.add_column("components", overflow="fold", ratio=3)
-    measured = any(record.errors for record in fidelity)
-    if measured:
+    has_errors = any(record.errors for record in fidelity)
+    if has_errors:
         table.add_column("worst error", overflow="fold", ratio=2)
     for group in fidelity.groups():
         # Users know a path by the name of its muscle.
         owners = (component.removesuffix("/path") for component in group.components)
         names = dict.fromkeys(owner.rsplit("/", 1)[1] or "the model" for owner in owners)
-        worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
+        largest_errors = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
         add_row(
             table,
             group.cannot_say,
             group.done,
             join_words(list(names), max_count=3),
-            *([", ".join(worst)] if measured else []),
+            *([", ".join(largest_errors)] if has_errors else []),
         )
     return table

@@ -29,22 +29,22 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
     width = min(width, MAX_WIDTH)
     start, end = ("\033[1m", "\033[0m") if bold else ("", "")
     parameters = command.parameters()
-    places = [each for each in parameters if each.declared.maker == "Argument"]
-    usage = " ".join([f"osimlite {name} [OPTIONS]", *map(_name_argument, places)])
+    arguments = [parameter for parameter in parameters if parameter.declared.maker == "Argument"]
+    usage = " ".join([f"osimlite {name} [OPTIONS]", *map(_name_argument, arguments)])
     lines = [f"{start}Usage:{end} {usage}", ""]
     for paragraph in (command.__doc__ or "").strip().split("\n\n"):
         lines += [*_wrap(" ".join(paragraph.split()), width, 0), ""]
-    groups: dict[str, list[Any]] = {"Arguments": places} if places else {}
-    for each in parameters:
-        if each.declared.maker == "Option":
-            heading = each.declared.settings.get("rich_help_panel") or "Options"
-            groups.setdefault(heading, []).append(each)
+    groups: dict[str, list[Any]] = {"Arguments": arguments} if arguments else {}
+    for parameter in parameters:
+        if parameter.declared.maker == "Option":
+            heading = parameter.declared.settings.get("rich_help_panel") or "Options"
+            groups.setdefault(heading, []).append(parameter)
     for heading, group in groups.items():
         lines.append(f"{start}{heading}:{end}")
-        for each in group:
-            is_argument = each.declared.maker == "Argument"
-            words = _name_argument(each) if is_argument else _name_option(each)
-            lines += _describe(words, _explain(each), width, start, end)
+        for parameter in group:
+            is_argument = parameter.declared.maker == "Argument"
+            name_text = _name_argument(parameter) if is_argument else _name_option(parameter)
+            lines += _describe(name_text, _explain(parameter), width, start, end)
         lines.append("")
     lines[-1:] = [*_describe("-h, --help", "Show this text.", width, start, end), ""]
     return "\n".join(lines)
@@ -53,18 +53,20 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
 def _name_argument(parameter: Any) -> str:
     """Return an argument in capitals, with dots for several and brackets if it may be left out."""
     _, is_list = parameter.scalar()
-    word = (parameter.declared.settings.get("metavar") or parameter.name).upper()
-    word = f"{word}..." if is_list else word
-    return word if parameter.default is ... else f"[{word}]"
+    argument_name = (parameter.declared.settings.get("metavar") or parameter.name).upper()
+    argument_name = f"{argument_name}..." if is_list else argument_name
+    return argument_name if parameter.default is ... else f"[{argument_name}]"
 
 
 def _name_option(parameter: Any) -> str:
     """Return the spellings of an option, short ones first, and the placeholder of its value."""
-    spellings = sorted(parameter.spellings, key=lambda word: (word[:2] == "--", 0))
-    kind, _ = parameter.scalar()
-    if kind is bool:
+    spellings = sorted(parameter.spellings, key=lambda spelling: (spelling[:2] == "--", 0))
+    value_type, _ = parameter.scalar()
+    if value_type is bool:
         return ", ".join(spellings)
-    placeholder = parameter.declared.settings.get("metavar") or PLACEHOLDERS.get(kind, "VALUE")
+    placeholder = parameter.declared.settings.get("metavar") or PLACEHOLDERS.get(
+        value_type, "VALUE"
+    )
     return f"{', '.join(spellings)} {placeholder}"
 
 
@@ -72,28 +74,28 @@ def _explain(parameter: Any) -> str:
     """Return the help of a parameter with its default."""
     settings = parameter.declared.settings
     text = " ".join((settings.get("help") or "").split())
-    shown = settings.get("show_default", True)
+    show_default = settings.get("show_default", True)
     default = parameter.default
     if default is ...:
-        words = "" if parameter.declared.maker == "Argument" else "required"
-    elif isinstance(shown, str):
-        words = f"default: {shown}"
-    elif shown and default is not None and not isinstance(default, bool) and default != "":
-        words = f"default: {default}"
+        default_note = "" if parameter.declared.maker == "Argument" else "required"
+    elif isinstance(show_default, str):
+        default_note = f"default: {show_default}"
+    elif show_default and default is not None and not isinstance(default, bool) and default != "":
+        default_note = f"default: {default}"
     else:
-        words = ""
-    return f"{text} [{words}]" if words else text
+        default_note = ""
+    return f"{text} [{default_note}]" if default_note else text
 
 
-def _describe(words: str, text: str, width: int, start: str, end: str) -> list[str]:
+def _describe(name_text: str, text: str, width: int, start: str, end: str) -> list[str]:
     """Return the lines of an option or argument with its help."""
-    left = f"  {start}{words}{end}"
+    beginning = f"  {start}{name_text}{end}"
     indent = NAME_WIDTH + 4
     lines = _wrap(text, width, indent)
-    if len(words) > NAME_WIDTH or not lines:
-        return [left, *lines]
-    padding = " " * (NAME_WIDTH - len(words) + 2)
-    return [f"{left}{padding}{lines[0].lstrip()}", *lines[1:]]
+    if len(name_text) > NAME_WIDTH or not lines:
+        return [beginning, *lines]
+    padding = " " * (NAME_WIDTH - len(name_text) + 2)
+    return [f"{beginning}{padding}{lines[0].lstrip()}", *lines[1:]]
 
 
 def _wrap(text: str, width: int, indent: int) -> list[str]:

@@ -123,14 +123,14 @@ Modules without a page are skipped for the one that called them.
 
 def find_page(error: BaseException) -> str:
     """Return the page of the manual for an exception that was raised."""
-    kinds = (f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__)
+    class_names = (f"{cls.__module__}.{cls.__qualname__}" for cls in type(error).__mro__)
     modules = (
         frame.f_globals.get("__name__", "")
         for frame, _ in reversed([*walk_tb(error.__traceback__)])
     )
-    for part in chain(kinds, modules):
-        while part:
-            if part in PAGES:
-                return PAGES[part]
-            part = part.rpartition(".")[0]
+    for name in chain(class_names, modules):
+        while name:
+            if name in PAGES:
+                return PAGES[name]
+            name = name.rpartition(".")[0]
     return "docs/errors.md"

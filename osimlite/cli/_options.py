@@ -224,9 +224,11 @@ def list_simulation_options(
         from osimlite.simulation.options import INTEGRATION_OPTIONS, Options
 
         return (
-            each
-            for each in list_options(Options)
-            if not names or each.name in names or (integration and each.name in INTEGRATION_OPTIONS)
+            option
+            for option in list_options(Options)
+            if not names
+            or option.name in names
+            or (integration and option.name in INTEGRATION_OPTIONS)
         )
 
     return list_selected
@@ -281,12 +283,12 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
 
 
 def parse_named_words(
-    words: Iterable[str] | None, option: str, form: str = "NAME=VALUE"
+    assignments: Iterable[str] | None, option: str, form: str = "NAME=VALUE"
 ) -> dict[str, str]:
     """Parse the ``NAME=VALUE`` words of an option.
 
     Args:
-        words: words of the command line.
+        assignments: words of the command line.
         option: the option, for messages.
         form: expected form, for messages.
 
@@ -299,18 +301,18 @@ def parse_named_words(
     from osimlite.errors import SettingError
 
     result = {}
-    for word in words or ():
+    for assignment in assignments or ():
         # The first equals sign separates: values may contain more of them.
-        name, equals, value = (part.strip() for part in word.partition("="))
+        name, equals, value = (piece.strip() for piece in assignment.partition("="))
         if not equals:
-            raise SettingError(f"{option} takes {form}, got '{word}'")
+            raise SettingError(f"{option} takes {form}, got '{assignment}'")
         if name in result:
             raise SettingError(f"{option} names '{name}' twice; leave one out")
         result[name] = value
     return result
 
 
-def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]]]:
+def parse_applied_loads(assignments: Iterable[str] | None) -> dict[str, list[list[str]]]:
     """Parse the words of ``--applied-to``.
 
     Returns:
@@ -320,18 +322,19 @@ def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]
     Raises:
         SettingError: a word does not have this form, or two have the same body.
     """
-    named = parse_named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
+    text_by_body = parse_named_words(assignments, "--applied-to", "BODY=FORCE,POINT,MOMENT")
     # Several loads on one body are separated by "+", the columns of a load by commas.
     return {
-        body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()
+        body: [load.strip().split(",") for load in text.split("+")]
+        for body, text in text_by_body.items()
     }
 
 
-def parse_named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
+def parse_named_numbers(assignments: Iterable[str] | None, option: str) -> dict[str, float]:
     """Parse the ``NAME=NUMBER`` words of an option.
 
     Args:
-        words: words of the command line.
+        assignments: words of the command line.
         option: the option, for messages.
 
     Returns:
@@ -343,7 +346,7 @@ def parse_named_numbers(words: Iterable[str] | None, option: str) -> dict[str, f
     from osimlite.errors import SettingError
 
     result = {}
-    for name, text in parse_named_words(words, option, "NAME=NUMBER").items():
+    for name, text in parse_named_words(assignments, option, "NAME=NUMBER").items():
         try:
             result[name] = float(text)
         except ValueError:
@@ -352,12 +355,15 @@ def parse_named_numbers(words: Iterable[str] | None, option: str) -> dict[str, f
 
 
 def parse_quantities(
-    words: Iterable[str] | None, mechanism: Mechanism, option: str, states: Collection[str] = ()
+    assignments: Iterable[str] | None,
+    mechanism: Mechanism,
+    option: str,
+    states: Collection[str] = (),
 ) -> dict[str, float]:
     """Parse the ``COORDINATE=VALUE`` words of an option.
 
     Args:
-        words: words of the command line.
+        assignments: words of the command line.
         mechanism: mechanism with the coordinates.
         option: the option, for messages.
         states: paths of other states that may be named.
@@ -375,7 +381,7 @@ def parse_quantities(
 
     result = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
-    for name, text in parse_named_words(words, option, form).items():
+    for name, text in parse_named_words(assignments, option, form).items():
         try:
             # States such as activations have no unit to convert.
             if name in states:
@@ -383,9 +389,9 @@ def parse_quantities(
                 continue
             result[name] = convert_value(mechanism, name, text)
             # Only values are compared with the coordinate's range; speeds have none.
-            info = mechanism.coordinates[mechanism.coordinate_index(name)]
-            if option == "--set" and (odd := describe_suspect_value(info, name, text)):
-                raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
+            coordinate = mechanism.coordinates[mechanism.coordinate_index(name)]
+            if option == "--set" and (suspicion := describe_suspect_value(coordinate, name, text)):
+                raise SettingError(f"{option}: {suspicion} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The command is wrong and not the model, so this must not be a ModelError.
             raise OsimliteError(f"{option}: {error.message}{suggest_name(name, states)}") from None
@@ -433,10 +439,10 @@ def resolve_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
     from osimlite.errors import MissingFolderError
 
     # A misspelt folder would otherwise only show as missing meshes.
-    for place in geometry or ():
-        if not place.is_dir():
+    for folder in geometry or ():
+        if not folder.is_dir():
             raise MissingFolderError(
-                "--geometry names a folder that does not exist", file=str(place)
+                "--geometry names a folder that does not exist", file=str(folder)
             )
     return geometry or ()
 

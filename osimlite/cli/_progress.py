@@ -89,29 +89,29 @@ class _Task:
     def describe(self, now: float) -> str:
         """Return the task, how far it is, and the time left."""
         if self.part is not None:
-            words = self.part.describe(now)
+            description = self.part.describe(now)
             is_one_of_many = self.total is not None and self.total > 1.0
             return escape_unprintable(
-                f"{self.title}, {_format(self.done)} of {_format(self.total or 0.0)} done; {words}"
+                f"{self.title}, {_format(self.done)} of {_format(self.total or 0.0)} done; {description}"
                 if is_one_of_many
-                else words
+                else description
             )
         elapsed = now - self.started
-        parts = []
+        details = []
         if self.total and self.done:
-            part = min(1.0, self.done / self.total)
+            fraction = min(1.0, self.done / self.total)
             amount = f" ({_format(self.done)} of {_format(self.total)}{self.unit})"
             # A total of 1 is a part of the work, which has no unit.
-            parts += [f"{100.0 * part:.0f} %{amount if self.total != 1.0 else ''}"]
+            details += [f"{100.0 * fraction:.0f} %{amount if self.total != 1.0 else ''}"]
             if self.details:
-                parts.append(self.details)
-            if elapsed > ESTIMATE_S and 0.0 < part < 1.0:
-                parts.append(f"{_format_duration(elapsed * (1.0 - part) / part)} left")
+                details.append(self.details)
+            if elapsed > ESTIMATE_S and 0.0 < fraction < 1.0:
+                details.append(f"{_format_duration(elapsed * (1.0 - fraction) / fraction)} left")
         else:
-            parts += [words for words in (self.details,) if words]
+            details += [description for description in (self.details,) if description]
             if elapsed > ESTIMATE_S:
-                parts.append(_format_duration(elapsed))
-        return escape_unprintable(f"{self.title}: {', '.join(parts)}" if parts else self.title)
+                details.append(_format_duration(elapsed))
+        return escape_unprintable(f"{self.title}: {', '.join(details)}" if details else self.title)
 
 
 def _format(amount: float) -> str:
@@ -189,14 +189,14 @@ class _Line:
             return
         try:
             now = time.monotonic()
-            is_due = now - self._last_output >= SILENT_S and now - self._last_drawn >= REDRAW_S
-            if self.tasks and is_due and self.is_terminal():
+            is_overdue = now - self._last_output >= SILENT_S and now - self._last_drawn >= REDRAW_S
+            if self.tasks and is_overdue and self.is_terminal():
                 self._last_drawn = now
                 # One column less than the terminal has, which would break the line.
-                words = self.tasks[-1].describe(now)[: max(1, count_columns() - 1)]
+                text = self.tasks[-1].describe(now)[: max(1, count_columns() - 1)]
                 # Padding with blanks overwrites the rest of a longer line.
-                self._write(f"\r{words:{self._shown}}")
-                self._shown = len(words)
+                self._write(f"\r{text:{self._shown}}")
+                self._shown = len(text)
         finally:
             self._lock.release()
 
@@ -311,13 +311,13 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
 
 
 @contextmanager
-def motion_bar(title: str, to: float) -> Iterator[Callable[[float, float], None]]:
+def motion_bar(title: str, end_time: float) -> Iterator[Callable[[float, float], None]]:
     """Show the progress of a motion up to a time (s).
 
     Yields:
         A function that takes the time reached and the length of the steps, s.
     """
-    with progress_bar(title, to, " s") as advance:
+    with progress_bar(title, end_time, " s") as advance:
         yield lambda t, step: advance(t, None, f"steps of {step:.2g} s")
 
 
@@ -353,9 +353,9 @@ def show_engine_warnings() -> None:
             # Compiling takes seconds on the first run, which people should not take for the
             # simulation.
             elif _line.tasks:
-                words = record.getMessage()
-                is_over = not words.startswith("compiling")
-                _line.tasks[-1].details = "" if is_over else f"{words} (once per machine)"
+                message = record.getMessage()
+                is_finished = not message.startswith("compiling")
+                _line.tasks[-1].details = "" if is_finished else f"{message} (once per machine)"
 
     log = logging.getLogger("osimlite.simulation.engines")
     log.addHandler(ProgressHandler())

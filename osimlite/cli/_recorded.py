@@ -122,9 +122,9 @@ def draw_tables(
         names = ColumnNames.from_model(model, mechanism)
         steps = _find_steps(loads, mechanism)
         bands = None if band is None else read_bands(band)
-        written = plot_tables(tables, folder, names, steps=steps, report=progress, bands=bands)
-    say(describe_pictures(written), err=err)
-    return written
+        paths = plot_tables(tables, folder, names, steps=steps, report=progress, bands=bands)
+    say(describe_pictures(paths), err=err)
+    return paths
 
 
 def describe_pictures(files: list[Path]) -> str:

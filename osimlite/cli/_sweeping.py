@@ -87,7 +87,7 @@ def make_plan(
     below: Sequence[str] | None,
     above: Sequence[str] | None,
     controls: Sequence[str] | None = None,
-    **choices: Any,
+    **settings: Any,
 ) -> Plan:
     """Make the plan of a sweep from command-line options.
 
@@ -98,7 +98,7 @@ def make_plan(
         below: coordinates and values below which a run ends.
         above: coordinates and values above which a run ends.
         controls: controls of actuators.
-        choices: further keyword arguments of :func:`osimlite.studies.sweep.plan.plan`.
+        settings: further keyword arguments of :func:`osimlite.studies.sweep.plan.plan`.
 
     Raises:
         OsimliteError: an option is invalid.
@@ -111,7 +111,7 @@ def make_plan(
 
     ranges = parse_ranges(vary or [])
     # A controller has parameters that vary by default.
-    if not ranges and choices.get("controller") is None:
+    if not ranges and settings.get("controller") is None:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
     levels = {
         "below": _parse_levels(below, "--stop-below"),
@@ -127,14 +127,14 @@ def make_plan(
                 parameter,
                 controls=parse_controls(controls or []),
                 **levels,
-                **choices,
+                **settings,
             )
-        except UnitWarning as odd:
-            raise SettingError(f"{odd} (if not, write rad after the number)") from None
+        except UnitWarning as warning:
+            raise SettingError(f"{warning} (if not, write rad after the number)") from None
 
 
 def _make_plan(
-    source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any
+    source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **settings: Any
 ) -> Plan:
     from functools import partial
     from inspect import Parameter
@@ -146,45 +146,48 @@ def _make_plan(
     # A model file has no parameters; a function may be called with others for each run.
     if Path(source).suffix.lower() == ".osim":
         model, folder = read_source(source, parameter)
-        return plan(model, ranges, folder=str(folder), **choices)
-    given = parse_named_words(parameter, "-p")
+        return plan(model, ranges, folder=str(folder), **settings)
+    set_values = parse_named_words(parameter, "-p")
     # A value for a parameter that also varies would be overwritten in each run.
-    both = [name for name in ranges if name in given]
-    if both:
-        raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
-    known = {
-        name: default for name, default in list_parameters(source).items() if name not in given
+    doubly_set = [name for name in ranges if name in set_values]
+    if doubly_set:
+        raise SettingError(f"the parameter '{doubly_set[0]}' is set and varied; do one of the two")
+    varied_defaults = {
+        name: default for name, default in list_parameters(source).items() if name not in set_values
     }
     # The nominal model needs a value for each parameter without a default; take the lower bound of its
     # range.
-    needed = {
+    nominal_values = {
         name: str(ranges[name]).partition(":")[0]
-        for name in known
-        if known[name] is Parameter.empty and name in ranges
+        for name in varied_defaults
+        if varied_defaults[name] is Parameter.empty and name in ranges
     }
     # A partial function of this module can be sent to other processes.
     return plan(
-        partial(_make_model, source, {**needed, **given}), ranges, parameters=known, **choices
+        partial(_make_model, source, {**nominal_values, **set_values}),
+        ranges,
+        parameters=varied_defaults,
+        **settings,
     )
 
 
-def _make_model(source: str, given: Mapping[str, str], parameters: Mapping[str, float]) -> Any:
+def _make_model(source: str, set_values: Mapping[str, str], parameters: Mapping[str, float]) -> Any:
     from osimlite.models.source import make_model
 
     # Functions may require int parameters, so whole numbers are written without a decimal point.
-    words = {
+    texts = {
         name: repr(int(value) if value.is_integer() else value)
         for name, value in parameters.items()
     }
-    return make_model(source, {**given, **words})
+    return make_model(source, {**set_values, **texts})
 
 
-def _parse_levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
+def _parse_levels(assignments: Sequence[str] | None, option: str) -> dict[str, str]:
     from osimlite.base.quantity import parse_quantity
     from osimlite.errors import SettingError
 
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
-    result = parse_named_words(words, option, form)
+    result = parse_named_words(assignments, option, form)
     for text in result.values():
         if parse_quantity(text) is None:
             raise SettingError(f"{option} takes {form}, got '{text}'")

@@ -90,13 +90,15 @@ def validate_paths(
     files = find_project_files(paths, only_ours=only_ours, passed=skipped)
     failed = False
     if diff:
-        shown = [_show_diff(path, config, unsafe=unsafe_fixes) for path in files]
-        count, left, unread = (sum(counts[index] for counts in shown) for index in range(3))
-        say(f"Would apply {_count_fixes(count)}{_describe_unsafe_fixes(left)}.", err=True)
+        diff_counts = [_show_diff(path, config, unsafe=unsafe_fixes) for path in files]
+        count, unsafe_count, unread = (
+            sum(counts[index] for counts in diff_counts) for index in range(3)
+        )
+        say(f"Would apply {_count_fixes(count)}{_describe_unsafe_fixes(unsafe_count)}.", err=True)
         return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:
-        count, left, failed = _fix_files(files, config, unsafe=unsafe_fixes)
-        say(f"Applied {_count_fixes(count)}{_describe_unsafe_fixes(left)}.", err=True)
+        count, unsafe_count, failed = _fix_files(files, config, unsafe=unsafe_fixes)
+        say(f"Applied {_count_fixes(count)}{_describe_unsafe_fixes(unsafe_count)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, config, cached=not no_cache, progress=progress)
     report.passed = skipped
@@ -117,8 +119,8 @@ def validate_paths(
         width = min(max(get_terminal_width(), 40), 120)
         text = render(report, format, colour=wants_colour(), width=width, everything=everything)
         (show if format in FOR_PEOPLE else print_for_programs)(text)
-    worst = Severity(fail_on) if fail_on is not None else _find_threshold(files)
-    return 2 if failed else int(bool(report.at_least(worst)))
+    threshold = Severity(fail_on) if fail_on is not None else _find_threshold(files)
+    return 2 if failed else int(bool(report.at_least(threshold)))
 
 
 def check_option_values(format: str, fail_on: str | None) -> None:
@@ -131,12 +133,14 @@ def check_option_values(format: str, fail_on: str | None) -> None:
     Raises:
         OsimliteError: a value is unknown.
     """
-    for option, word, known in (
+    for option, value, known_values in (
         ("--fail-on", fail_on, tuple(Severity)),
         ("--format", format, FORMATS),
     ):
-        if word is not None and word not in known:
-            raise OsimliteError(f"{option} must be one of {join_words(known)}, not '{word}'")
+        if value is not None and value not in known_values:
+            raise OsimliteError(
+                f"{option} must be one of {join_words(known_values)}, not '{value}'"
+            )
 
 
 def _read_source(path: str) -> Source:
@@ -147,14 +151,14 @@ def _read_source(path: str) -> Source:
     return Source.from_file(path)
 
 
-def _check_source(source: Source, given: Config) -> Report:
+def _check_source(source: Source, config: Config) -> Report:
     """Check one file with the settings of its folder and of the command line."""
     from osimlite.lint.engine import make_subject, run_rules
 
     assert source.file is not None
     # Rules that measure paths and muscles have no fixes, so measuring is not needed here.
     return run_rules(
-        make_subject(source, find_settings(source.file).config_for(source.file, given)),
+        make_subject(source, find_settings(source.file).config_for(source.file, config)),
         measure=False,
     )
 
@@ -165,42 +169,45 @@ def _find_threshold(files: list[str]) -> Severity:
 
 
 def _apply_fixes(
-    source: Source, given: Config, unsafe: bool, put: Callable[[list[bytes | memoryview]], Source]
+    source: Source,
+    config: Config,
+    unsafe: bool,
+    make_source: Callable[[list[bytes | memoryview]], Source],
 ) -> tuple[Source, int, int]:
     """Apply fixes until none is left.
 
     Args:
         source: the file.
-        given: settings of the command line.
+        config: settings of the command line.
         unsafe: apply fixes that may change the meaning, too.
-        put: makes the source of the next round from the pieces of the fixed text.
+        make_source: makes the source of the next round from the pieces of the fixed text.
 
     Returns:
         The fixed file, the number of fixes, and the number of remaining unsafe fixes.
     """
     from osimlite.lint.fixes import apply_fixes_in_pieces
 
-    total = left = 0
+    total = unsafe_count = 0
     # A fix can reveal further findings: a misspelt set hides the errors of its members. Ten rounds
     # end fixes that undo each other.
     for _ in range(10):
-        report = _check_source(source, given)
+        report = _check_source(source, config)
         pieces, count = apply_fixes_in_pieces(source, report, unsafe=unsafe)
         if not count:
-            left = sum(finding.fix is not None for finding in report.findings)
+            unsafe_count = sum(finding.fix is not None for finding in report.findings)
             break
         total += count
-        source = put(pieces)
-    return source, total, left
+        source = make_source(pieces)
+    return source, total, unsafe_count
 
 
-def _fix_files(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, bool]:
+def _fix_files(files: list[str], config: Config, unsafe: bool) -> tuple[int, int, bool]:
     """Fix files and return the number of fixes, the number of remaining unsafe fixes, and whether a file failed."""
     total = guesses = 0
     failed = False
     for path in files:
         try:
-            count, left = _fix_file(path, given, unsafe)
+            count, unsafe_count = _fix_file(path, config, unsafe)
         except MissingFileError:
             # The check that follows reports the missing file.
             continue
@@ -209,11 +216,11 @@ def _fix_files(files: list[str], given: Config, unsafe: bool) -> tuple[int, int,
             failed = True
             continue
         total += count
-        guesses += left
+        guesses += unsafe_count
     return total, guesses, failed
 
 
-def _fix_file(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
+def _fix_file(path: str, config: Config, unsafe: bool) -> tuple[int, int]:
     """Fix a file in place; return the number of fixes and of remaining unsafe fixes."""
     from osimlite.base.files import open_atomically
 
@@ -223,8 +230,8 @@ def _fix_file(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
         pieces.clear()
         return _read_source(path)
 
-    _, count, left = _apply_fixes(_read_source(path), given, unsafe, put)
-    return count, left
+    _, count, unsafe_count = _apply_fixes(_read_source(path), config, unsafe, put)
+    return count, unsafe_count
 
 
 UNREADABLE = ("OSIM001", "OSIM801")
@@ -235,25 +242,30 @@ def _count_fixes(count: int) -> str:
     return f"{count} fix" if count == 1 else f"{count} fixes"
 
 
-def _describe_unsafe_fixes(left: int) -> str:
-    return f"; --unsafe-fixes would apply {left} more" if left else ""
+def _describe_unsafe_fixes(count: int) -> str:
+    return f"; --unsafe-fixes would apply {count} more" if count else ""
 
 
-def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
+def _show_diff(path: str, config: Config, unsafe: bool) -> tuple[int, int, bool]:
     """Print what the fixes would change; return their number, that of unsafe ones, and whether the file is unreadable."""
     from osimlite.io.document.source import Source
 
     source = _read_source(path)
-    after, count, left = _apply_fixes(
-        source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file)
+    fixed, count, unsafe_count = _apply_fixes(
+        source, config, unsafe, lambda pieces: Source(b"".join(pieces), source.file)
     )
-    print_diff(source.text, after.text, path, path)
+    print_diff(source.text, fixed.text, path, path)
     unread = next(
-        (item for item in _check_source(after, given).findings if item.code in UNREADABLE), None
+        (
+            finding
+            for finding in _check_source(fixed, config).findings
+            if finding.code in UNREADABLE
+        ),
+        None,
     )
     if unread is not None:
         complain(f"{path}:{unread.line}:{unread.column}: {unread.message}")
-    return count, left, unread is not None
+    return count, unsafe_count, unread is not None
 
 
 def get_terminal_width() -> int:
@@ -265,7 +277,7 @@ def get_terminal_width() -> int:
     return shutil.get_terminal_size((80, 24)).columns
 
 
-def _format_statistics(report: Report, everything: bool) -> str:
+def _format_statistics(report: Report, show_all: bool) -> str:
     from osimlite.lint.registry import all_rules
     from osimlite.lint.reporters.terminal import (
         describe_skipped,
@@ -273,14 +285,17 @@ def _format_statistics(report: Report, everything: bool) -> str:
         format_summary,
     )
 
-    known = {rule.code: rule for rule in all_rules()}
-    rows = [f"{count:6d}  {code}  {known[code].name}" for code, count in report.codes.most_common()]
+    rule_by_code = {rule.code: rule for rule in all_rules()}
+    rows = [
+        f"{count:6d}  {code}  {rule_by_code[code].name}"
+        for code, count in report.codes.most_common()
+    ]
     return (
         "\n".join(
             [
                 *rows,
                 format_summary(report),
-                *filter(None, [describe_skipped(report, everything), describe_unmeasured(report)]),
+                *filter(None, [describe_skipped(report, show_all), describe_unmeasured(report)]),
             ]
         )
         + "\n"

@@ -52,7 +52,7 @@ def check_trial(
     check_option_values(format, fail_on)
     with progress_bar("checking", None) as progress:
         report = check(
-            *paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of)
+            *paths, select=select, ignore=ignore, progress=lambda done, total: progress(done, total)
         )
     if format == "json":
         from osimlite.base.text import format_json
@@ -69,8 +69,8 @@ def check_trial(
         )
         width = min(max(get_terminal_width(), 40), 120)
         show(render(visible, format, colour=wants_colour(), width=width, everything=everything))
-        for why in report.unchecked:
-            show(f"Not checked: {why}.\n")
+        for reason in report.unchecked:
+            show(f"Not checked: {reason}.\n")
     raise SystemExit(int(bool(report.at_least(Severity(fail_on or Severity.WARNING)))))
 
 
@@ -80,14 +80,14 @@ def _show_verdicts(report: TrialReport) -> None:
 
     from osimlite.cli._console import add_row, create_table, print_table, show
 
-    for file, verdicts in groupby(report.worst, key=lambda verdict: verdict.file):
+    for file, verdicts in groupby(report.worst, key=lambda row: row.file):
         table = create_table()
         for column in ("", "", "limits", ""):
             table.add_column(
                 column, overflow="fold", justify="right" if column == "limits" else "left"
             )
-        for verdict in verdicts:
-            add_row(table, verdict.verdict, verdict.shown, verdict.limits, verdict.words)
+        for row in verdicts:
+            add_row(table, row.verdict, row.shown, row.limits, row.words)
         show(f"{file}\n")
         print_table(table)
         show("\n")

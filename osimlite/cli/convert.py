@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 def _list_choices() -> Iterator[OptionSpec]:
     """Yield the options of all formats."""
-    seen = set()
-    for choices in [
+    names = set()
+    for options_of_format in [
         *(importer.choices for importer in IMPORTERS),
         *(exporter.choices for exporter in EXPORTERS),
     ]:
-        for choice in choices:
+        for option in options_of_format:
             # A format that is read and written has some options for both.
-            if choice.name not in seen:
-                seen.add(choice.name)
-                yield choice
+            if option.name not in names:
+                names.add(option.name)
+                yield option
 
 
 @command_with(_list_choices)
@@ -77,7 +77,7 @@ def convert(
         bool, Option("--formats", help="List all formats and what each carries.")
     ] = False,
     overwrite: options.Overwrite = False,
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Convert a file: AddBiomechanics, MuJoCo, URDF, glTF and other formats from and to OpenSim's.
 
@@ -95,8 +95,8 @@ def convert(
         return
     if file is None:
         raise SettingError("name a file to convert; --formats lists the formats")
-    given = {name: value for name, value in chosen.items() if value is not None}
+    set_options = {name: value for name, value in option_values.items() if value is not None}
     request = converting.Request.create(file, output, source, target)
     with progress_bar("converting", None):
-        result = request.carry_out(motion, geometry, given, overwrite=overwrite)
+        result = request.carry_out(motion, geometry, set_options, overwrite=overwrite)
     converting.report(request, result)

@@ -110,8 +110,8 @@ class _Tour:
         start = time.perf_counter()
 
         def tell(result: str, *files: Path) -> None:
-            took = f"({time.perf_counter() - start:.1f} s)"
-            for line in textwrap.wrap(f"{result} {took}", 76):
+            duration = f"({time.perf_counter() - start:.1f} s)"
+            for line in textwrap.wrap(f"{result} {duration}", 76):
                 say(f"   {line}")
             if files:
                 say(
@@ -131,17 +131,17 @@ def _build_and_check(tour: _Tour) -> None:
     from osimlite.models.dynamic_walker import dynamic_walker
     from osimlite.translate import to_urdf
 
-    with tour.step("Build the Dynamic Walker in Python") as tell:
+    with tour.step("Build the Dynamic Walker in Python") as report_result:
         model = dynamic_walker()
         file = make_folder(tour.folder / MOTIONS[0].model) / f"{model.name}.osim"
         write(model, file)
-        tell(f"{sum(1 for _ in model.components())} components", file)
+        report_result(f"{sum(1 for _ in model.components())} components", file)
 
-    with tour.step("Validate the file") as tell:
+    with tour.step("Validate the file") as report_result:
         report = validate(file)
-        tell(f"{len(report.errors)} errors, {len(report.warnings)} warnings")
+        report_result(f"{len(report.errors)} errors, {len(report.warnings)} warnings")
 
-    with tour.step("Validate a copy in which the name of a contact is misspelt") as tell:
+    with tour.step("Validate a copy in which the name of a contact is misspelt") as report_result:
         text = file.read_text(encoding="utf-8")
         # A walker without this text would be copied without the mistake.
         assert text.count(MISSPELT[0]) == 1
@@ -150,12 +150,12 @@ def _build_and_check(tour: _Tour) -> None:
         result = validate(broken)
         # Remarks on the copy would hide the one finding that the step is about.
         show(render(replace(result, findings=result.errors), "full"))
-        tell("OpenSim reads such a file, and refuses to simulate it", broken)
+        report_result("OpenSim reads such a file, and refuses to simulate it", broken)
 
-    with tour.step("Translate it to URDF, for robotics") as tell:
+    with tour.step("Translate it to URDF, for robotics") as report_result:
         urdf = to_urdf(model)
         urdf.write(file.with_name("urdf"))
-        tell(
+        report_result(
             f"{len(urdf.fidelity)} parts that URDF cannot express are listed in fidelity.json",
             file.with_name("urdf"),
         )
@@ -169,18 +169,18 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
 
     result, sentences = [], []
     # The stack closes all simulations, also if the tour fails half-way.
-    with ExitStack() as work:
-        with tour.step("Make three models ready to move") as tell:
+    with ExitStack() as stack:
+        with tour.step("Make three models ready to move") as report_result:
             ready = [
-                work.enter_context(Simulation(make_model(motion.model), "compiled"))
+                stack.enter_context(Simulation(make_model(motion.model), "compiled"))
                 for motion in MOTIONS
             ]
-            tell(
+            report_result(
                 f"{join_words(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}"
             )
         for motion, simulation in zip(MOTIONS, ready, strict=True):
             with (
-                tour.step(f"{motion.title}: {motion.model}") as tell,
+                tour.step(f"{motion.title}: {motion.model}") as report_result,
                 motion_bar("   simulating", motion.to) as bar,
             ):
                 trajectory = simulation.run(
@@ -190,11 +190,11 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 trajectory.write(folder)
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
                 sentences.append(motion.describe(trajectory))
-                tell(sentences[-1], folder)
+                report_result(sentences[-1], folder)
             result.append(trajectory)
     # The first motion is the one that PyBullet can compute, without muscles.
     _compare_engines(tour, result[0])
-    human, states, said = _simulate_walking(tour)
+    human, states, walking_text = _simulate_walking(tour)
     if not pictures:
         return []
     # Drawing imports large packages, which a tour without pictures does not need.
@@ -206,10 +206,10 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
         f"osimlite scone {tour.folder}/human-walks/human-walks.scone --optimize --generations 50"
     )
 
-    with tour.step("Plot the jump: coordinates, activations, forces, energy") as tell:
+    with tour.step("Plot the jump: coordinates, activations, forces, energy") as report_result:
         plots = plot_simulation(result[-1], tour.folder / MOTIONS[-1].model)
-        tell(f"{len(plots)} pictures", plots[0].with_name("*.png"))
-    with tour.step("Write a page for the browser of each motion") as tell:
+        report_result(f"{len(plots)} pictures", plots[0].with_name("*.png"))
+    with tour.step("Write a page for the browser of each motion") as report_result:
         pages = []
         titles = [
             *((motion.title, f"{motion.model}.html") for motion in MOTIONS),
@@ -218,18 +218,20 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
         # `Simulation` keeps the model of its trajectories.
         for motion, trajectory, sentence in zip(MOTIONS, result, sentences, strict=True):
             assert trajectory.model is not None
-            shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
-            words = f"{sentence} {motion.seen}"
-            story = Story(words, motion.command.format(tour.folder), f"{motion.model}.html", titles)
-            pages.append(shown.write_page(tour.folder / story.page, story))
-        shown = Shown.of(human.model, build_mechanism(human.model), motion=states)
+            viewed = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
+            caption = f"{sentence} {motion.seen}"
+            story = Story(
+                caption, motion.command.format(tour.folder), f"{motion.model}.html", titles
+            )
+            pages.append(viewed.write_page(tour.folder / story.page, story))
+        viewed = Shown.of(human.model, build_mechanism(human.model), motion=states)
         pages.append(
-            shown.write_page(
-                tour.folder / human_page, Story(said, human_command, human_page, titles)
+            viewed.write_page(
+                tour.folder / human_page, Story(walking_text, human_command, human_page, titles)
             )
         )
         size = sum(page.stat().st_size for page in pages) / 1e6
-        tell(f"{size:.1f} MB; they need no network", *pages)
+        report_result(f"{size:.1f} MB; they need no network", *pages)
     return pages
 
 
@@ -241,9 +243,11 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
     from osimlite.simulation.run import Simulation
 
     motion = MOTIONS[0]
-    with tour.step("Simulate the walker by PyBullet too: URDF, custom contact forces") as tell:
+    with tour.step(
+        "Simulate the walker by PyBullet too: URDF, custom contact forces"
+    ) as report_result:
         if find_spec("pybullet") is None:
-            tell(
+            report_result(
                 "PyBullet is not installed; to compare both engines, run: pip install 'osimlite[bullet]'"
             )
             return
@@ -256,7 +260,7 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
             )
         folder = tour.folder / f"{motion.model}-bullet"
         bullet.write(folder)
-        tell(
+        report_result(
             f"{simulation.engine.version}: in {motion.to:g} s no coordinate is ever farther than "
             f"{compute_largest_difference(compiled, bullet):.1e} rad or m from the motion of the compiled engine; "
             f"{_count_steps(compiled)} and {_count_steps(bullet)} steps",
@@ -264,17 +268,17 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
         )
 
 
-def compute_largest_difference(one: Trajectory, other: Trajectory) -> float:
+def compute_largest_difference(first: Trajectory, second: Trajectory) -> float:
     """Return the largest difference of a coordinate (rad or m) between two motions with equal times.
 
     Args:
-        one: first motion.
-        other: second motion; its coordinates may have another order.
+        first: first motion.
+        second: second motion; its coordinates may have another order.
     """
     import numpy as np
 
-    columns = [other.coordinates.index(name) for name in one.coordinates]
-    return float(np.abs(one.values - other.values[:, columns]).max())
+    columns = [second.coordinates.index(name) for name in first.coordinates]
+    return float(np.abs(first.values - second.values[:, columns]).max())
 
 
 def _count_steps(motion: Trajectory) -> int:
@@ -291,7 +295,7 @@ def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
     from osimlite.models.walking import write_scenario
     from osimlite.studies.reflexes.scenario import Scenario
 
-    with tour.step("Have a human walk for ten seconds, by reflexes of 16 muscles") as tell:
+    with tour.step("Have a human walk for ten seconds, by reflexes of 16 muscles") as report_result:
         scenario = Scenario(write_scenario(tour.folder / "human-walks"))
         walked = scenario.walk(scenario.best())
         file = tour.folder / "human-walks" / "states.sto"
@@ -301,23 +305,23 @@ def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
         # The second half of the walk is steady; the first steps start from a guess.
         peak = float(walked.loads.rows[len(table.times) // 2 :].max())
         mass, t = scenario.get_walkers(1).mass, walked.times[0]
-        said = (
+        text = (
             f"A human model of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
             "muscles react to their lengths and forces, and those of the hips to the lean of the torso. The gains come "
             f"from an optimization. The peak ground reaction force is {peak:.1f} times the body weight."
         )
-        tell(said, file)
+        report_result(text, file)
         scenario.close()
-    return scenario, file, said
+    return scenario, file, text
 
 
 def _describe_fall(motion: Trajectory) -> str:
     events = motion.summary["contact_events"]
     knee = next(event["time_s"] for event in events if "Knee" in event["contact"])
-    apart = compute_distance_to_opensim(motion)
+    largest_difference = compute_distance_to_opensim(motion)
     return (
         f"Released at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee touches the ground. It does the same in "
-        f"OpenSim: all coordinates differ from its converged motion by at most {apart:.1e} rad or m."
+        f"OpenSim: all coordinates differ from its converged motion by at most {largest_difference:.1e} rad or m."
     )
 
 
@@ -330,10 +334,12 @@ def _describe_walk(motion: Trajectory) -> str:
     ]
     # Distance and duration are taken between the first and the last touch-down, so that the start
     # does not count.
-    way = np.interp(steps, motion.times, motion.values[:, motion.coordinates.index("Pelvis_tx")])
+    positions = np.interp(
+        steps, motion.times, motion.values[:, motion.coordinates.index("Pelvis_tx")]
+    )
     return (
         "The same walker, but for the moment of inertia of its shanks (0.0921 instead of 1 kg·m²) and its feet, 7.4 cm "
-        f"further ahead, makes {len(steps)} steps in {motion.times[-1]:g} s, at {np.ptp(way) / np.ptp(steps):.2f} m/s, "
+        f"further ahead, makes {len(steps)} steps in {motion.times[-1]:g} s, at {np.ptp(positions) / np.ptp(steps):.2f} m/s, "
         "and does not stop. No motor drives it, only gravity."
     )
 
@@ -343,27 +349,32 @@ def _describe_jump(motion: Trajectory) -> str:
 
     heights = [motion.mechanism.center_of_mass(q)[1] for q in motion.values]
     # The time at which the mass centre is highest separates take-off and landing.
-    middle = motion.times[int(np.argmax(heights))]
+    highest_time = motion.times[int(np.argmax(heights))]
     events = motion.summary["contact_events"]
-    off = max(
-        event["time_s"] for event in events if event["event"] == "end" and event["time_s"] < middle
-    )
-    on = min(
+    take_off = max(
         event["time_s"]
         for event in events
-        if event["event"] == "begin" and event["time_s"] > middle
+        if event["event"] == "end" and event["time_s"] < highest_time
     )
-    pushes = [
+    landing = min(
+        event["time_s"]
+        for event in events
+        if event["event"] == "begin" and event["time_s"] > highest_time
+    )
+    vertical_forces = [
         column
         for label, column in motion.forces.items()
         if ".foot_" in label and label.endswith(".force.Y")
     ]
     # The mass is in kg, so the quotient is in body weights.
-    push, mass = np.sum(pushes, axis=0)[motion.times < off].max(), motion.mechanism.total_mass
+    peak_force, mass = (
+        np.sum(vertical_forces, axis=0)[motion.times < take_off].max(),
+        motion.mechanism.total_mass,
+    )
     return (
         f"A human of {mass:.0f} kg jumps by 16 muscles, whose excitations a search found: the feet push with "
-        f"{push / (9.80665 * mass):.1f} times the body weight, the mass center rises from {heights[0]:.2f} to "
-        f"{max(heights):.2f} m, and for {on - off:.2f} s nothing touches the ground."
+        f"{peak_force / (9.80665 * mass):.1f} times the body weight, the mass center rises from {heights[0]:.2f} to "
+        f"{max(heights):.2f} m, and for {landing - take_off:.2f} s nothing touches the ground."
     )
 
 
@@ -414,11 +425,13 @@ def compute_distance_to_opensim(trajectory: Trajectory) -> float:
     text = (
         files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text(encoding="utf-8")
     )
-    largest = 0.0
+    largest_difference = 0.0
     # Times are rounded, since both motions have them as sums of steps.
     times = [round(float(t), 6) for t in trajectory.times]
     for row in csv.DictReader(text.splitlines()):
         index = times.index(round(float(row["time"]), 6))
         for number, name in enumerate(trajectory.coordinates):
-            largest = max(largest, abs(float(trajectory.values[index][number]) - float(row[name])))
-    return largest
+            largest_difference = max(
+                largest_difference, abs(float(trajectory.values[index][number]) - float(row[name]))
+            )
+    return largest_difference

@@ -47,20 +47,22 @@ def diff(
             raise OsimliteError(
                 "--git takes the seven arguments of git's external diff; see 'git help diff'"
             )
-        title, old, new = str(files[0]), files[1], files[4]
+        title, old_file, new_file = str(files[0]), files[1], files[4]
     elif len(files) == 2:
-        title, (old, new) = "", files
+        title, (old_file, new_file) = "", files
     else:
         raise OsimliteError("diff takes two files")
-    if all(is_table(str(file)) for file in (old, new) if str(file) != "/dev/null"):
+    if all(is_table(str(file)) for file in (old_file, new_file) if str(file) != "/dev/null"):
         from osimlite.cli._table_diff import describe_table_differences
 
-        lines = describe_table_differences(old, new)
+        lines = describe_table_differences(old_file, new_file)
     else:
-        read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
-        kind = next((type(top) for top in read if top is not None), Model)
+        documents = [
+            None if str(file) == "/dev/null" else read_any(file) for file in (old_file, new_file)
+        ]
+        document_class = next((type(top) for top in documents if top is not None), Model)
         lines = describe_differences(
-            find_differences(*(kind() if top is None else top for top in read))
+            find_differences(*(document_class() if top is None else top for top in documents))
         )
     if git:
         say(f"--- {title}")
@@ -75,20 +77,23 @@ def describe_differences(differences: list[Difference]) -> list[str]:
     """Return one or two lines for each difference, grouped by component."""
     lines: list[str] = []
     last = None
-    for path, what, old, new in differences:
-        if not what:
-            lines.append(f"+ {path} ({new})" if old is None else f"- {path} ({old})")
+    for path, property_name, old_value, new_value in differences:
+        if not property_name:
+            lines.append(
+                f"+ {path} ({new_value})" if old_value is None else f"- {path} ({old_value})"
+            )
             last = None
             continue
         if path != last:
             lines.append(f"  {path}")
             last = path
-        if old is None or new is None:
-            lines.append(
-                f"    {'+' if old is None else '-'} {what}: {_format_value(new if old is None else old)}"
-            )
+        if old_value is None or new_value is None:
+            sign, value = ("+", new_value) if old_value is None else ("-", old_value)
+            lines.append(f"    {sign} {property_name}: {_format_value(value)}")
         else:
-            lines.append(f"    {what}: {_format_value(old)} -> {_format_value(new)}")
+            lines.append(
+                f"    {property_name}: {_format_value(old_value)} -> {_format_value(new_value)}"
+            )
     return lines
 
 

@@ -139,29 +139,31 @@ def doctor(
         say(sentence)
     say()
 
-    wanted = list_requirements()
-    uses = list_purposes(wanted)
+    requirements = list_requirements()
+    purposes = list_purposes(requirements)
     # A package may be in several extras, and is imported once.
-    every = {name for names in wanted.values() for name in names}
+    package_names = {name for names in requirements.values() for name in names}
     result = {}
     with (
-        progress_bar("loading each package", len(every)) as progress,
+        progress_bar("loading each package", len(package_names)) as progress,
         # Threads suffice, since each waits for a process; importing is bound by the disk.
         ThreadPoolExecutor(2 * count_cores()) as pool,
     ):
         # Each package is imported in a process of its own, several at a time.
-        for count, package in enumerate(pool.map(examine_package, every), 1):
+        for count, package in enumerate(pool.map(examine_package, package_names), 1):
             result[package.name] = package
             progress(count)
     table = create_table()
     for heading in ("extra", "for", "packages"):
         table.add_column(heading, overflow="fold")
-    for extra, names in wanted.items():
+    for extra, names in requirements.items():
         packages = [result[name] for name in names]
-        missing = any(not package.version for package in packages)
-        words = ", ".join(f"{item.name} {item.version or 'missing'}" for item in packages)
-        add_row(table, extra or "(none)", ", ".join(uses[extra]), words)
-        if extra and missing:
+        is_missing = any(not package.version for package in packages)
+        package_texts = ", ".join(
+            f"{package.name} {package.version or 'missing'}" for package in packages
+        )
+        add_row(table, extra or "(none)", ", ".join(purposes[extra]), package_texts)
+        if extra and is_missing:
             table.add_row("", "", Text(f"pip install 'osimlite[{extra}]'", style="bold"))
     print_table(table)
 
@@ -182,30 +184,32 @@ def list_requirements() -> dict[str, list[str]]:
     Returns:
         Names of packages by extra, in the order of `EXTRAS`.
     """
-    wanted: dict[str, list[str]] = {extra: [] for extra in EXTRAS}
+    requirements: dict[str, list[str]] = {extra: [] for extra in EXTRAS}
     for line in metadata.requires("osimlite") or []:
         # A requirement begins with the name; version, extras and marker follow.
         name = re.split(r"[\s\[<>=!~;(]", line, maxsplit=1)[0]
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", line)
         group = extra[1] if extra else ""
-        if group in wanted and name not in ("osimlite", *wanted[group]):
-            wanted[group].append(name)
-    return wanted
+        if group in requirements and name not in ("osimlite", *requirements[group]):
+            requirements[group].append(name)
+    return requirements
 
 
-def list_purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
+def list_purposes(requirements: dict[str, list[str]]) -> dict[str, list[str]]:
     """Return the uses that each extra enables: it is the first with all their packages.
 
     Args:
-        wanted: packages by extra.
+        requirements: packages by extra.
 
     Returns:
         Uses by extra, as in `NEEDS`.
     """
-    result: dict[str, list[str]] = {extra: [] for extra in wanted}
+    result: dict[str, list[str]] = {extra: [] for extra in requirements}
     for use, packages in NEEDS.items():
         # The first extra in the order of the table is the smallest one.
-        extra = next((extra for extra, names in wanted.items() if {*packages} <= {*names}), None)
+        extra = next(
+            (extra for extra, names in requirements.items() if {*packages} <= {*names}), None
+        )
         if extra is not None:
             result[extra].append(use)
     return result
@@ -243,14 +247,14 @@ def examine_package(name: str) -> Package:
     modules = _list_modules(tuple(sys.path)).get(name.lower(), [])
     # The module with the package's name is the main one of several. A few packages have none: pillow
     # provides PIL, pyyaml provides yaml.
-    named = name.lower().replace("-", "_")
+    main_module = name.lower().replace("-", "_")
     main = (
-        named
-        if named in modules
+        main_module
+        if main_module in modules
         else next(module for module in modules if not module.startswith("_"))
     )
     # -P: do not import from the current folder.
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-P", "-c", f"import {main}"],
         capture_output=True,
         check=False,
@@ -258,12 +262,12 @@ def examine_package(name: str) -> Package:
         cwd=Path(__file__).parent,
         env={**os.environ, SAFE_PATH: "1"},
     )
-    if done.returncode == 0:
+    if completed.returncode == 0:
         return Package(name, version, "")
-    words = done.stderr.decode(errors="replace").strip().splitlines() or [
-        f"its process ended with {done.returncode}"
+    error_lines = completed.stderr.decode(errors="replace").strip().splitlines() or [
+        f"its process ended with {completed.returncode}"
     ]
-    return Package(name, version, words[-1])
+    return Package(name, version, error_lines[-1])
 
 
 @cache
@@ -291,14 +295,14 @@ def _print_mesh_folders(model: Path | None) -> None:
         else model.resolve().parent
     )
     settings = load_settings(folder)
-    where = (
+    settings_file = (
         settings.file
         or "none (write them in pyproject.toml under tool.osimlite, or in osimlite.toml)"
     )
-    say(f"settings: {where}")
+    say(f"settings: {settings_file}")
     say("mesh folders, in the order of the search:")
-    for place in MeshFolders(folder, settings.mesh_paths).searched:
-        say(f"  {place}: {_count_meshes(place)}")
+    for mesh_folder in MeshFolders(folder, settings.mesh_paths).searched:
+        say(f"  {mesh_folder}: {_count_meshes(mesh_folder)}")
     if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
         say(
             "The bones of OpenSim's models are in the folder Geometry of its installation. Name it in the environment "
@@ -306,8 +310,8 @@ def _print_mesh_folders(model: Path | None) -> None:
         )
 
 
-def _count_meshes(place: Path) -> str:
-    if not place.is_dir():
+def _count_meshes(folder: Path) -> str:
+    if not folder.is_dir():
         return "does not exist"
-    count = sum(path.suffix.lower() in MESHES for path in place.iterdir())
+    count = sum(path.suffix.lower() in MESHES for path in folder.iterdir())
     return f"{count} mesh files" if count else "no mesh files"

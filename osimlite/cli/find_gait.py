@@ -125,8 +125,8 @@ def _describe_result(gait: Gait) -> FactTable:
     facts.add("step length", f"{cycle.length:.6g} m")
     facts.add("period", f"{cycle.period:.6g} s")
     end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
-    done = f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
-    facts.add("walk", done)
+    counts = f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}"
+    facts.add("walk", f"{counts}; {end} after {walk.end:.4g} s")
     facts.add(
         "near it",
         f"{round(BASIN_STARTS * gait.found.walking)} of {BASIN_STARTS} starts make {BASIN_STEPS} steps",

@@ -74,15 +74,17 @@ def fit(
     for name, text in texts.items():
         write_atomically(folder / name, text)
     segments: dict[str, list[str]] = {}
-    for body, own in person.factors.items():
-        numbers = " ".join(f"{factor:.4f}" for factor in (own if by_axis else own[:1]))
+    for body, body_factors in person.factors.items():
+        numbers = " ".join(
+            f"{factor:.4f}" for factor in (body_factors if by_axis else body_factors[:1])
+        )
         segments.setdefault(f"{numbers} ± {max(person.uncertain[body]):.3f}", []).append(body)
     for size, bodies in segments.items():
         say(f"{', '.join(bodies)}: {size}")
-    before, after = person.errors(person.before), person.errors(person.after)
-    for trial, error in after.items():
+    errors_before, errors_after = person.errors(person.before), person.errors(person.after)
+    for trial, error in errors_after.items():
         say(
-            f"{trial}: errors of {100.0 * error:.2f} cm (root mean square), {100.0 * before[trial]:.2f} cm before"
+            f"{trial}: errors of {100.0 * error:.2f} cm (root mean square), {100.0 * errors_before[trial]:.2f} cm before"
         )
     for note in person.notes:
         say(note)

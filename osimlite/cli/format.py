@@ -34,36 +34,36 @@ def format(
     from osimlite.io.document.source import Source
     from osimlite.lint.project_files import DOCUMENTS, find_project_files
 
-    changed, same, worst = 0, 0, 0
+    changed_count, same_count, exit_code = 0, 0, 0
     for path in find_project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):
         try:
             source = Source.from_file(path)
-            after = format_document(source)
+            formatted = format_document(source)
         except OsimliteError as error:
             complain(error)
-            worst = max(worst, error.exit_code)
+            exit_code = max(exit_code, error.exit_code)
             continue
-        before = source.text
-        if before == after:
-            same += 1
+        original = source.text
+        if original == formatted:
+            same_count += 1
             continue
-        changed += 1
+        changed_count += 1
         if show_diff:
-            print_diff(before, after, path, f"{path} (formatted)")
+            print_diff(original, formatted, path, f"{path} (formatted)")
         elif check:
             say(f"would reformat {path}")
         else:
             try:
-                write_atomically(path, after)
+                write_atomically(path, formatted)
             except OsimliteError as error:
                 complain(error)
-                worst = max(worst, error.exit_code)
+                exit_code = max(exit_code, error.exit_code)
                 continue
             say(f"reformatted {path}")
-    if same and not (changed and show_diff):
-        files = "1 file is" if same == 1 else f"{same} files are"
+    if same_count and not (changed_count and show_diff):
+        files = "1 file is" if same_count == 1 else f"{same_count} files are"
         say(f"{files} formatted already", err=True)
-    if worst:
-        raise SystemExit(worst)
-    if changed and (check or show_diff):
+    if exit_code:
+        raise SystemExit(exit_code)
+    if changed_count and (check or show_diff):
         raise SystemExit(1)

@@ -110,9 +110,9 @@ def gait(
     # The numbers are checked before the simulation, and names of variables after the model is read.
     _check_numbers(to, accuracy, reach, perturb or (), seed)
     model, folder = options.read_source(source, parameter)
-    with ExitStack() as work:
-        where = None if output is None else work.enter_context(prepare_folder(output))
-        simulation = work.enter_context(
+    with ExitStack() as stack:
+        output_folder = None if output is None else stack.enter_context(prepare_folder(output))
+        simulation = stack.enter_context(
             Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder)
         )
         refuse_constraints(simulation.mechanism)
@@ -129,12 +129,12 @@ def gait(
         result.skipped = simulation.forces.skipped
         cycle = result.cycle
         if step_map is not None and cycle is not None:
-            for part in perturb or ():
-                with progress_bar(f"starting within {part:.0%}", starts) as progress:
-                    states = sample_perturbed_starts(step_map, state, part, starts, seed)
+            for size in perturb or ():
+                with progress_bar(f"starting within {size:.0%}", starts) as progress:
+                    states = sample_perturbed_starts(step_map, state, size, starts, seed)
                     walks = simulate_walks(step_map, cycle, states, steps, progress=progress)
                 result.nearby.append(
-                    Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps)
+                    Nearby(size, sum(len(walk.steps) >= steps for walk in walks), starts, steps)
                 )
             if basin:
                 with progress_bar("basin", grid * grid) as progress:
@@ -148,7 +148,7 @@ def gait(
                         target_steps=steps,
                         progress=progress,
                     )
-        files = _write(where, result, pictures) if where else []
+        files = _write(output_folder, result, pictures) if output_folder else []
     _describe_cycle(result, files).show()
     # Scripts test the exit code for a cycle.
     if cycle is None:
@@ -171,7 +171,7 @@ def _check_numbers(
         ("--to", to),
         ("--accuracy", accuracy),
         ("--reach", reach),
-        *(("--perturb", part) for part in perturb),
+        *(("--perturb", size) for size in perturb),
     ]
     for option, number in numbers:
         # `not 0 < number < inf` also refuses NaN.
@@ -302,10 +302,10 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
             "fixed point",
             f"to {cycle.residual:.2g} after {format_count(cycle.iterations, 'step')} of Newton",
         )
-    for near in result.nearby:
+    for neighbourhood in result.nearby:
         facts.add(
-            f"within {near.part:.0%}",
-            f"{near.walked} of {near.starts} starts make {near.steps} steps",
+            f"within {neighbourhood.part:.0%}",
+            f"{neighbourhood.walked} of {neighbourhood.starts} starts make {neighbourhood.steps} steps",
         )
     if result.basin is not None:
         basin = result.basin
@@ -325,8 +325,8 @@ def _write(folder: Path, result: GaitReport, pictures: bool) -> list[Path]:
 
     from osimlite.base.files import write_atomically
 
-    written = [folder / "gait.json"]
-    write_atomically(written[0], (json.dumps(_make_json(result), indent=1) + "\n").encode())
+    paths = [folder / "gait.json"]
+    write_atomically(paths[0], (json.dumps(_make_json(result), indent=1) + "\n").encode())
     basin = result.basin
     for name in ("basin.csv", "basin.png"):
         # Files of an earlier run would be mistaken for results of this one.
@@ -339,13 +339,13 @@ def _write(folder: Path, result: GaitReport, pictures: bool) -> list[Path]:
                 f"{x!r},{y!r},{count}"
                 for x, count in zip(basin.x.values.tolist(), line, strict=True)
             ]
-        written.append(folder / "basin.csv")
-        write_atomically(written[-1], ("\n".join(rows) + "\n").encode())
+        paths.append(folder / "basin.csv")
+        write_atomically(paths[-1], ("\n".join(rows) + "\n").encode())
         if pictures:
             from osimlite.studies.gait.basin_plot import draw_basin
 
-            written.append(draw_basin(basin, folder / "basin.png", title=result.model))
-    return written
+            paths.append(draw_basin(basin, folder / "basin.png", title=result.model))
+    return paths
 
 
 def _make_json(result: GaitReport) -> dict[str, Any]:
@@ -353,8 +353,8 @@ def _make_json(result: GaitReport) -> dict[str, Any]:
 
     def list_touches(events: Sequence[GaitStep | Scuff]) -> list[dict[str, Any]]:
         return [
-            {"time_s": each.time, "foot": each.foot, "length_m": each.length, "air_s": each.air}
-            for each in events
+            {"time_s": event.time, "foot": event.foot, "length_m": event.length, "air_s": event.air}
+            for event in events
         ]
 
     walk, cycle, names = result.walk, result.cycle, result.coordinates
@@ -371,10 +371,10 @@ def _make_json(result: GaitReport) -> dict[str, Any]:
     if cycle is None:
         facts |= {"cycle": None, "why_no_cycle": result.why_not}
     else:
-        n = len(names)
+        count = len(names)
         facts["cycle"] = {
-            "values": dict(zip(names, cycle.state[:n].tolist(), strict=True)),
-            "speeds": dict(zip(names, cycle.state[n:].tolist(), strict=True)),
+            "values": dict(zip(names, cycle.state[:count].tolist(), strict=True)),
+            "speeds": dict(zip(names, cycle.state[count:].tolist(), strict=True)),
             "step_length_m": cycle.length,
             "period_s": cycle.period,
             "speed_m_per_s": cycle.speed,
@@ -386,7 +386,7 @@ def _make_json(result: GaitReport) -> dict[str, Any]:
             "per_stride": cycle.per_stride,
         }
         facts["random_starts"] = [
-            {"part": each.part, "walk": each.walked, "of": each.starts, "steps": each.steps}
-            for each in result.nearby
+            {"part": event.part, "walk": event.walked, "of": event.starts, "steps": event.steps}
+            for event in result.nearby
         ]
     return facts

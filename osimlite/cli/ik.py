@@ -61,7 +61,7 @@ def ik(
     from osimlite.schema.markers import Marker
 
     require_plots(plot=plot)
-    weights, kept = (
+    weights, coordinate_weights = (
         options.parse_named_numbers(weight, "--weight"),
         options.parse_named_numbers(keep, "--keep"),
     )
@@ -73,7 +73,7 @@ def ik(
             data,
             orientations=trial if of_sensors else None,
             weights=weights,
-            coordinates=kept,
+            coordinates=coordinate_weights,
             constraints=not free,
             start=first,
             end=last,
@@ -82,12 +82,12 @@ def ik(
     make_folder(folder)
     table = create_motion_table(motion)
     write_atomically(folder / "ik.mot", "".join(format_old_table(table, f"\n{UNITS}")))
-    what, names, errors = "marker", motion.markers, motion.marker_errors
+    measurement, names, errors = "marker", motion.markers, motion.marker_errors
     if of_sensors:
-        what, names, errors = "orientation", motion.sensors, motion.orientation_errors
+        measurement, names, errors = "orientation", motion.sensors, motion.orientation_errors
     write_sto(
-        folder / f"{what}_errors.sto",
-        f"{what} errors",
+        folder / f"{measurement}_errors.sto",
+        f"{measurement} errors",
         motion.times.tolist(),
         names,
         errors.tolist(),
@@ -95,16 +95,16 @@ def ik(
     )
     for line in describe_fit(motion):
         say(line)
-    if words := describe_unknown(model, NO_EFFECT):
-        say(words, err=True)
+    if unknown_text := describe_unknown(model, NO_EFFECT):
+        say(unknown_text, err=True)
     if data is not None:
-        known = {marker.name: None for marker in model.components(Marker)}
-        if missing := [name for name in known if name not in data.names]:
-            say(f"in the model, but not in the data: {join_words(missing)}")
-        if unknown := [name for name in data.names if name not in known]:
+        marker_names = {marker.name: None for marker in model.components(Marker)}
+        if missing_names := [name for name in marker_names if name not in data.names]:
+            say(f"in the model, but not in the data: {join_words(missing_names)}")
+        if unknown := [name for name in data.names if name not in marker_names]:
             say(f"in the data, but not in the model: {join_words(unknown)}")
-    say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")
+    say(f"wrote {folder / 'ik.mot'} and {folder / f'{measurement}_errors.sto'}")
     if plot:
-        of_errors = StoTable(f"{what} errors", motion.times, tuple(names), errors)
-        tables = {"ik.mot": table, f"{what}_errors.sto": of_errors}
+        errors_table = StoTable(f"{measurement} errors", motion.times, tuple(names), errors)
+        tables = {"ik.mot": table, f"{measurement}_errors.sto": errors_table}
         draw_tables(tables, folder, model, motion.mechanism)

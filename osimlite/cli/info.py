@@ -74,7 +74,10 @@ def info(
             ("model", model.name),
             ("file", size),
             ("document version", str(document.version)),
-            ("gravity", " ".join(f"{g:g}" for g in model.gravity) + " m/s^2"),
+            (
+                "gravity",
+                " ".join(f"{component_m_s2:g}" for component_m_s2 in model.gravity) + " m/s^2",
+            ),
             ("bodies", f"{len(model.body_set.objects)}, {mass:.6g} kg"),
             ("joints", str(len(model.joint_set.objects))),
             (
@@ -114,7 +117,7 @@ def info(
     _print_classes(components, everything)
 
 
-def _print_table_info(file: Path, everything: bool) -> None:
+def _print_table_info(file: Path, show_all: bool) -> None:
     from osimlite.base.files import read_file
     from osimlite.cli._console import FactTable
     from osimlite.io.tables.headers import StorageHeader
@@ -123,12 +126,14 @@ def _print_table_info(file: Path, everything: bool) -> None:
     table = Table(read_file(file), str(file))
     stated = {key: entry.value.text for key, entry in table.entries.items()}
     header = table.header
-    kind = f"storage, version {header.form}" if isinstance(header, StorageHeader) else "markers"
+    table_type = (
+        f"storage, version {header.form}" if isinstance(header, StorageHeader) else "markers"
+    )
     if isinstance(header, StorageHeader) and header.parts > 1:
-        kind += f", each cell a {header.kind}"
+        table_type += f", each cell a {header.kind}"
     rows = len(table.rows.times)
     facts = FactTable()
-    facts.add("table", kind)
+    facts.add("table", table_type)
     facts.add("file", f"{file} ({len(table.data) / 1000:.0f} kB)")
     facts.add("rows", str(rows))
     facts.add("markers" if table.is_markers else "columns besides time", str(len(table.columns)))
@@ -140,7 +145,7 @@ def _print_table_info(file: Path, everything: bool) -> None:
     unit = "Units" if table.is_markers else "inDegrees"
     facts.add(unit, stated.get(unit, "not stated"))
     facts.show()
-    _print_items("Markers" if table.is_markers else "Columns", table.columns, everything)
+    _print_items("Markers" if table.is_markers else "Columns", table.columns, show_all)
 
 
 def _make_note_rows(count: int) -> list[tuple[str, str]]:
@@ -152,49 +157,54 @@ def _list_files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the properties that name files and folders, with their values and whether the files are missing."""
     from osimlite.schema.specs import get_reference_specs
 
-    for item in top.walk():
-        for spec in get_reference_specs(type(item)):
-            value = getattr(item, spec.name)
+    for owner in top.walk():
+        for spec in get_reference_specs(type(owner)):
+            value = getattr(owner, spec.name)
             if not spec.reference.target.endswith(("file", "folder")):
                 continue
             for name in value if isinstance(value, tuple) else (value,):
                 if name not in ("", None, "Unassigned"):
-                    lost = spec.reference.rule == "file" and not (folder / name.strip()).is_file()
+                    is_missing = (
+                        spec.reference.rule == "file" and not (folder / name.strip()).is_file()
+                    )
                     status = (
                         " (missing)"
-                        if lost
+                        if is_missing
                         else " (written)"
                         if spec.reference.rule.startswith("output")
                         else ""
                     )
                     yield (
-                        spec.name if item is top else f"{item.name or item.tag}: {spec.name}",
+                        spec.name if owner is top else f"{owner.name or owner.tag}: {spec.name}",
                         f"{name}{status}",
                     )
 
 
-def _print_classes(objects: Sequence[Object], everything: bool) -> None:
+def _print_classes(objects: Sequence[Object], show_all: bool) -> None:
     """Print the number of objects of each class."""
     from osimlite.schema.base import Unknown
 
     counts = Counter(
-        item.class_name if isinstance(item, Unknown) else type(item).__name__ for item in objects
+        each_object.class_name if isinstance(each_object, Unknown) else type(each_object).__name__
+        for each_object in objects
     )
-    _print_items("Classes", [f"{count} {name}" for name, count in counts.most_common()], everything)
+    _print_items("Classes", [f"{count} {name}" for name, count in counts.most_common()], show_all)
 
 
-def _print_items(title: str, items: Sequence[str], everything: bool) -> None:
-    """Print a list of items, unless `everything` the first 15 only."""
+def _print_items(title: str, items: Sequence[str], show_all: bool) -> None:
+    """Print a list of items, unless `show_all` the first 15 only."""
     from osimlite.base.text import escape_unprintable
     from osimlite.cli._console import count_columns, say, show
 
-    shown = items if everything else items[:15]
+    visible_items = items if show_all else items[:15]
     # NUL keeps textwrap from breaking lines within an item.
-    text = f"{title}: " + ", ".join(escape_unprintable(item).replace(" ", "\0") for item in shown)
+    text = f"{title}: " + ", ".join(
+        escape_unprintable(item).replace(" ", "\0") for item in visible_items
+    )
     lines = textwrap.fill(text, count_columns(), subsequent_indent="  ", break_long_words=False)
     show("\n" + lines.replace("\0", " ") + "\n")
-    if len(items) > len(shown):
-        say(f"and {len(items) - len(shown)} more (--all lists them)")
+    if len(items) > len(visible_items):
+        say(f"and {len(items) - len(visible_items)} more (--all lists them)")
 
 
 def _format_coordinates(model: Model) -> Iterator[str]:
@@ -211,11 +221,11 @@ def _format_coordinates(model: Model) -> Iterator[str]:
             unit = {"rotational": "rad", "translational": "m"}.get(
                 motions.get(coordinate.name, ""), ""
             )
-            low, high = coordinate.range
+            lower, upper = coordinate.range
             flags = [
-                word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)
+                flag for flag in ("locked", "clamped", "prescribed") if getattr(coordinate, flag)
             ]
-            numbers = f"{coordinate.default_value:>9.4g} {unit:3}  {low:.4g} to {high:.4g} {unit}".rstrip()
+            numbers = f"{coordinate.default_value:>9.4g} {unit:3}  {lower:.4g} to {upper:.4g} {unit}".rstrip()
             yield f"    {coordinate.name:{width}} {numbers}" + (
                 f"  ({', '.join(flags)})" if flags else ""
             )
@@ -226,19 +236,19 @@ def _format_muscles(muscles: Sequence[Any]) -> Iterator[str]:
     from osimlite.schema.paths import GeometryPath
 
     width = max(len(muscle.name) for muscle in muscles)
-    for kind in dict.fromkeys(type(muscle).__name__ for muscle in muscles):
-        yield f"  {kind}"
+    for class_name in dict.fromkeys(type(muscle).__name__ for muscle in muscles):
+        yield f"  {class_name}"
         for muscle in muscles:
-            if type(muscle).__name__ != kind:
+            if type(muscle).__name__ != class_name:
                 continue
             path = muscle.geometry_path
-            laid = type(path).__name__
+            path_text = type(path).__name__
             if isinstance(path, GeometryPath):
                 wraps = len(path.path_wrap_set.objects)
-                laid = format_count(len(path.path_point_set.objects), "point")
-                laid += f", {format_count(wraps, 'wrap')}" if wraps else ""
+                path_text = format_count(len(path.path_point_set.objects), "point")
+                path_text += f", {format_count(wraps, 'wrap')}" if wraps else ""
             lengths = f"{muscle.optimal_fiber_length:>7.4g} m {muscle.tendon_slack_length:>7.4g} m"
-            yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
+            yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {path_text}"
 
 
 def _describe_simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
@@ -267,8 +277,8 @@ def _describe_simulation(model: Model, folder: Path, text: str) -> tuple[str, bo
         mechanism.acceleration(*mechanism.default_state())
     except OsimliteError as error:
         return f"not possible: {error}", False
-    answer = "possible, nothing is left out"
+    description = "possible, nothing is left out"
     if forces.skipped:
-        answer = f"not without leaving out (--skip-unsupported) {join_words(summarize_skipped(forces.skipped))}"
+        description = f"not without leaving out (--skip-unsupported) {join_words(summarize_skipped(forces.skipped))}"
     # An attribute ``file`` includes another file, which may change without this one.
-    return answer, not forces.reads_files and re.search(r"\sfile\s*=", text) is None
+    return description, not forces.reads_files and re.search(r"\sfile\s*=", text) is None

@@ -27,7 +27,7 @@ def inverse_dynamics(
     plot: options.Plot = False,
     band: options.Band = None,
     output: options.Folder = None,
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Compute the generalized forces of a recorded motion: writes inverse_dynamics.sto.
 
@@ -55,11 +55,11 @@ def inverse_dynamics(
             start=first,
             end=last,
             folder=file.parent,
-            **chosen,
+            **option_values,
         )
     assert table.motion is not None
     folder, tables = options.choose_output_folder(file, output), {"inverse_dynamics.sto": table}
     write_results(table.motion, tables, folder)
     if plot:
-        loads = chosen.get("external_loads")
+        loads = option_values.get("external_loads")
         draw_tables(tables, folder, model, table.motion.mechanism, loads, band=band)

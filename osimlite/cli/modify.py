@@ -70,21 +70,25 @@ def modify(
 
     if source not in (None, "nimble"):
         raise SettingError(f"--from takes 'nimble', not '{source}'")
-    changes = []
-    for word in replace or ():
-        name, equals, value = word.partition("=")
+    operators = []
+    for assignment in replace or ():
+        name, equals, value = assignment.partition("=")
         if not equals:
-            raise SettingError(f"--replace takes NAME=WORD, such as muscles=degroote; got '{word}'")
-        changes.append(find_change(name, value))
+            raise SettingError(
+                f"--replace takes NAME=WORD, such as muscles=degroote; got '{assignment}'"
+            )
+        operators.append(find_change(name, value))
     top = read_any(file)
     if isinstance(top, Model):
-        if not changes and source is None:
+        if not operators and source is None:
             raise SettingError(
                 "there is nothing to replace; add --replace NAME=WORD, such as muscles=degroote"
             )
         model = read(file)
     else:
-        processor = next((part for part in top.walk() if isinstance(part, ModelProcessor)), None)
+        processor = next(
+            (member for member in top.walk() if isinstance(member, ModelProcessor)), None
+        )
         if processor is None:
             raise DocumentError(f"a {type(top).__name__} has no model to change", file=str(file))
         model = process_model(processor, file.parent)
@@ -93,12 +97,18 @@ def modify(
         from osimlite.translate.nimble import convert_from_nimble
 
         rewritten = convert_from_nimble(model)
-    fitted = [item for change in changes for item in change(model, file.parent) or ()]
+    fitted = [
+        path_fit
+        for apply_change in operators
+        for path_fit in apply_change(model, file.parent) or ()
+    ]
     target = output or file.with_name(f"{file.stem}_modified.osim")
     make_folder_of(target)
     write(model, target)
-    for each in rewritten:
-        say(f"{each.component}: {each.difference}; {each.done or 'not changed'}")
+    for joint_change in rewritten:
+        say(
+            f"{joint_change.component}: {joint_change.difference}; {joint_change.done or 'not changed'}"
+        )
     if source == "nimble" and not rewritten:
         say("OpenSim moves this model as Nimble does; nothing was rewritten")
     if fitted:
@@ -112,15 +122,19 @@ def modify(
             "worst, mm",
         ):
             table.add_column(heading, justify="left" if heading == "path" else "right")
-        for item in sorted(fitted, key=lambda item: -item.worst_arm):
-            numbers = (item.length, item.arm, max(item.worst_length, item.worst_arm))
-            count = len(item.path.coordinate_paths)
-            name = item.path.name.rpartition("/")[2]
+        for path_fit in sorted(fitted, key=lambda path_fit: -path_fit.worst_arm):
+            numbers = (
+                path_fit.length,
+                path_fit.arm,
+                max(path_fit.worst_length, path_fit.worst_arm),
+            )
+            count = len(path_fit.path.coordinate_paths)
+            name = path_fit.path.name.rpartition("/")[2]
             add_row(
                 table,
                 name,
                 str(count),
-                str(item.order),
+                str(path_fit.order),
                 *(f"{1e3 * number:.3f}" for number in numbers),
             )
         print_table(table)

@@ -113,15 +113,15 @@ def muscles(
             )
         # Muscles that do not move with the coordinates would fill the table with constants.
         result[str(path)] = curves if muscle else curves.select_muscles(curves.crossing)
-    first, *others = result.values()
+    first, *other_curves = result.values()
     if not first.muscles:
         raise ModelError(
             f"'{file.name}' has no muscle"
             + (f" that moves with {join_words(list(values))}" if values else "s")
         )
-    if others:
+    if other_curves:
         # Only muscles of both models can be compared.
-        first, second = _select_common_muscles(first, others[0])
+        first, second = _select_common_muscles(first, other_curves[0])
         result = dict(zip(result, (first, second), strict=True))
     _print_ranges(list(result.values()), file, compare)
     if output is not None:
@@ -136,19 +136,19 @@ def muscles(
         folder = output.parent / output.stem if output is not None else Path(f"{file.stem}-muscles")
         with progress_bar("drawing", None):
             regions = ColumnNames.from_model(model, mechanism).regions
-            beside = second if others else None
-            written = plot_muscles(first, mechanism, folder, beside, regions=regions)
-        say(f"wrote {len(written)} pictures into {folder}")
+            compared = second if other_curves else None
+            paths = plot_muscles(first, mechanism, folder, compared, regions=regions)
+        say(f"wrote {len(paths)} pictures into {folder}")
 
 
 def _sample_coordinates(
-    mechanism: Mechanism, words: Sequence[str], points: int
+    mechanism: Mechanism, assignments: Sequence[str], points: int
 ) -> dict[str, list[float]]:
     """Return the values of each coordinate that is varied.
 
     Args:
         mechanism: mechanism with the coordinates.
-        words: coordinates with an optional range, NAME or NAME=LOW:HIGH.
+        assignments: coordinates with an optional range, NAME or NAME=LOW:HIGH.
         points: number of values.
     """
     from math import isfinite
@@ -157,32 +157,38 @@ def _sample_coordinates(
     from osimlite.simulation.initial_state import convert_value, describe_suspect_value
 
     result = {}
-    for word in words:
-        name, equals, given = (part.strip() for part in word.partition("="))
+    for assignment in assignments:
+        name, equals, range_text = (bound_text.strip() for bound_text in assignment.partition("="))
         if name in result:
             raise SettingError(f"--coordinate names '{name}' twice; leave one out")
         try:
-            info = mechanism.coordinates[mechanism.coordinate_index(name)]
+            mechanism_coordinate = mechanism.coordinates[mechanism.coordinate_index(name)]
         except ModelError as error:
             raise SettingError(f"--coordinate: {error.message}") from None
-        low, high = info.range
+        lower, upper = mechanism_coordinate.range
         if equals:
-            parts = given.split(":")
-            if len(parts) != 2:
+            bound_texts = range_text.split(":")
+            if len(bound_texts) != 2:
                 raise SettingError(
-                    f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{word}'"
+                    f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{assignment}'"
                 )
-            for part in parts:
-                if odd := describe_suspect_value(info, name, part):
-                    raise SettingError(f"--coordinate: {odd} (if not, write {part.strip()}rad)")
-            low, high = (convert_value(mechanism, name, part) for part in parts)
-        if equals and low > high:
-            raise SettingError(f"--coordinate takes the lower end of the range first, got '{word}'")
-        if not (isfinite(low) and isfinite(high) and low < high):
+            for bound_text in bound_texts:
+                if suspicion := describe_suspect_value(mechanism_coordinate, name, bound_text):
+                    raise SettingError(
+                        f"--coordinate: {suspicion} (if not, write {bound_text.strip()}rad)"
+                    )
+            lower, upper = (
+                convert_value(mechanism, name, bound_text) for bound_text in bound_texts
+            )
+        if equals and lower > upper:
+            raise SettingError(
+                f"--coordinate takes the lower end of the range first, got '{assignment}'"
+            )
+        if not (isfinite(lower) and isfinite(upper) and lower < upper):
             raise SettingError(
                 f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1"
             )
-        result[name] = [low + (high - low) * k / (points - 1) for k in range(points)]
+        result[name] = [lower + (upper - lower) * k / (points - 1) for k in range(points)]
     return result
 
 
@@ -196,18 +202,18 @@ def _select_common_muscles(
 
     # Models may keep their muscles in different sets, so names are compared, not paths.
     names = [[path.rpartition("/")[2] for path in curves.muscles] for curves in (first, second)]
-    both = [name for name in names[0] if name in names[1]]
-    alone = [name for name in dict.fromkeys(names[0] + names[1]) if name not in both]
-    if not both:
+    common_names = [name for name in names[0] if name in names[1]]
+    single_names = [name for name in dict.fromkeys(names[0] + names[1]) if name not in common_names]
+    if not common_names:
         raise ModelError("the two models have no muscle of the same name")
-    if alone:
-        say(f"in one model only: {join_words(alone)}")
-    one, other = (
-        curves.select_muscles([own.index(name) for name in both])
+    if single_names:
+        say(f"in one model only: {join_words(single_names)}")
+    first_common, second_common = (
+        curves.select_muscles([model_names.index(name) for name in common_names])
         # Both selections have the order of the first model.
-        for curves, own in zip((first, second), names, strict=True)
+        for curves, model_names in zip((first, second), names, strict=True)
     )
-    return one, other
+    return first_common, second_common
 
 
 def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> None:
@@ -217,11 +223,11 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
     from osimlite.base.text import format_range
     from osimlite.cli._console import add_row, create_table, print_table, say
 
-    first, *others = curves
+    first, *compared = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
     # The length belongs to one coordinate; over two, arms say more.
     lengths = {"length": "length (mm)"} if len(arms) < 2 else {}
-    shown = {
+    label_by_quantity = {
         **lengths,
         **arms,
         "normalized_fiber_length": "fiber / optimal",
@@ -232,29 +238,29 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
     )
     table.add_column("Muscle")
     columns = [[path.rpartition("/")[2] for path in first.muscles]]
-    for name, label in shown.items():
+    for name, label in label_by_quantity.items():
         table.add_column(label, justify="right")
         factor, form = (
             (1000.0, ".1f")
             if label.endswith("(mm)")
             else (1.0, ".0f" if label.endswith("(N)") else ".3f")
         )
-        low, high = first.get_bounds(name)
-        if others:
+        lower, upper = first.get_bounds(name)
+        if compared:
             # `fmax` ignores NaN, where a muscle has no equilibrium.
-            low = high = np.fmax.reduce(np.abs(others[0].columns[name] - first.columns[name]))
+            lower = upper = np.fmax.reduce(np.abs(compared[0].columns[name] - first.columns[name]))
         columns.append(
             [
-                format_range(factor * least, factor * most, form)
-                for least, most in zip(low, high, strict=True)
+                format_range(factor * smallest, factor * largest, form)
+                for smallest, largest in zip(lower, upper, strict=True)
             ]
         )
     for row in zip(*columns, strict=True):
         add_row(table, *row)
     print_table(table)
     # NaN marks poses without an equilibrium.
-    unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
-    if unsettled:
+    unsolved_count = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
+    if unsolved_count:
         say("'-' and gaps in the table: the muscle has no equilibrium there")
 
 
@@ -281,9 +287,9 @@ def _write_curves(result: Mapping[str, MuscleCurves], output: Path) -> None:
 
         arrow = require("pyarrow", extra="sweep", purpose="a .parquet table")
         parquet = require("pyarrow.parquet", extra="sweep", purpose="a .parquet table")
-        out = io.BytesIO()
-        parquet.write_table(arrow.table(columns), out)
-        write_atomically(output, out.getvalue())
+        buffer = io.BytesIO()
+        parquet.write_table(arrow.table(columns), buffer)
+        write_atomically(output, buffer.getvalue())
         return
     import csv
 

@@ -107,7 +107,7 @@ def optimize(
     controller: options.Controller = None,
     par: options.Par = None,
     interpolation: sweeping.Interpolation = "linear",
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Search for the initial state, controls or parameters that optimize an objective, and write the best model.
 
@@ -140,7 +140,7 @@ def optimize(
         is_planted=planted,
         feet=tuple(foot) if foot else None,
         controller=options.read_feedback(controller, par),
-        **chosen,
+        **option_values,
     )
     make_folder_of(output)
     with progress_bar("searching", budget) as progress:
@@ -165,20 +165,20 @@ def optimize(
     _describe_optimum(objective, result).show()
 
 
-def _describe_optimum(objective: str, found: Optimum) -> FactTable:
+def _describe_optimum(objective: str, optimum: Optimum) -> FactTable:
     from osimlite.studies.sweep.optimize import BEST_FILE, HISTORY_FILE, PAR_FILE, SUMMARY_FILE
 
-    facts = FactTable(f"{objective} {found.value:.6g}")
-    for name, value in found.values.items():
+    facts = FactTable(f"{objective} {optimum.value:.6g}")
+    for name, value in optimum.values.items():
         facts.add(name, f"{value:.6g}")
-    facts.add("runs", f"{found.evaluations}, the best was number {found.evaluation}")
-    facts.add("ended", found.ended)
+    facts.add("runs", f"{optimum.evaluations}, the best was number {optimum.evaluation}")
+    facts.add("ended", optimum.ended)
     names = (
         BEST_FILE,
         HISTORY_FILE,
         SUMMARY_FILE,
         # Only searches for parameters of a controller write this file.
-        *([PAR_FILE] if found.model.with_name(PAR_FILE).exists() else []),
+        *([PAR_FILE] if optimum.model.with_name(PAR_FILE).exists() else []),
     )
-    facts.add("files", ", ".join(str(found.model.with_name(name)) for name in names))
+    facts.add("files", ", ".join(str(optimum.model.with_name(name)) for name in names))
     return facts

@@ -31,23 +31,30 @@ def rule(
 
     rules = all_rules()
     columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80
-    result = [known for known in rules if code is None or known.matches(code)]
+    result = [each_rule for each_rule in rules if code is None or each_rule.matches(code)]
     if code is not None and not result:
-        names = [word for known in (*rules, *rule_groups()) for word in (known.code, known.name)]
-        near = suggest_name(code, names) or "; 'osimlite rule' lists all rules"
-        raise OsimliteError(f"there is no rule '{code}'{near}")
+        names = [
+            name
+            for each_rule in (*rules, *rule_groups())
+            for name in (each_rule.code, each_rule.name)
+        ]
+        suggestion = suggest_name(code, names) or "; 'osimlite rule' lists all rules"
+        raise OsimliteError(f"there is no rule '{code}'{suggestion}")
     from osimlite.lint.pages import format_group_page, format_rule_page
 
     for group in rule_groups():
         if code is not None and (code == group.name or code.upper() == group.code):
             show(_wrap_page(format_group_page(group), columns) + "\n\n")
     if len(result) > 1:
-        width = max(len(known.name) for known in result)
-        for known in result:
-            head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
+        width = max(len(each_rule.name) for each_rule in result)
+        for each_rule in result:
+            heading = f"{each_rule.code}  {each_rule.name:{width}}  {each_rule.severity.value:7}  "
             show(
                 textwrap.fill(
-                    known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)
+                    each_rule.summary,
+                    columns,
+                    initial_indent=heading,
+                    subsequent_indent=" " * len(heading),
                 )
                 + "\n"
             )
@@ -68,10 +75,10 @@ def _wrap_page(page: str, columns: int) -> str:
             rows.append(textwrap.fill(" ".join(prose), columns, break_on_hyphens=False))
             prose = []
         code ^= line.startswith("```")
-        lead = "  " if line.startswith("- ") else ""
+        indent = "  " if line.startswith("- ") else ""
         rows.append(
-            textwrap.fill(line, columns, subsequent_indent=lead, break_on_hyphens=False)
-            if lead
+            textwrap.fill(line, columns, subsequent_indent=indent, break_on_hyphens=False)
+            if indent
             else line
         )
     return "\n".join(rows[:-1])

@@ -151,7 +151,7 @@ def run(
             "--refine takes one study; leave out the others, --json, --resume and --cluster"
         )
     # Outcomes hold all tables: they are kept only if something is drawn from them.
-    kept: dict[str | Path, Outcome] | None = {} if report is not None or plot else None
+    outcomes: dict[str | Path, Outcome] | None = {} if report is not None or plot else None
     # Starting processes for few setups takes longer than running them.
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
@@ -161,8 +161,8 @@ def run(
             workers=count,
             cluster=cluster,
             resume=resume,
-            progress=lambda done, of: progress(done, of),
-            kept=kept,
+            progress=lambda done, total: progress(done, total),
+            kept=outcomes,
             overwrite=overwrite,
             write_outside=write_outside,
         )
@@ -174,12 +174,12 @@ def run(
         show(json.dumps([vars(trial) for trial in trials], indent=2) + "\n")
     else:
         _show_trials(trials)
-    if kept:
-        _write_report(kept, report, err=as_json)
+    if outcomes:
+        _write_report(outcomes, report, err=as_json)
         # Like the results, pictures mirror the folders of the setups: trials often have setups of
         # the same name.
         folders = assign_folders(files, output or Path())
-        for setup, outcome in kept.items() if plot else ():
+        for setup, outcome in outcomes.items() if plot else ():
             folder = folders[Path(setup)] or Path()
             _draw_outcome(
                 Path(setup),
@@ -288,14 +288,14 @@ def _print_outcome(setup: Path, outcome: Outcome) -> None:
 
     facts = FactTable(str(setup), outcome.told)
     # Findings with a suggestion were shown before the run.
-    unsaid = [finding for finding in outcome.warnings if finding.suggestion is None]
-    for finding in unsaid[:MOST_WARNINGS]:
+    unreported = [finding for finding in outcome.warnings if finding.suggestion is None]
+    for finding in unreported[:MOST_WARNINGS]:
         facts.add("check", str(finding))
-    if (more := len(unsaid) - MOST_WARNINGS) > 0:
-        files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in unsaid))
+    if (hidden_count := len(unreported) - MOST_WARNINGS) > 0:
+        files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in unreported))
         facts.add(
             "check",
-            f"{format_count(more, 'warning')} more; see them with: osimlite validate {files}",
+            f"{format_count(hidden_count, 'warning')} more; see them with: osimlite validate {files}",
         )
     facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
     facts.show()
@@ -308,7 +308,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
     from osimlite.cli._console import show, show_rows
     from osimlite.tools.many import STATUSES
 
-    shown = trials
+    visible_trials = trials
     if len(trials) > MOST_ROWS:
         worst = sorted(
             trials,
@@ -318,29 +318,29 @@ def _show_trials(trials: list[RunRecord]) -> None:
             ),
         )
         # The worst come first in the table.
-        shown = worst[-MOST_ROWS:][::-1]
+        visible_trials = worst[-MOST_ROWS:][::-1]
     rows = []
-    for trial in shown:
-        words = trial.message or "; ".join(f"{name} {said}" for name, said in trial.told[:2])
+    for trial in visible_trials:
+        result_text = trial.message or "; ".join(f"{name} {fact}" for name, fact in trial.told[:2])
         if trial.warnings:
             more = (
                 f"; and {format_count(len(trial.warnings) - 1, 'warning')} more"
                 if len(trial.warnings) > 1
                 else ""
             )
-            words = f"{words}; {trial.warnings[0]}{more}"
+            result_text = f"{result_text}; {trial.warnings[0]}{more}"
         # A setup that a former run did has no time of this run.
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
         status = trial.status + (", before" if trial.was_done else "")
-        rows.append((trial.setup, status, seconds, words))
+        rows.append((trial.setup, status, seconds, result_text))
     show_rows(("setup", "", "s", ""), rows, right=(2,))
     counts = Counter(trial.status for trial in trials)
-    told = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
+    status_text = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):
-        told += f", {warned} with warnings"
+        status_text += f", {warned} with warnings"
     more = (
-        f" ({len(shown)} shown: those that failed or whose markers are farthest off)"
-        if shown is not trials
+        f" ({len(visible_trials)} shown: those that failed or whose markers are farthest off)"
+        if visible_trials is not trials
         else ""
     )
-    show(f"{format_count(len(trials), 'setup')}: {told}{more}\n")
+    show(f"{format_count(len(trials), 'setup')}: {status_text}{more}\n")

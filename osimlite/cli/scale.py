@@ -69,10 +69,10 @@ def scale(
     # BODY=A:B,C:D gives several pairs; "BODY.XZ" restricts the factor to these axes.
     measurements = {
         body: (
-            [_parse_pair(pair, body) for pair in pairs.split(",")],
+            [_parse_pair(pair_text, body) for pair_text in pairs_text.split(",")],
             {body.partition(".")[0]: _parse_axes(body)},
         )
-        for body, pairs in options.parse_named_words(
+        for body, pairs_text in options.parse_named_words(
             distance, "--distance", "BODY=MARKER:MARKER"
         ).items()
     }
@@ -114,12 +114,12 @@ def scale(
 def _parse_pair(text: str, body: str) -> tuple[str, str]:
     from osimlite.errors import SettingError
 
-    one, _, two = text.partition(":")
-    if not one or not two:
+    first, _, second = text.partition(":")
+    if not first or not second:
         raise SettingError(
             f"'{text}' is not a pair of markers for '{body}'; write {body}=MARKER:MARKER"
         )
-    return one.strip(), two.strip()
+    return first.strip(), second.strip()
 
 
 def _parse_axes(body: str) -> str:
@@ -130,7 +130,7 @@ def _parse_factors(text: str, body: str) -> tuple[float, ...]:
     from osimlite.errors import SettingError
 
     try:
-        numbers = [float(word) for word in text.split(",")]
+        numbers = [float(number_text) for number_text in text.split(",")]
     except ValueError:
         # A word that is no number leads to the same message as a wrong count.
         numbers = []

@@ -94,44 +94,48 @@ def scone(
     from osimlite.studies.reflexes.search import BEST_FILE, search_parameters
 
     if not optimize and (
-        resume or any(given is not None for given in (generations, population, seed))
+        resume or any(loaded is not None for loaded in (generations, population, seed))
     ):
         raise SettingError(
             "--generations, --population, --seed and --resume are options of a search; add --optimize"
         )
     if str(scenario) == SCENARIO:
         scenario = write_scenario(output)
-    given = Scenario(scenario)
-    values = given.best() if par is None else {name: own[0] for name, own in read_par(par).items()}
+    loaded = Scenario(scenario)
+    values = (
+        loaded.best()
+        if par is None
+        else {name: parameter_values[0] for name, parameter_values in read_par(par).items()}
+    )
     files = []
     if optimize:
         values = search_parameters(
-            given,
+            loaded,
             output,
             generations=generations,
             population=population,
             seed=seed,
             resume=resume,
-            report=lambda each: show(f"{each}\n", err=True),
+            report=lambda generation: show(f"{generation}\n", err=True),
         )
         files.append(output / BEST_FILE)
-    walked = given.walk(values, duration=duration)
+    walk = loaded.walk(values, duration=duration)
     make_folder(output)
     for name, table in (
-        ("states", walked.states),
-        ("excitations", walked.excitations),
-        ("loads", walked.loads),
+        ("states", walk.states),
+        ("excitations", walk.excitations),
+        ("loads", walk.loads),
     ):
         files.append(output / f"{name}.sto")
         write_sto(files[-1], name, table.times, table.columns, table.rows)
-    facts = FactTable(f"{given.model.name} {walked.times[0]:.3f} s")
-    facts.add("result", f"{walked.results[0]:.6g}")
-    for name, term in walked.terms.items():
+    facts = FactTable(f"{loaded.model.name} {walk.times[0]:.3f} s")
+    facts.add("result", f"{walk.results[0]:.6g}")
+    for name, term in walk.terms.items():
         facts.add(name, f"{term[0]:.6g}")
-    for name, report in walked.report.items():
+    for name, report in walk.report.items():
         facts.add(LABELS.get(name, name), f"{report[0]:.6g} {UNITS.get(name, '')}".rstrip())
-    gait = measure_gait(given, walked)
-    for name, words in () if gait is None else gait.describe().items():
-        facts.add(name, words)
+    gait = measure_gait(loaded, walk)
+    for name, gait_text in () if gait is None else gait.describe().items():
+        facts.add(name, gait_text)
     facts.add("files", ", ".join(map(str, files)))
     facts.show()

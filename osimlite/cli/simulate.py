@@ -50,7 +50,7 @@ def simulate(
             help="Show the motion live in PyBullet's window, with fixed steps; Escape ends it, space pauses it.",
         ),
     ] = False,
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Simulate a model forward in time from its default pose: writes states.sto, forces.sto and summary.json.
 
@@ -69,9 +69,9 @@ def simulate(
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
-    results, before = options.choose_output_folder(file, output), chosen["resume"]
+    results, earlier = options.choose_output_folder(file, output), option_values["resume"]
     # The earlier simulation is read at the start and would be replaced at the end.
-    if before is not None and results.resolve() == Path(before).resolve():
+    if earlier is not None and results.resolve() == Path(earlier).resolve():
         raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
     model, feedback = read(file), options.read_feedback(controller, par)
     if controls:
@@ -84,7 +84,7 @@ def simulate(
         engine,
         folder=file.parent,
         show=gui,
-        **chosen,
+        **option_values,
     ) as simulation:
         initial = {} if states is None else simulation.read_state(states)
         initial |= options.parse_quantities(
@@ -97,8 +97,8 @@ def simulate(
                 trajectory = simulation.run(
                     to,
                     fixed_step=LIVE_STEP_S
-                    if gui and chosen["fixed_step"] is None
-                    else chosen["fixed_step"],
+                    if gui and option_values["fixed_step"] is None
+                    else option_values["fixed_step"],
                     initial=initial,
                     initial_speeds=speeds,
                     controls=parse_controls(controls) if controls else None,
@@ -111,10 +111,10 @@ def simulate(
             if trajectory is None:
                 raise
             is_failure = isinstance(stopped, SimulationError)
-            how = "stopped" if is_failure else "interrupted"
+            ending = "stopped" if is_failure else "interrupted"
             # Print this first: preparing the files takes a while after many steps.
             complain(
-                f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
+                f"{ending} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
             _describe_run(trajectory, write_results(trajectory, results)).show()
             if is_failure:
@@ -127,7 +127,7 @@ def simulate(
 
             folders = options.list_mesh_folders(file, None)
             with progress_bar("drawing", None) as bar:
-                wrapping = chosen["wrapping"]
+                wrapping = option_values["wrapping"]
                 return draw(
                     model,
                     trajectory,
@@ -221,18 +221,18 @@ def write_results(
     except OSError as error:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
     try:
-        written = trajectory.write(temporary)
+        paths = trajectory.write(temporary)
         if plot:
             from osimlite.view.plots import plot_simulation
 
             with progress_bar("drawing", None):
-                written += plot_simulation(trajectory, temporary)
+                paths += plot_simulation(trajectory, temporary)
         if film is not None:
-            written.append(film(temporary / "animation.gif"))
-        for path in written:
+            paths.append(film(temporary / "animation.gif"))
+        for path in paths:
             replace_with(path, folder / path.name)
         # Files of an earlier simulation would be mistaken for results of this one.
-        for name in _list_earlier(folder) - {path.name for path in written}:
+        for name in _list_earlier(folder) - {path.name for path in paths}:
             (folder / name).unlink(missing_ok=True)
     # `BaseException` includes Ctrl-C, after which no temporary folder may stay.
     except BaseException as error:
@@ -241,7 +241,7 @@ def write_results(
             raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
         raise
     temporary.rmdir()
-    return [folder / path.name for path in written]
+    return [folder / path.name for path in paths]
 
 
 def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
@@ -264,21 +264,22 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
             "warning",
             "muscles start with the model's states, not in equilibrium; add --equilibrate",
         )
-    first, last = (summary["energy_J"][when]["total"] for when in ("start", "end"))
+    first, last = (summary["energy_J"][moment]["total"] for moment in ("start", "end"))
     facts.add("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")
-    for name, largest in summary["largest_contact_forces"].items():
+    for name, peak in summary["largest_contact_forces"].items():
         times = [
             f"{'from' if event['event'] == 'begin' else 'to'} {event['time_s']:.4g}"
             for event in summary["contact_events"]
             if event["contact"] == name
         ]
         # The unit is printed once, after the last time.
-        shown = (
+        contact_text = (
             " ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
         )
-        size, when = largest["force_N"], largest["time_s"]
+        size, moment = peak["force_N"], peak["time_s"]
         facts.add(
-            name, f"peak {size:.4g} N at {when:.4g} s" + (f"; contact {shown}" if times else "")
+            name,
+            f"peak {size:.4g} N at {moment:.4g} s" + (f"; contact {contact_text}" if times else ""),
         )
     for skipped in summarize_skipped(summary["skipped_forces"]):
         facts.add("left out", skipped)

@@ -44,7 +44,7 @@ def static_optimization(
     plot: options.Plot = False,
     band: options.Band = None,
     output: options.Folder = None,
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Compute muscle forces of a recorded motion: the smallest activations that produce the motion.
 
@@ -79,7 +79,7 @@ def static_optimization(
             start=first,
             end=last,
             folder=file.parent,
-            **chosen,
+            **option_values,
         )
     assert result.motion is not None
     folder = options.choose_output_folder(file, output)
@@ -91,7 +91,12 @@ def static_optimization(
         add_forces(model, forces or (), replace=replace)
         tables = {files[0].name: result, files[1].name: result.forces or result}
         draw_tables(
-            tables, folder, model, result.motion.mechanism, chosen.get("external_loads"), band=band
+            tables,
+            folder,
+            model,
+            result.motion.mechanism,
+            option_values.get("external_loads"),
+            band=band,
         )
     if message := result.describe_unsolved():
         complain(message)

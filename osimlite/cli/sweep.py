@@ -75,7 +75,7 @@ def sweep(
     controller: options.Controller = None,
     par: options.Par = None,
     interpolation: sweeping.Interpolation = "linear",
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Simulate a model with many initial states or parameters; writes a table with one row for each run.
 
@@ -106,7 +106,7 @@ def sweep(
         is_planted=planted,
         feet=tuple(foot) if foot else None,
         controller=options.read_feedback(controller, par),
-        **chosen,
+        **option_values,
     )
     # Samples are drawn before the runs, so that a resumed sweep has the same.
     points = choose(plan.variables, sampler, samples, seed)
@@ -130,10 +130,10 @@ def sweep(
         names = [get_measure_name(spec) for spec in plan.measures]
         variables = [variable.name for variable in plan.variables]
         with progress_bar("drawing", None):
-            written = plot_runs(
+            paths = plot_runs(
                 outcome.to_arrow().to_pydict(), variables, names, output.parent, output.stem
             )
-        say(describe_pictures(written))
+        say(describe_pictures(paths))
     # Some failures are expected in a sweep; if all runs fail, the setting is wrong.
     if outcome.status["failed"] == outcome.count:
         complain("every run failed")
@@ -146,24 +146,26 @@ def _describe_sweep(plan: Plan, outcome: Outcome) -> FactTable:
     from osimlite.studies.sweep.results import compute_ranges
 
     facts = FactTable(format_count(outcome.count, "run"))
-    new = sum(outcome.status.values())
+    new_count = sum(outcome.status.values())
     if outcome.before:
         facts.add("done before", str(outcome.before))
-    if new:
+    if new_count:
         facts.add(
-            "time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second"
+            "time taken",
+            f"{outcome.seconds:.3g} s, {new_count / outcome.seconds:.4g} runs per second",
         )
         facts.add(
-            "ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common())
+            "ended",
+            ", ".join(f"{count} {status}" for status, count in outcome.status.most_common()),
         )
     # The usual reasons; the table has a column with all of them.
     reasons = outcome.reasons.most_common(3)
     for reason, count in reasons:
         facts.add("failed", f"{format_count(count, 'run')}: {reason}")
-    if others := outcome.status["failed"] - sum(count for _, count in reasons):
+    if other_count := outcome.status["failed"] - sum(count for _, count in reasons):
         facts.add(
             "failed",
-            f"{format_count(others, 'run')} for other reasons; the column 'reason' has them all",
+            f"{format_count(other_count, 'run')} for other reasons; the column 'reason' has them all",
         )
     for name, result in compute_ranges(
         outcome.path, [get_measure_name(spec) for spec in plan.measures]

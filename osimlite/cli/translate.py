@@ -35,9 +35,13 @@ def _list_model_importers() -> list[Importer]:
 
 
 def _describe_formats() -> str:
-    words = [f"'{name}' writes {each.help}" for name, each in list_exporters("translate").items()]
+    sentences = [
+        f"'{name}' writes {exporter.help}" for name, exporter in list_exporters("translate").items()
+    ]
     titles = join_words([importer.title for importer in _list_model_importers()])
-    return "The format: " + "; ".join([*words, f"'{OSIM}' converts a file of {titles} to OpenSim"])
+    return "The format: " + "; ".join(
+        [*sentences, f"'{OSIM}' converts a file of {titles} to OpenSim"]
+    )
 
 
 @command_with(_list_format_options)
@@ -57,7 +61,7 @@ def translate(
         ),
     ] = None,
     overwrite: options.Overwrite = False,
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Translate a model to another format: writes the model, its meshes and fidelity.json.
 
@@ -91,63 +95,67 @@ def translate(
         raise OsimliteError(f"--to is {' or '.join(map(repr, (*formats, OSIM)))}, not '{to}'")
     importer = _find_importer(file) if to == OSIM else None
     owners: list[tuple[Any, str, bool]] = [
-        (each, f"--to {name}", name == to) for name, each in formats.items()
+        (converter, f"--to {name}", name == to) for name, converter in formats.items()
     ]
     owners += [
-        (each, f"--to {OSIM} from {each.title}", each is importer)
-        for each in _list_model_importers()
+        (converter, f"--to {OSIM} from {converter.title}", converter is importer)
+        for converter in _list_model_importers()
     ]
     # An option of another format would be ignored without a message.
-    for each, words, is_used in owners:
-        strange = [
+    for converter, option_name, is_used in owners:
+        foreign_options = [
             option.name
-            for option in each.choices
-            if chosen[option.name] is not None and not is_used
+            for option in converter.choices
+            if option_values[option.name] is not None and not is_used
         ]
-        if strange:
-            raise SettingError(f"--{strange[0].replace('_', '-')} is an option of {words}")
+        if foreign_options:
+            raise SettingError(
+                f"--{foreign_options[0].replace('_', '-')} is an option of {option_name}"
+            )
     # Formats have defaults of their own, which None must not replace.
-    given = {name: value for name, value in chosen.items() if value is not None}
-    made: Any
+    set_values = {name: value for name, value in option_values.items() if value is not None}
+    translated: Any
     with progress_bar("translating", None):
         if importer is not None:
-            made = importer.read(file, name=file.stem, **given)
+            translated = importer.read(file, name=file.stem, **set_values)
         else:
-            made = formats[to].write(
+            translated = formats[to].write(
                 read(file),
                 folder=file.parent,
                 name=file.stem,
                 geometry=options.list_mesh_folders(file, geometry),
-                **given,
+                **set_values,
             )
     folder = options.choose_output_folder(file, output)
     suffix = OSIM if importer is not None else {"mjcf": "xml"}.get(to, to)
     guard = OutputGuard(folder, f"{file.stem}.{suffix}", file.name, overwrite=overwrite)
     guard.protect_records()
-    guard.protect_files(made)
-    written = made.write(folder)
+    guard.protect_files(translated)
+    paths = translated.write(folder)
 
-    if len(made.fidelity):
+    if len(translated.fidelity):
         from osimlite.cli._fidelity_table import tabulate
 
-        print_table(tabulate(made.fidelity, to.upper()))
-    same, otherwise, lost = made.fidelity.counts()
-    say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
+        print_table(tabulate(translated.fidelity, to.upper()))
+    exact_count, changed_count, lost_count = translated.fidelity.counts()
+    say(
+        f"components: {exact_count} exact, {changed_count} approximated or converted, {lost_count} left out"
+    )
     # URDF has a robot, whose links and joints are the summary.
-    robot = getattr(made, "robot", None)
+    robot = getattr(translated, "robot", None)
     summary = (
-        ", ".join(f"{count} {what}" for what, count in made.summary.items())
+        ", ".join(f"{count} {part_type}" for part_type, count in translated.summary.items())
         if robot is None
         else f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move"
     )
-    say(f"{summary}; wrote " + join_words([str(path) for path in written], max_count=4))
+    say(f"{summary}; wrote " + join_words([str(path) for path in paths], max_count=4))
     # Some formats cannot express the initial state, and say so.
-    if getattr(made, "start_note", ""):
-        say(made.start_note)
+    if getattr(translated, "start_note", ""):
+        say(translated.start_note)
     if check is not None:
         from osimlite.cli._checking_mjcf import print_mjcf_check as check_mjcf
 
-        check_mjcf(file, written[0], folder)
+        check_mjcf(file, paths[0], folder)
 
 
 def _find_importer(file: Path) -> Importer:
@@ -158,11 +166,11 @@ def _find_importer(file: Path) -> Importer:
     """
     from osimlite.errors import OsimliteError
 
-    known = {importer.name: importer for importer in _list_model_importers()}
+    importer_by_name = {importer.name: importer for importer in _list_model_importers()}
     name = find_format(file)
-    if name not in known:
-        words = join_words([importer.title for importer in known.values()])
+    if name not in importer_by_name:
+        titles = join_words([importer.title for importer in importer_by_name.values()])
         raise OsimliteError(
-            f"this is no file of {words}, which --to {OSIM} converts", file=str(file)
+            f"this is no file of {titles}, which --to {OSIM} converts", file=str(file)
         )
-    return known[name]
+    return importer_by_name[name]

@@ -70,21 +70,23 @@ def upgrade(
 def _print_changes(document: Document) -> None:
     """Print a table of changes, then notes of the reader, then what was lost."""
     steps: dict[str, list[Change]] = {}
-    done = document.changes
-    for change in done:
+    changes_made = document.changes
+    for change in changes_made:
         steps.setdefault(change.what, []).append(change)
     if steps:
         table = create_table()
         table.add_column("What changed")
         table.add_column("Places", justify="right")
         table.add_column("First line", justify="right")
-        for what, changes in sorted(steps.items(), key=lambda item: item[1][0].below):
+        for description, changes in sorted(
+            steps.items(), key=lambda changes_of_type: changes_of_type[1][0].below
+        ):
             line = document.source.locate_tag(changes[0].number).line
-            add_row(table, what, str(len(changes)), str(line))
+            add_row(table, description, str(len(changes)), str(line))
         print_table(table)
     for note in document.notes:
         if note.line is not None:
-            meant = (
+            reading = (
                 "as nothing"
                 if not note.value
                 else "as it stands"
@@ -92,14 +94,16 @@ def _print_changes(document: Document) -> None:
                 else f"as '{note.value}'"
             )
             consequence = (
-                f"; {note.value}" if note.kind == "overlooked" else f" and was read {meant}"
+                f"; {note.value}" if note.kind == "overlooked" else f" and was read {reading}"
             )
             say(f"line {note.line}: '{note.word}' is not XML{consequence}")
-    lost: dict[str, list[Change]] = {}
-    for change in done:
+    losses: dict[str, list[Change]] = {}
+    for change in changes_made:
         if change.lost is not None:
-            lost.setdefault(change.lost, []).append(change)
-    for what, changes in lost.items():
+            losses.setdefault(change.lost, []).append(change)
+    for description, changes in losses.items():
         first = document.source.locate_tag(changes[0].number).line
-        more = f" and {format_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
-        say(f"lost: {what} (line {first}, {changes[0].where}{more})")
+        other_places = (
+            f" and {format_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
+        )
+        say(f"lost: {description} (line {first}, {changes[0].where}{other_places})")

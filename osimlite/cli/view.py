@@ -45,7 +45,7 @@ def view(
     browser: options.Browser = True,
     *,
     wrapping: str,
-    **chosen: Any,
+    **option_values: Any,
 ) -> None:
     """Look at a model and its motion: bodies, contacts, muscles, component tree, a slider for every coordinate.
 
@@ -64,37 +64,39 @@ def view(
     from osimlite.view.shown import Shown
 
     model, mechanism, left_out = build_showable(read(file))
-    given: Mapping[str, float] = options.parse_quantities(values, mechanism, "--set")
+    coordinate_values: Mapping[str, float] = options.parse_quantities(values, mechanism, "--set")
     folders = options.list_mesh_folders(file, geometry)
-    shown = Shown.of(
+    viewed = Shown.of(
         model,
         mechanism,
         folders,
         file=file,
         motion=motion,
         forces=forces,
-        values=given,
+        values=coordinate_values,
         wrapping=wrapping,
         left_out=left_out,
     )
-    for remark in (*shown.remarks, *describe_errors(shown.findings, shown.scene.remarks)):
+    for remark in (*viewed.remarks, *describe_errors(viewed.findings, viewed.scene.remarks)):
         say(remark)
-    written = {
-        name: each for name, each in list_exporters("view").items() if chosen[name] is not None
+    requested_exporters = {
+        name: exporter
+        for name, exporter in list_exporters("view").items()
+        if option_values[name] is not None
     }
-    for name, exporter in written.items():
-        choices = {each.name: chosen[each.name] for each in exporter.choices}
-        say(f"wrote {exporter.write(shown, chosen[name], **choices)}")
-    if not written:
-        _serve(shown, port, browser=browser)
+    for name, exporter in requested_exporters.items():
+        format_options = {option.name: option_values[option.name] for option in exporter.choices}
+        say(f"wrote {exporter.write(viewed, option_values[name], **format_options)}")
+    if not requested_exporters:
+        _serve(viewed, port, browser=browser)
 
 
-def _serve(shown: Shown, port: int, *, browser: bool) -> None:
+def _serve(viewed: Shown, port: int, *, browser: bool) -> None:
     import webbrowser
 
     from osimlite.cli._console import say
 
-    with shown.server(port) as server:
+    with viewed.server(port) as server:
         say(f"serving {server.url} until you press Ctrl-C")
         if browser:
             webbrowser.open(server.url)

@@ -129,11 +129,11 @@ def jumper(driven: bool = True) -> Model:
     _add_shape(model, torso, "trunk", (0.0, 0.28, 0.0), Ellipsoid(radii=(0.10, 0.30, 0.15)))
     _add_shape(model, torso, "pelvis", (-0.02, 0.03, 0.0), Ellipsoid(radii=(0.09, 0.08, 0.13)))
     _add_shape(model, torso, "head", (0.02, 0.69, 0.0), Sphere(radius=0.105))
-    turn = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT_DEG))
+    tilt = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT_DEG))
     forward = Coordinate(name="pelvis_tx", range=(-5.0, 5.0))
-    up = Coordinate(name="pelvis_ty", range=(-1.0, 3.0), default_value=PELVIS_HEIGHT_M)
+    height = Coordinate(name="pelvis_ty", range=(-1.0, 3.0), default_value=PELVIS_HEIGHT_M)
     model.add(
-        PlanarJoint(name="ground_pelvis", coordinates=[turn, forward, up]).between(
+        PlanarJoint(name="ground_pelvis", coordinates=[tilt, forward, height]).between(
             model.ground, torso
         )
     )
@@ -195,18 +195,18 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
     _add_shape(
         model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.025, 0.035))
     )
-    for name, coordinate, parent, child, at, low, high in (
+    for name, coordinate, parent, child, location, lower, upper in (
         ("hip", "hip_flexion", torso, femur, (0.0, 0.0, z), -15.0, 120.0),
         ("knee", "knee_angle", femur, tibia, (0.0, -THIGH_LENGTH_M, 0.0), -115.0, 0.0),
         ("ankle", "ankle_angle", tibia, foot, (0.0, -SHANK_LENGTH_M, 0.0), -45.0, 35.0),
     ):
         angle = Coordinate(
             name=f"{coordinate}_{side}",
-            range=(radians(low), radians(high)),
+            range=(radians(lower), radians(upper)),
             default_value=radians(SQUAT_DEG[coordinate]),
         )
         model.add(
-            PinJoint(name=f"{name}_{side}", coordinates=[angle]).between(parent, child, at=at)
+            PinJoint(name=f"{name}_{side}", coordinates=[angle]).between(parent, child, at=location)
         )
         model.add(
             CoordinateLimitForce(
@@ -215,9 +215,9 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
                 # For rotations OpenSim has these limits in degrees, and the stiffness in N m per
                 # degree.
                 upper_stiffness=20.0,
-                upper_limit=high,
+                upper_limit=upper,
                 lower_stiffness=20.0,
-                lower_limit=low,
+                lower_limit=lower,
                 damping=0.25,
                 transition=10.0,
             )
@@ -225,13 +225,18 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
     # Two spheres per foot carry it at heel and ball, so that the ankle can roll it.
     for name, x, radius in (("heel", -0.05, 0.03), ("ball", 0.15, 0.025)):
         # The lowest points of the spheres are at the sole.
-        place = (x, radius - ANKLE_HEIGHT_M, 0.0)
+        sphere_position = (x, radius - ANKLE_HEIGHT_M, 0.0)
         _add_contact(
             model,
-            ContactSphere(name=f"{name}_{side}", socket_frame=foot, location=place, radius=radius),
+            ContactSphere(
+                name=f"{name}_{side}",
+                socket_frame=foot,
+                location=sphere_position,
+                radius=radius,
+            ),
             floor,
         )
-    for body, name, at, radius, quadrant in (
+    for body, name, location, radius, quadrant in (
         (femur, "hip_back", (0.0, 0.0, 0.0), 0.06, "-x"),
         (torso, "hip_front", (0.0, 0.0, z), 0.035, "+x"),
         (femur, "knee", (0.0, -THIGH_LENGTH_M, 0.0), 0.042, "+x"),
@@ -239,24 +244,28 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
         # Cylinders keep the muscles outside of hip and knee when these are bent.
         body.wrap_object_set.objects.append(
             WrapCylinder(
-                name=f"{name}_{side}", translation=at, radius=radius, length=0.2, quadrant=quadrant
+                name=f"{name}_{side}",
+                translation=location,
+                radius=radius,
+                length=0.2,
+                quadrant=quadrant,
             )
         )
-    places = {
+    body_positions = {
         "torso": (torso, z),
         "femur": (femur, 0.0),
         "tibia": (tibia, 0.0),
         "foot": (foot, 0.0),
     }
     for name, muscle in MUSCLES.items():
-        _add_muscle(model, f"{name}_{side}", muscle, places, side)
+        _add_muscle(model, f"{name}_{side}", muscle, body_positions, side)
 
 
 def _add_muscle(
     model: Model,
     name: str,
     muscle: MuscleParameters,
-    places: dict[str, tuple[Body, float]],
+    body_positions: dict[str, tuple[Body, float]],
     side: str,
 ) -> None:
     """Add a muscle to one leg.
@@ -265,14 +274,14 @@ def _add_muscle(
         model: model that is built.
         name: name of the muscle.
         muscle: its parameters.
-        places: body and lateral position (m) of path points, by the name of the body.
+        body_positions: body and lateral position (m) of path points, by the name of the body.
         side: suffix of the leg.
     """
     points: list[AbstractPathPoint] = [
         PathPoint(
             name=f"{name}-P{number}",
-            socket_parent_frame=places[body][0],
-            location=(x, y, places[body][1]),
+            socket_parent_frame=body_positions[body][0],
+            location=(x, y, body_positions[body][1]),
         )
         for number, (body, x, y) in enumerate(muscle.path, 1)
     ]
@@ -308,9 +317,11 @@ def _add_body(model: Model, name: str, mass: float, center: Vec3, inertia: float
     return model.add(body)
 
 
-def _add_shape(model: Model, body: Body, name: str, at: Vec3, shape: Geometry) -> None:
+def _add_shape(model: Model, body: Body, name: str, position: Vec3, shape: Geometry) -> None:
     """Attach a shape to a body at a position (m) in it."""
-    model.add(PhysicalOffsetFrame(name=name, socket_parent=body, translation=at)).attach(shape)
+    model.add(PhysicalOffsetFrame(name=name, socket_parent=body, translation=position)).attach(
+        shape
+    )
 
 
 def _add_contact(model: Model, sphere: ContactSphere, floor: ContactHalfSpace) -> None:

@@ -81,9 +81,11 @@ def human_walks() -> Model:
         contact.static_friction = contact.dynamic_friction = 0.8
         contact.transition_velocity = 0.2
     probe = Bhargava2004MuscleMetabolicsProbe(name="metabolics")
-    known = probe.metabolic_muscle_parameter_set.objects
+    muscle_parameters = probe.metabolic_muscle_parameter_set.objects
     for muscle in model.components(DeGrooteFregly2016Muscle):
-        known.append(Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(name=muscle.name))
+        muscle_parameters.append(
+            Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(name=muscle.name)
+        )
     model.add(probe)
     return model
 
@@ -100,17 +102,17 @@ def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
     """
     states, controls = _list_variables(model)
     pairs = {
-        kind: [
+        variable_type: [
             MocoPeriodicityGoalPair(initial_variable=name, final_variable=_mirror_path(name))
             for name in names
         ]
-        for kind, names in (("state", states), ("control", controls))
+        for variable_type, names in (("state", states), ("control", controls))
     }
     forward = f"{PELVIS}pelvis_tx/value"
     # Weights are proportional to volume: a muscle twice as large consumes twice the energy.
     sizes = {
-        f"/forceset/{m.name}": m.max_isometric_force * m.optimal_fiber_length
-        for m in _list_muscles(model)
+        f"/forceset/{muscle.name}": muscle.max_isometric_force * muscle.optimal_fiber_length
+        for muscle in _list_muscles(model)
     }
     mean = sum(sizes.values()) / len(sizes)
     weights = [MocoWeight(name=name, weight=round(size / mean, 3)) for name, size in sizes.items()]
@@ -174,14 +176,14 @@ def make_guess(model: Model) -> MocoTrajectory:
     All muscles have the same small activation.
     """
     states, controls = _list_variables(model)
-    part = np.linspace(0.0, 1.0, 21)
-    bump = np.sin(pi * part)
+    fraction = np.linspace(0.0, 1.0, 21)
+    bump = np.sin(pi * fraction)
     angles: dict[str, Array] = {
         "pelvis_tilt": np.full(21, -0.05),
-        "pelvis_tx": SPEED_M_S * GUESS_STEP_S * part,
+        "pelvis_tx": SPEED_M_S * GUESS_STEP_S * fraction,
         "pelvis_ty": np.full(21, 0.93),
-        "hip_flexion_r": np.radians(25.0 - 40.0 * part),
-        "hip_flexion_l": np.radians(40.0 * part - 15.0),
+        "hip_flexion_r": np.radians(25.0 - 40.0 * fraction),
+        "hip_flexion_l": np.radians(40.0 * fraction - 15.0),
         "knee_angle_r": np.radians(-8.0 - 8.0 * bump),
         "knee_angle_l": np.radians(-8.0 - 52.0 * bump),
         "ankle_angle_r": np.radians(5.0 * bump),
@@ -189,11 +191,13 @@ def make_guess(model: Model) -> MocoTrajectory:
     }
     columns = {}
     for name in (*states, *controls):
-        owner, _, what = name.rpartition("/")
+        owner, _, quantity = name.rpartition("/")
         values = angles.get(owner.rpartition("/")[2], np.full(21, 0.05))
-        columns[name] = np.gradient(values, GUESS_STEP_S * part) if what == "speed" else values
+        columns[name] = (
+            np.gradient(values, GUESS_STEP_S * fraction) if quantity == "speed" else values
+        )
     return MocoTrajectory(
-        GUESS_STEP_S * part, columns, {"states": tuple(states), "controls": tuple(controls)}
+        GUESS_STEP_S * fraction, columns, {"states": tuple(states), "controls": tuple(controls)}
     )
 
 
@@ -226,17 +230,19 @@ def _list_muscles(model: Model) -> list[DeGrooteFregly2016Muscle]:
 
 def _list_variables(model: Model) -> tuple[list[str], list[str]]:
     """Return the paths of the states and of the controls."""
-    paths = [info.path for info in build_mechanism(model).coordinates]
+    paths = [coordinate.path for coordinate in build_mechanism(model).coordinates]
     controls = [f"/forceset/{muscle.name}" for muscle in _list_muscles(model)]
-    kinematic = [f"{path}/{what}" for what in ("value", "speed") for path in paths]
+    kinematic = [f"{path}/{quantity}" for quantity in ("value", "speed") for path in paths]
     return [*kinematic, *(f"{name}/activation" for name in controls)], controls
 
 
 def _mirror_path(name: str) -> str:
     """Return the path of the same variable on the other side."""
     # Names end in _r or _l.
-    swap = str.maketrans("rl", "lr")
+    side_table = str.maketrans("rl", "lr")
     return "/".join(
-        part[:-1] + part[-1].translate(swap) if part[-2:] in ("_r", "_l") else part
-        for part in name.split("/")
+        path_part[:-1] + path_part[-1].translate(side_table)
+        if path_part[-2:] in ("_r", "_l")
+        else path_part
+        for path_part in name.split("/")
     )

@@ -77,8 +77,8 @@ def write_beside(source: str, model: Model, file: Path) -> list[Path]:
     """
     if source not in STUDIES:
         return []
-    place, _, name = STUDIES[source].partition(":")
-    return getattr(_import_built_in(place, source), name)(model, file)
+    module_name, _, name = STUDIES[source].partition(":")
+    return getattr(_import_built_in(module_name, source), name)(model, file)
 
 
 def list_parameters(source: str) -> dict[str, Any]:
@@ -125,31 +125,31 @@ def _find_function(source: str) -> Callable[..., Any]:
         OsimliteError: the source names nothing, or no function.
     """
     target = BUILT_IN.get(source, source)
-    place, _, name = target.rpartition(":")
+    location, _, name = target.rpartition(":")
     # Without a colon the target is a file, whose function is found by itself.
-    if not place:
-        place, name = target, ""
+    if not location:
+        location, name = target, ""
     if source in BUILT_IN:
-        module = _import_built_in(place, source)
-    elif place.endswith(".py"):
-        module = run_python_file(Path(place))
+        module = _import_built_in(location, source)
+    elif location.endswith(".py"):
+        module = run_python_file(Path(location))
     elif ":" in target:
-        module = import_user_module(place)
+        module = import_user_module(location)
     else:
-        known = (
+        known_models = (
             suggest_name(source, BUILT_IN) or f"; the built-in models are {join_words(BUILT_IN)}"
         )
         raise OsimliteError(
-            f"'{source}' is not a built-in model, Python file, module:function or data file{known}"
+            f"'{source}' is not a built-in model, Python file, module:function or data file{known_models}"
         )
     if name:
         result = getattr(module, name, None)
         if not callable(result):
             raise OsimliteError(
-                f"'{place}' has no function '{name}'{suggest_name(name, _list_functions(module))}"
+                f"'{location}' has no function '{name}'{suggest_name(name, _list_functions(module))}"
             )
         return result
-    return _select_function(module, place)
+    return _select_function(module, location)
 
 
 def _import_built_in(module: str, source: str) -> ModuleType:
@@ -181,7 +181,7 @@ def _list_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     }
 
 
-def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
+def _select_function(module: ModuleType, location: str) -> Callable[..., Any]:
     """Return the function of a file that makes its model.
 
     It is the one annotated to return a Model, or the only one.
@@ -194,16 +194,16 @@ def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
     if isinstance(ready, Model):
         return lambda: ready
     functions = _list_functions(module)
-    annotated = {name: f for name, f in functions.items() if _returns_model(f)}
+    annotated = {name: function for name, function in functions.items() if _returns_model(function)}
     # A file may contain helper functions; an annotation tells which one makes the model.
     candidates = annotated or functions
     if len(candidates) == 1:
         return next(iter(candidates.values()))
     if not candidates:
-        raise OsimliteError("the file has no function that returns a Model", file=place)
+        raise OsimliteError("the file has no function that returns a Model", file=location)
     raise OsimliteError(
-        f"the file has several functions ({join_words(candidates)}); say which one with {place}:FUNCTION",
-        file=place,
+        f"the file has several functions ({join_words(candidates)}); say which one with {location}:FUNCTION",
+        file=location,
     )
 
 
@@ -224,14 +224,17 @@ def _parse_arguments(
     Raises:
         OsimliteError: the function has no such parameter, or one without a default is missing.
     """
-    known = inspect.signature(function).parameters
+    known_parameters = inspect.signature(function).parameters
     arguments = {}
     for name, text in parameters.items():
-        if name not in known:
-            hint = suggest_name(name, known) or f"; it has {join_words(known) or 'none'}"
+        if name not in known_parameters:
+            hint = (
+                suggest_name(name, known_parameters)
+                or f"; it has {join_words(known_parameters) or 'none'}"
+            )
             raise OsimliteError(f"'{source}' has no parameter '{name}'{hint}")
-        arguments[name] = _parse_value(name, text, known[name])
-    for name, parameter in known.items():
+        arguments[name] = _parse_value(name, text, known_parameters[name])
+    for name, parameter in known_parameters.items():
         optional = parameter.default is not parameter.empty or parameter.kind in (
             parameter.VAR_POSITIONAL,
             parameter.VAR_KEYWORD,
@@ -251,16 +254,16 @@ def _parse_value(name: str, text: str, parameter: inspect.Parameter) -> Any:
     """
     default = parameter.default
     # The type of the default decides how a text is read.
-    kind: type | None = None if default in (inspect.Parameter.empty, None) else type(default)
+    value_type: type | None = None if default in (inspect.Parameter.empty, None) else type(default)
     try:
-        if kind is bool:
+        if value_type is bool:
             return _WORDS[text.lower()]
-        if kind is int:
+        if value_type is int:
             return int(text)
-        return text if kind is str else float(text)
+        return text if value_type is str else float(text)
     except (KeyError, ValueError):
         # Without a default, a text that is no number remains a text.
-        if kind is None:
+        if value_type is None:
             return text
-        noun = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
+        noun = {bool: "true or false", int: "a whole number"}.get(value_type, "a number")
         raise OsimliteError(f"parameter '{name}' must be {noun}, got '{text}'") from None

@@ -153,9 +153,9 @@ def human_walker(
 
 
 def _set_start_and_track(
-    model: Model, start: Mapping[str, tuple[float, float]], way: float
+    model: Model, start: Mapping[str, tuple[float, float]], distance: float
 ) -> Model:
-    """Set the initial state, and extend platform and coordinate range for a distance `way` (m).
+    """Set the initial state, and extend platform and coordinate range for a distance `distance` (m).
 
     Returns:
         The same model.
@@ -165,11 +165,11 @@ def _set_start_and_track(
             coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]
         if coordinate.name == "Pelvis_tx":
             # The range does not limit the motion; it tells how far the walker may go.
-            coordinate.range = (-1.0, way)
+            coordinate.range = (-1.0, distance)
         elif coordinate.name.endswith("Knee_rz"):
             # The stops of the knees are elastic, so that the knees exceed 0 a little.
             coordinate.range = (coordinate.range[0], 0.5)
     for platform in model.components(Brick):
         _, thickness, width = platform.half_lengths
-        platform.half_lengths = (way, thickness, width)
+        platform.half_lengths = (distance, thickness, width)
     return model

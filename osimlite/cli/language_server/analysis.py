@@ -134,7 +134,7 @@ class DocumentAnalysis:
             or MEASURES in subject.cache
         ):
             return False
-        return any(known.about == MEASURES and subject.is_for(known) for known in all_rules())
+        return any(rule.about == MEASURES and subject.is_for(rule) for rule in all_rules())
 
     def measure_report(self) -> Report:
         """Measure paths and muscles, and return the findings of all rules.
@@ -179,29 +179,31 @@ class DocumentAnalysis:
         """
         top = None if self.document is None else self.document.top
         result: dict[int, Object] = {}
-        for item in top.walk() if top is not None else ():
-            if item._index is not None:
+        for each_object in top.walk() if top is not None else ():
+            if each_object._index is not None:
                 # Objects of an included file have the index of the element that includes it. The
                 # walk meets the including object first, so that one is kept.
-                result.setdefault(item._index, item)
+                result.setdefault(each_object._index, each_object)
         return result
 
     def find_span(self, number: int) -> Span:
         """Return the offsets of an element's start tag, content and end tag."""
         return self.source.spans[number]
 
-    def compute_offset(self, place: Position) -> int:
+    def compute_offset(self, position: Position) -> int:
         """Convert a position of a finding (line and column from 1) to an offset in the text."""
-        return min(self.source.line_start(place.line) + place.column - 1, len(self.text.content))
+        return min(
+            self.source.line_start(position.line) + position.column - 1, len(self.text.content)
+        )
 
     @cached_property
     def uses(self) -> list[tuple[Use, int, int]]:
         """Return all references in the text, each with the start and end offsets of its word."""
         result = []
         for use in () if self.document is None else self.document.uses:
-            place = self._find_word_range(use)
-            if place is not None:
-                result.append((use, *place))
+            word_range = self._find_word_range(use)
+            if word_range is not None:
+                result.append((use, *word_range))
         return result
 
     def _find_word_range(self, use: Use) -> tuple[int, int] | None:
@@ -213,25 +215,29 @@ class DocumentAnalysis:
             return None
         if use.spec.tag == "@name":
             return self.find_name_range(number)
-        inner = self.source.child(number, use.spec.tag)
-        if inner is None:
+        child = self.source.child(number, use.spec.tag)
+        if child is None:
             return None
-        span = self.find_span(inner)
-        content = self.source.text[span.tag_end : span.inner_end]
+        element_span = self.find_span(child)
+        content = self.source.text[element_span.tag_end : element_span.inner_end]
         if use.position is None:
-            start = span.tag_end + len(content) - len(content.lstrip())
+            start = element_span.tag_end + len(content) - len(content.lstrip())
             return start, start + len(content.strip())
         # Count words up to the index: a search for the value could find an equal word before it.
-        place = span.tag_end
+        offset = element_span.tag_end
         for _ in range(use.position + 1):
-            place = next(
-                (k for k in range(place, span.inner_end) if not self.source.text[k].isspace()),
-                span.inner_end,
+            offset = next(
+                (
+                    k
+                    for k in range(offset, element_span.inner_end)
+                    if not self.source.text[k].isspace()
+                ),
+                element_span.inner_end,
             )
-            start = place
-            while place < span.inner_end and not self.source.text[place].isspace():
-                place += 1
-        return (start, place) if self.source.text[start:place] == use.value else None
+            start = offset
+            while offset < element_span.inner_end and not self.source.text[offset].isspace():
+                offset += 1
+        return (start, offset) if self.source.text[start:offset] == use.value else None
 
     def find_name_range(self, number: int) -> tuple[int, int] | None:
         """Find the value of an element's attribute `name`.
@@ -239,10 +245,10 @@ class DocumentAnalysis:
         Returns:
             Its start and end offsets; None without the attribute.
         """
-        span = self.find_span(number)
-        place = self.source.locate_attribute(number, "name")
-        start = self.compute_offset(place)
-        return (start, start + place.length) if start > span.start else None
+        element_span = self.find_span(number)
+        position = self.source.locate_attribute(number, "name")
+        start = self.compute_offset(position)
+        return (start, start + position.length) if start > element_span.start else None
 
     def find_label_range(self, number: int) -> tuple[int, int]:
         """Find the name of an element, or its tag if it has no name.
@@ -250,8 +256,11 @@ class DocumentAnalysis:
         Returns:
             Start and end offsets.
         """
-        span = self.find_span(number)
-        return self.find_name_range(number) or (span.start + 1, span.start + 1 + len(span.tag))
+        element_span = self.find_span(number)
+        return self.find_name_range(number) or (
+            element_span.start + 1,
+            element_span.start + 1 + len(element_span.tag),
+        )
 
     def find_target(self, offset: int) -> Target | None:
         """Return what the name at an offset refers to, or the component whose start tag is there."""
@@ -259,12 +268,16 @@ class DocumentAnalysis:
             # The cursor after the last character still belongs to the word.
             if start <= offset <= end:
                 return self.resolve_use(use)
-        for number, item in self.objects.items():
-            span = self.find_span(number)
-            if span.start <= offset <= span.tag_end:
-                if item.layout is not None and item.layout.include is not None:
-                    return Target(item.layout.include.path)
-                return self._make_target(self.file, item) if isinstance(item, Component) else None
+        for number, each_object in self.objects.items():
+            element_span = self.find_span(number)
+            if element_span.start <= offset <= element_span.tag_end:
+                if each_object.layout is not None and each_object.layout.include is not None:
+                    return Target(each_object.layout.include.path)
+                return (
+                    self._make_target(self.file, each_object)
+                    if isinstance(each_object, Component)
+                    else None
+                )
         return None
 
     def resolve_use(self, use: Use) -> Target | None:
@@ -286,7 +299,7 @@ class DocumentAnalysis:
                 else (label.at for label in table.labels if label.text.startswith(text))
             )
             return (
-                next((Target(str(table.file), at=at) for at in labels), None)
+                next((Target(str(table.file), at=position) for position in labels), None)
                 if table is not None
                 else None
             )
@@ -298,29 +311,29 @@ class DocumentAnalysis:
         if result is not None and setup.tool is not None:
             # A Moco study may contain its model instead of naming a file.
             return self._make_target(setup.model_file or setup.tool[0], result)
-        named = (
-            (file, item)
+        matches = (
+            (file, member)
             for file, top in setup.added_sets
-            for item in top.walk()
-            if item.name == text
+            for member in top.walk()
+            if member.name == text
         )
         return next(
             (
-                Target(*one, number=one[1]._index)
-                for one in named
-                if is_a(one[1], use.reference.target)
+                Target(*match, number=match[1]._index)
+                for match in matches
+                if is_a(match[1], use.reference.target)
             ),
             None,
         )
 
-    def _make_target(self, file: str, item: Component) -> Target:
+    def _make_target(self, file: str, component: Component) -> Target:
         tree = self.tree
-        path = "" if tree is None else tree.path_of(item) or ""
-        shown: Component | None = item
-        while tree is not None and shown is not None and shown._index is None:
+        path = "" if tree is None else tree.path_of(component) or ""
+        visible: Component | None = component
+        while tree is not None and visible is not None and visible._index is None:
             # Components that OpenSim adds itself have no element: show the owner that has one.
-            shown = tree.parent_of(shown)
-        return Target(file, item, path, None if shown is None else shown._index)
+            visible = tree.parent_of(visible)
+        return Target(file, component, path, None if visible is None else visible._index)
 
     def find_references(self, target: Target) -> list[tuple[int, int]]:
         """Return the start and end offsets of all words that refer to a target."""

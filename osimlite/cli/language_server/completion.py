@@ -27,46 +27,56 @@ _TOP_TAGS = (
 
 
 def list_completions(
-    analysis: DocumentAnalysis, known: DocumentAnalysis | None, offset: int
+    analysis: DocumentAnalysis, readable: DocumentAnalysis | None, offset: int
 ) -> list[types.CompletionItem]:
     """Return the completions at an offset.
 
     Args:
         analysis: the text as it is, usually half-typed.
-        known: last version of the text that could be read; it provides the names.
+        readable: last version of the text that could be read; it provides the names.
         offset: character offset of the cursor.
     """
     cursor = analysis.cursor(offset)
-    around = cursor.inner
-    if cursor.kind == "closing tag" and around is not None:
+    enclosing = cursor.inner
+    if cursor.kind == "closing tag" and enclosing is not None:
         return [
             _make_item(
-                analysis, cursor, around.tag, f"{around.tag}>", types.CompletionItemKind.Keyword
+                analysis,
+                cursor,
+                enclosing.tag,
+                f"{enclosing.tag}>",
+                types.CompletionItemKind.Keyword,
             )
         ]
     if cursor.kind == "tag":
-        return [*_complete_tags(analysis, cursor, around, bracket="")]
+        return [*_complete_tags(analysis, cursor, enclosing, bracket="")]
     if cursor.kind == "attribute" and cursor.attribute == "name" and cursor.element is not None:
         reference = find_name_reference(cursor)
         if reference is not None:
-            return [*_complete_names(analysis, known, cursor, reference, cursor.element)]
-    if cursor.kind != "text" or around is None:
+            return [*_complete_names(analysis, readable, cursor, reference, cursor.element)]
+    if cursor.kind != "text" or enclosing is None:
         return []
-    if around.cls is not None or (around.spec is not None and is_list_property(around.spec)):
-        return [*_complete_tags(analysis, cursor, around, bracket="<")]
-    if around.spec is None:
+    if enclosing.cls is not None or (
+        enclosing.spec is not None and is_list_property(enclosing.spec)
+    ):
+        return [*_complete_tags(analysis, cursor, enclosing, bracket="<")]
+    if enclosing.spec is None:
         return []
-    kind = around.spec.names or around.spec.kind
-    if isinstance(kind, Value):
-        words = ("true", "false") if kind.scalar == "bool" else kind.choices
+    field_type = enclosing.spec.names or enclosing.spec.kind
+    if isinstance(field_type, Value):
+        values = ("true", "false") if field_type.scalar == "bool" else field_type.choices
         return [
-            _make_item(analysis, cursor, str(word), str(word), types.CompletionItemKind.Value)
-            for word in words
+            _make_item(analysis, cursor, str(value), str(value), types.CompletionItemKind.Value)
+            for value in values
         ]
-    if isinstance(kind, Reference):
+    if isinstance(field_type, Reference):
         return [
             *_complete_names(
-                analysis, known, cursor, kind, cursor.around[-2] if len(cursor.around) > 1 else None
+                analysis,
+                readable,
+                cursor,
+                field_type,
+                cursor.around[-2] if len(cursor.around) > 1 else None,
             )
         ]
     return []
@@ -74,13 +84,13 @@ def list_completions(
 
 def _complete_names(
     analysis: DocumentAnalysis,
-    known: DocumentAnalysis | None,
+    readable: DocumentAnalysis | None,
     cursor: Cursor,
     reference: Reference,
-    holder: Element | None,
+    owner: Element | None,
 ) -> Iterator[types.CompletionItem]:
     """Yield completions for the text of a reference."""
-    for name in list_names(known, cursor, reference, holder) if known is not None else ():
+    for name in list_names(readable, cursor, reference, owner) if readable is not None else ():
         item = _make_item(
             analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail
         )
@@ -90,44 +100,44 @@ def _complete_names(
 
 
 def _complete_tags(
-    analysis: DocumentAnalysis, cursor: Cursor, around: Element | None, bracket: str
+    analysis: DocumentAnalysis, cursor: Cursor, enclosing: Element | None, bracket: str
 ) -> Iterator[types.CompletionItem]:
     """Yield completions for the elements that may be inside the enclosing one."""
     # The tag of an object, or of a list of objects; values have no tags inside.
-    if around is None:
+    if enclosing is None:
         return
-    if around.cls is None:
-        if around.tag == "OpenSimDocument":
+    if enclosing.cls is None:
+        if enclosing.tag == "OpenSimDocument":
             for tag in _TOP_TAGS if is_document(analysis.file) else ("Model",):
                 yield _complete_object(analysis, cursor, tag, bracket, "")
         elif (
-            around.spec is not None
-            and is_list_property(around.spec)
-            and around.spec.accepts is not None
+            enclosing.spec is not None
+            and is_list_property(enclosing.spec)
+            and enclosing.spec.accepts is not None
         ):
-            for tag in list_class_tags(around.spec.accepts):
+            for tag in list_class_tags(enclosing.spec.accepts):
                 yield _complete_object(analysis, cursor, tag, bracket, "")
         return
     # Properties that the object has already would be ignored by OpenSim.
-    given = _list_written_tags(analysis, around)
-    for spec in get_field_specs(around.cls).values():
-        if spec in list_single_object_properties(around.cls):
+    written_tags = _list_written_tags(analysis, enclosing)
+    for spec in get_field_specs(enclosing.cls).values():
+        if spec in list_single_object_properties(enclosing.cls):
             assert spec.accepts is not None
             for tag in list_class_tags(spec.accepts):
                 yield _complete_object(analysis, cursor, tag, bracket, spec.tag)
-        elif spec.tag not in given:
+        elif spec.tag not in written_tags:
             yield _complete_property(analysis, cursor, spec, bracket)
 
 
-def _list_written_tags(analysis: DocumentAnalysis, around: Element) -> set[str]:
+def _list_written_tags(analysis: DocumentAnalysis, enclosing: Element) -> set[str]:
     """Return the tags of properties that the text already gives to an object."""
-    item = analysis.objects.get(around.number) if analysis.is_readable else None
-    if item is None:
+    enclosing_object = analysis.objects.get(enclosing.number) if analysis.is_readable else None
+    if enclosing_object is None:
         return set()
     return {
         spec.tag
-        for spec in get_field_specs(type(item)).values()
-        if spec.name in item.model_fields_set
+        for spec in get_field_specs(type(enclosing_object)).values()
+        if spec.name in enclosing_object.model_fields_set
     }
 
 
@@ -136,18 +146,20 @@ def _complete_property(
 ) -> types.CompletionItem:
     if isinstance(spec.kind, ObjectField):
         # An unnamed property takes objects of several classes, which a name tells apart.
-        inner = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
-        text = f"{bracket}{spec.tag}{inner}</{spec.tag}>"
+        content = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
+        text = f"{bracket}{spec.tag}{content}</{spec.tag}>"
     else:
         default = ""
         if isinstance(spec.kind, Value) and spec.default is not None:
             default = make_formatter(spec.kind, "shortest")(spec.default)
-        choices = (
+        values = (
             ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
         )
         # `${1|a,b|}` is the choice of a snippet, `${1:text}` a placeholder.
-        place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escape_snippet(default)}}}"
-        text = f"{bracket}{spec.tag}>{place}</{spec.tag}>"
+        placeholder = (
+            f"${{1|{','.join(values)}|}}" if values else f"${{1:{_escape_snippet(default)}}}"
+        )
+        text = f"{bracket}{spec.tag}>{placeholder}</{spec.tag}>"
     item = _make_item(
         analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, describe_value(spec)
     )
@@ -159,8 +171,8 @@ def _complete_property(
 def _complete_object(
     analysis: DocumentAnalysis, cursor: Cursor, tag: str, bracket: str, name: str
 ) -> types.CompletionItem:
-    named = f'name="{name}"' if name else 'name="$1"'
-    text = f"{bracket}{tag} {named}>\n\t$0\n</{tag}>"
+    name_attribute = f'name="{name}"' if name else 'name="$1"'
+    text = f"{bracket}{tag} {name_attribute}>\n\t$0\n</{tag}>"
     item = _make_item(analysis, cursor, tag, text, types.CompletionItemKind.Class, name)
     cls = find_class(tag)
     item.documentation = describe_class(cls) if cls is not None else None
@@ -176,14 +188,14 @@ def _make_item(
     kind: types.CompletionItemKind,
     detail: str = "",
 ) -> types.CompletionItem:
-    place = analysis.text.range(cursor.start, cursor.end)
+    edit_range = analysis.text.range(cursor.start, cursor.end)
     # Editors match the typed text against `filter_text`, which therefore has the opening bracket if
     # the inserted text has one.
     return types.CompletionItem(
         label,
         kind=kind,
         detail=detail or None,
-        text_edit=types.TextEdit(place, text),
+        text_edit=types.TextEdit(edit_range, text),
         filter_text=f"<{label}" if text.startswith("<") else label,
     )
 

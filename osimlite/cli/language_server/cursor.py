@@ -67,57 +67,63 @@ def find_cursor(text: str, offset: int) -> Cursor:
         offset: character offset of the cursor.
     """
     stack: list[Element] = []
-    count = behind = 0
-    for piece in find_markup(text[:offset]):
-        behind = piece.end
-        if piece.kind == "open":
-            stack.append(_make_element(text, piece.tag, piece.start, piece.end, count, stack))
-        elif piece.kind == "close":
-            _close_element(stack, piece)
-        count += piece.kind in ("open", "empty")
-    around = tuple(stack)
-    special = _SPECIAL.search(text, behind, offset)
-    if special is not None:
+    count = markup_end = 0
+    for markup in find_markup(text[:offset]):
+        markup_end = markup.end
+        if markup.kind == "open":
+            stack.append(_make_element(text, markup.tag, markup.start, markup.end, count, stack))
+        elif markup.kind == "close":
+            _close_element(stack, markup)
+        count += markup.kind in ("open", "empty")
+    enclosing = tuple(stack)
+    comment = _SPECIAL.search(text, markup_end, offset)
+    if comment is not None:
         # Comments that are closed before the cursor are part of the markup that was scanned above.
-        return Cursor("comment", around, special.start(), offset, "")
-    start = text.rfind("<", behind, offset)
+        return Cursor("comment", enclosing, comment.start(), offset, "")
+    start = text.rfind("<", markup_end, offset)
     if start < 0:
-        return _find_word(text, offset, behind, around)
+        return _find_word(text, offset, markup_end, enclosing)
     if text.startswith("</", start):
         name = _TAG_NAME.match(text, start + 2)
         assert name is not None
         return Cursor(
             "closing tag",
-            around,
+            enclosing,
             start + 2,
             name.end(),
             name[0],
-            element=around[-1] if around else None,
+            element=enclosing[-1] if enclosing else None,
         )
     name = _TAG_NAME.match(text, start + 1)
     assert name is not None
     end = _find_tag_end(text, start)
     element = _make_element(text, name[0], start, end, count, stack)
     if offset <= name.end():
-        return Cursor("tag", around, start + 1, name.end(), name[0], element=element)
+        return Cursor("tag", enclosing, start + 1, name.end(), name[0], element=element)
     value = _ATTRIBUTE_VALUE.search(text, start, offset)
     if value is None:
-        return Cursor("attribute", around, offset, offset, "", element=element)
-    rest = re.compile(r"[^\"'<>]*").match(text, offset)
-    assert rest is not None
-    begin = value.start(3)
+        return Cursor("attribute", enclosing, offset, offset, "", element=element)
+    value_end = re.compile(r"[^\"'<>]*").match(text, offset)
+    assert value_end is not None
+    value_start = value.start(3)
     return Cursor(
-        "attribute", around, begin, rest.end(), text[begin : rest.end()], value[1], element
+        "attribute",
+        enclosing,
+        value_start,
+        value_end.end(),
+        text[value_start : value_end.end()],
+        value[1],
+        element,
     )
 
 
-def _find_word(text: str, offset: int, behind: int, around: tuple[Element, ...]) -> Cursor:
+def _find_word(text: str, offset: int, markup_end: int, enclosing: tuple[Element, ...]) -> Cursor:
     start = offset
-    while start > behind and not text[start - 1].isspace():
+    while start > markup_end and not text[start - 1].isspace():
         start -= 1
     word = _WORD.match(text, start)
     assert word is not None
-    return Cursor("text", around, start, word.end(), word[0])
+    return Cursor("text", enclosing, start, word.end(), word[0])
 
 
 def _find_tag_end(text: str, start: int) -> int:
@@ -126,10 +132,10 @@ def _find_tag_end(text: str, start: int) -> int:
     return len(text) if result is None else result.end() if result[0] == ">" else result.start()
 
 
-def _close_element(stack: list[Element], piece: Markup) -> None:
+def _close_element(stack: list[Element], markup: Markup) -> None:
     """Close the innermost open element of a tag; ignore a closing tag without one."""
     for depth in range(len(stack) - 1, -1, -1):
-        if stack[depth].tag == piece.tag:
+        if stack[depth].tag == markup.tag:
             del stack[depth:]
             return
 
@@ -137,40 +143,44 @@ def _close_element(stack: list[Element], piece: Markup) -> None:
 def _make_element(
     text: str, tag: str, start: int, end: int, number: int, stack: list[Element]
 ) -> Element:
-    given = _NAME_GIVEN.search(text, start, end)
-    name = given[2] if given else ""
+    name_match = _NAME_GIVEN.search(text, start, end)
+    name = name_match[2] if name_match else ""
     cls, spec = _identify_element(stack[-1] if stack else None, tag, name)
     return Element(tag, start, number, name, cls, spec)
 
 
 def _identify_element(
-    around: Element | None, tag: str, name: str
+    enclosing: Element | None, tag: str, name: str
 ) -> tuple[type[Object] | None, FieldSpec | None]:
     """Identify what an element stands for.
 
     Args:
-        around: enclosing element; None at the top.
+        enclosing: enclosing element; None at the top.
         tag: its tag.
         name: its attribute `name`.
 
     Returns:
         Class of the object, and the property that it is or that holds it; None where unknown.
     """
-    if around is None or (around.tag == "OpenSimDocument" and around.cls is None):
+    if enclosing is None or (enclosing.tag == "OpenSimDocument" and enclosing.cls is None):
         return find_class(tag), None
-    if around.cls is None:
+    if enclosing.cls is None:
         # The enclosing element is a property that holds objects, or an unknown tag.
-        return find_class(tag), around.spec
-    spec = get_field_specs(around.cls).get(tag)
+        return find_class(tag), enclosing.spec
+    spec = get_field_specs(enclosing.cls).get(tag)
     if spec is None:
         result = find_class(tag)
-        return result, None if result is None else _find_holding_property(around.cls, result, name)
+        return result, None if result is None else _find_holding_property(
+            enclosing.cls, result, name
+        )
     if isinstance(spec.kind, ObjectField) and spec.kind.form == "unnamed":
         return spec.accepts, spec
     return None, spec
 
 
-def _find_holding_property(owner: type[Object], held: type[Object], name: str) -> FieldSpec | None:
+def _find_holding_property(
+    owner: type[Object], member_class: type[Object], name: str
+) -> FieldSpec | None:
     """Return the property of `owner` that holds one object of a class directly.
 
     The tag of such an element is the class; its attribute `name` is the property.
@@ -178,7 +188,7 @@ def _find_holding_property(owner: type[Object], held: type[Object], name: str) -
     fitting = [
         spec
         for spec in list_single_object_properties(owner)
-        if spec.accepts is not None and issubclass(held, spec.accepts)
+        if spec.accepts is not None and issubclass(member_class, spec.accepts)
     ]
     return next((spec for spec in fitting if spec.tag == name), fitting[0] if fitting else None)
 

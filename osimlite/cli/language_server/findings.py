@@ -49,47 +49,50 @@ def _find_offsets(analysis: DocumentAnalysis, finding: Finding) -> tuple[int, in
 
 
 def list_code_actions(
-    analysis: DocumentAnalysis, uri: str, wanted: types.Range
+    analysis: DocumentAnalysis, uri: str, requested_range: types.Range
 ) -> list[types.CodeAction]:
     """Return the actions for the findings in a range: fix them, ignore them, or fix everything in the file.
 
     Args:
         analysis: the file.
         uri: URI of the file.
-        wanted: range that the editor asks about; all of its lines count.
+        requested_range: range that the editor asks about; all of its lines count.
     """
     result: list[types.CodeAction] = []
     if not analysis.is_checked:
         # Do not run the rules here: the editor requests actions again after diagnostics arrive.
         return result
     # People ask anywhere in a line, and a finding may be about one word of it.
-    lines = types.Position(wanted.start.line, 0), types.Position(wanted.end.line + 1, 0)
+    lines = (
+        types.Position(requested_range.start.line, 0),
+        types.Position(requested_range.end.line + 1, 0),
+    )
     first, last = (analysis.text.offset(position) for position in lines)
     last = max(first, last - 1)
     for finding in analysis.report:
         start, end = _find_offsets(analysis, finding)
         if start > last or end < first:
             continue
-        concerned = [_make_diagnostic(analysis, finding)]
+        diagnostics = [_make_diagnostic(analysis, finding)]
         if finding.fix is not None:
             edits = _convert_edits(analysis, finding.fix.edits)
             result.append(
                 types.CodeAction(
                     _describe_fix(finding),
                     kind=types.CodeActionKind.QuickFix,
-                    diagnostics=concerned,
+                    diagnostics=diagnostics,
                     is_preferred=finding.fix.safe,
                     edit=types.WorkspaceEdit({uri: edits}),
                 )
             )
         ignoring = _make_ignore_edit(analysis, finding) if finding.code[4] != "0" else None
         if ignoring is not None:
-            where = "in this table" if analysis.is_table else "on this line"
+            scope = "in this table" if analysis.is_table else "on this line"
             result.append(
                 types.CodeAction(
-                    f"Ignore {finding.code} ({finding.name}) {where}",
+                    f"Ignore {finding.code} ({finding.name}) {scope}",
                     kind=types.CodeActionKind.QuickFix,
-                    diagnostics=concerned,
+                    diagnostics=diagnostics,
                     edit=types.WorkspaceEdit({uri: [ignoring]}),
                 )
             )
@@ -107,22 +110,22 @@ def list_code_actions(
 
 def _describe_fix(finding: Finding) -> str:
     assert finding.fix is not None
-    caution = "" if finding.fix.safe else " (look at the result)"
+    warning_text = "" if finding.fix.safe else " (look at the result)"
     if finding.suggestion is not None:
-        return escape_unprintable(f"Change to '{finding.suggestion}'{caution}")
-    return f"Fix {finding.code} ({finding.name}){caution}"
+        return escape_unprintable(f"Change to '{finding.suggestion}'{warning_text}")
+    return f"Fix {finding.code} ({finding.name}){warning_text}"
 
 
 def _convert_edits(analysis: DocumentAnalysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
     result = []
     data, is_table = analysis.source.data, analysis.is_table and not analysis.text.content.isascii()
-    seen = characters = 0
+    byte_offset = characters = 0
     for edit in sorted(edits, key=lambda edit: edit.start):
         start, end = edit.start, edit.end
         if is_table:
             # Fixes of tables count bytes, editors count characters.
-            characters += len(data[seen:start].decode())
-            seen, start, end = start, characters, characters + len(data[start:end].decode())
+            characters += len(data[byte_offset:start].decode())
+            byte_offset, start, end = start, characters, characters + len(data[start:end].decode())
         result.append(types.TextEdit(analysis.text.range(start, end), edit.text))
     return result
 
@@ -138,8 +141,8 @@ def _make_ignore_edit(analysis: DocumentAnalysis, finding: Finding) -> types.Tex
         header = _ENDS_HEADER.search(analysis.text.content)
         if header is None:
             return None
-        place = analysis.text.range(header.start(2), header.start(2))
-        return types.TextEdit(place, f"osimlite: ignore {finding.code}{header[1]}")
+        edit_range = analysis.text.range(header.start(2), header.start(2))
+        return types.TextEdit(edit_range, f"osimlite: ignore {finding.code}{header[1]}")
     line = analysis.source.lines[finding.line - 1]
     end = analysis.source.line_start(finding.line) + len(line)
     return types.TextEdit(

@@ -30,19 +30,19 @@ def describe_cursor(analysis: DocumentAnalysis, offset: int) -> types.Hover | No
     element = cursor.subject
     if cursor.kind == "comment" or element is None:
         return None
-    parts = []
+    paragraphs = []
     if cursor.kind == "text" or cursor.attribute == "name":
-        parts.append(_describe_target(analysis, offset))
+        paragraphs.append(_describe_target(analysis, offset))
     if element.cls is not None:
-        parts.append(_describe_class(element.cls))
+        paragraphs.append(_describe_class(element.cls))
         if cursor.kind in ("tag", "closing tag"):
-            parts.insert(0, _find_path(analysis, element))
+            paragraphs.insert(0, _find_path(analysis, element))
     elif element.spec is not None:
-        around = (
+        enclosing = (
             cursor.around[-2:] if cursor.kind in ("text", "closing tag") else cursor.around[-1:]
         )
-        parts.append(_describe_property(element.spec, around[0].cls if around else None))
-    text = "\n\n".join(part for part in parts if part)
+        paragraphs.append(_describe_property(element.spec, enclosing[0].cls if enclosing else None))
+    text = "\n\n".join(paragraph for paragraph in paragraphs if paragraph)
     if not text:
         return None
     content = types.MarkupContent(types.MarkupKind.Markdown, text)
@@ -56,10 +56,16 @@ def _describe_class(cls: type[Object]) -> str:
 
 
 def _describe_property(spec: FieldSpec, owner: type[Object] | None) -> str:
-    head = f"**{spec.tag}**: {describe_value(spec)}"
-    of = "" if owner is None else f"Property of {owner.tag}."
+    heading = f"**{spec.tag}**: {describe_value(spec)}"
+    owner_text = "" if owner is None else f"Property of {owner.tag}."
     return "\n\n".join(
-        part for part in (f"{head}{_describe_default(spec)}", describe_property(spec), of) if part
+        paragraph
+        for paragraph in (
+            f"{heading}{_describe_default(spec)}",
+            describe_property(spec),
+            owner_text,
+        )
+        if paragraph
     )
 
 
@@ -78,28 +84,28 @@ def _describe_target(analysis: DocumentAnalysis, offset: int) -> str:
         return (
             f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."
         )
-    said = f"{type(target.item).tag} `{target.path or target.item.name}`"
+    description = f"{type(target.item).tag} `{target.path or target.item.name}`"
     if target.file == analysis.file:
-        return said
+        return description
     data = (
         find_marker_labels(analysis.document)
         if isinstance(analysis.document, Setup) and is_a(target.item, "Marker")
         else None
     )
-    also = (
+    data_note = (
         f"; {'in' if target.item.name in data[1] else '**not** in'} `{data[0]}`"
         if data is not None
         else ""
     )
-    return f"{said} of `{file}`{also}"
+    return f"{description} of `{file}`{data_note}"
 
 
 def _find_path(analysis: DocumentAnalysis, element: Element) -> str:
     """Return the path of the component of an element, as markup; empty if the text is malformed."""
     if analysis.tree is None:
         return ""
-    item = analysis.objects.get(element.number)
-    path = None if item is None else analysis.tree.path_of(item)
+    component = analysis.objects.get(element.number)
+    path = None if component is None else analysis.tree.path_of(component)
     return f"`{path}`" if path else ""
 
 

@@ -64,16 +64,16 @@ def find_name_reference(cursor: Cursor) -> Reference | None:
         return None
     # For some classes the property that holds them, or the set they are in, declares what their
     # name refers to.
-    held = (
+    property_references = (
         element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None
     )
-    said = next(filter(None, held), None)
-    after = (_NAMED_AFTER[name] for name in get_class_names(cls) if name in _NAMED_AFTER)
-    return said or cls.name_reference or next(after, None)
+    declared = next(filter(None, property_references), None)
+    class_references = (_NAMED_AFTER[name] for name in get_class_names(cls) if name in _NAMED_AFTER)
+    return declared or cls.name_reference or next(class_references, None)
 
 
 def list_names(
-    analysis: DocumentAnalysis, cursor: Cursor, reference: Reference, holder: Element | None
+    analysis: DocumentAnalysis, cursor: Cursor, reference: Reference, owner: Element | None
 ) -> Iterator[Name]:
     """Yield the candidate texts for a reference.
 
@@ -81,7 +81,7 @@ def list_names(
         analysis: last version of the document that could be read.
         cursor: position of the reference.
         reference: what is named.
-        holder: element that has the reference.
+        owner: element that has the reference.
     """
     setup = analysis.document if isinstance(analysis.document, Setup) else None
     if reference.rule == "file":
@@ -97,7 +97,7 @@ def list_names(
     elif analysis.tree is not None and reference.rule not in _OPAQUE:
         if setup is None:
             yield from _list_components(
-                analysis.tree, reference, _find_owner(analysis, analysis.tree, holder)
+                analysis.tree, reference, _find_owner(analysis, analysis.tree, owner)
             )
         elif reference.rule == "state-path":
             for text, component in find_variables(analysis.tree, reference.target).items():
@@ -107,18 +107,23 @@ def list_names(
             yield from _list_names_in_setup(setup, analysis.tree, reference)
 
 
-def _find_owner(analysis: DocumentAnalysis, tree: Tree, holder: Element | None) -> Component:
+def _find_owner(analysis: DocumentAnalysis, tree: Tree, element: Element | None) -> Component:
     """Return the component from which relative paths of a reference start."""
-    if holder is None:
+    if element is None:
         return tree.model
-    item = analysis.objects.get(holder.number)
-    if (item is None or type(item) is not holder.cls) and holder.name:
+    owner = analysis.objects.get(element.number)
+    if (owner is None or type(owner) is not element.cls) and element.name:
         # The readable version is older than the text, so indices of elements may have shifted; look
         # for an object of the same name and class.
-        item = next(
-            (c for c in tree.components if c.name == holder.name and type(c) is holder.cls), None
+        owner = next(
+            (
+                component
+                for component in tree.components
+                if component.name == element.name and type(component) is element.cls
+            ),
+            None,
         )
-    return tree.model if item is None else tree.owner_of(item)
+    return tree.model if owner is None else tree.owner_of(owner)
 
 
 def _list_components(tree: Tree, reference: Reference, owner: Component) -> Iterator[Name]:
@@ -134,17 +139,17 @@ def _list_names_in_setup(setup: Setup, tree: Tree, reference: Reference) -> Iter
     Markers that the marker file contains come first.
     """
     if reference.rule == "set-member":
-        known = [Name(text) for text in sorted(setup.list_names(reference.target))]
+        names = [Name(text) for text in sorted(setup.list_names(reference.target))]
     else:
-        known = list(_list_components(tree, reference, tree.model))
-        added = (
-            setup.list_names(reference.target) - {name.text for name in known}
+        names = list(_list_components(tree, reference, tree.model))
+        added_names = (
+            setup.list_names(reference.target) - {name.text for name in names}
             if setup.added_sets
             else set()
         )
-        known += [
+        names += [
             Name(text, reference.target)
-            for text in sorted(added)
+            for text in sorted(added_names)
             if not reference.rule.endswith("path")
         ]
     table = (
@@ -152,12 +157,16 @@ def _list_names_in_setup(setup: Setup, tree: Tree, reference: Reference) -> Iter
         if reference.target in ("Marker", "PhysicalFrame", "Coordinate")
         else None
     )
-    for name in known:
+    for name in names:
         if table is None or reference.target != "Marker":
             yield name
         else:
-            has = name.text in table[1]
-            yield Name(name.text, f"{name.detail}, {'in' if has else 'not in'} {table[0]}", has)
+            is_in_data = name.text in table[1]
+            yield Name(
+                name.text,
+                f"{name.detail}, {'in' if is_in_data else 'not in'} {table[0]}",
+                is_in_data,
+            )
 
 
 def find_marker_labels(setup: Setup) -> tuple[str, list[str]] | None:
@@ -166,8 +175,8 @@ def find_marker_labels(setup: Setup) -> tuple[str, list[str]] | None:
     Returns:
         Its name as the setup spells it, and its labels; None without such a file.
     """
-    for item in setup.tool[1].walk() if setup.tool is not None else ():
-        name = str(getattr(item, "marker_file", "")).strip()
+    for part in setup.tool[1].walk() if setup.tool is not None else ():
+        name = str(getattr(part, "marker_file", "")).strip()
         table = setup.read_tool_table(name)
         if table is not None:
             return name, table.columns
@@ -177,10 +186,10 @@ def find_marker_labels(setup: Setup) -> tuple[str, list[str]] | None:
 def _list_files(folder: str, content: str) -> Iterator[Name]:
     """Yield files in a folder and the folders directly in it that may have a content."""
     suffixes = _SUFFIXES.get(content, (".xml",))
-    for place in (folder, *map(str, list_folders(Path(folder))[:50])):
-        for path in _list_entries(place, suffixes):
-            likely = content in _SUFFIXES or f"<{content}".encode() in read_beginning(path)
-            yield Name(get_relative_path(path, folder), content if likely else "", likely)
+    for searched_folder in (folder, *map(str, list_folders(Path(folder))[:50])):
+        for path in _list_entries(searched_folder, suffixes):
+            is_likely = content in _SUFFIXES or f"<{content}".encode() in read_beginning(path)
+            yield Name(get_relative_path(path, folder), content if is_likely else "", is_likely)
 
 
 def _list_entries(folder: str, suffixes: tuple[str, ...]) -> list[str]:

@@ -30,29 +30,34 @@ def list_symbols(analysis: DocumentAnalysis) -> list[types.DocumentSymbol]:
     return [] if top is None else _make_symbols(analysis, top)
 
 
-def _make_symbols(analysis: DocumentAnalysis, item: Object) -> list[types.DocumentSymbol]:
+def _make_symbols(analysis: DocumentAnalysis, owner: Object) -> list[types.DocumentSymbol]:
     """Return the symbol of an object, or those of its parts if the object has no element."""
-    inner: list[types.DocumentSymbol] = []
-    if get_object_specs(type(item)):
-        for _, held in item.list_owned_objects():
-            inner += _make_symbols(analysis, held)
-    if item._index is None:
-        return inner
-    span = analysis.find_span(item._index)
-    name = analysis.find_name_range(item._index)
-    start, end = name or (span.start + 1, span.start + 1 + len(span.tag))
-    cls = type(item)
-    kind = next(
-        (kind for known, kind in _SYMBOLS.items() if is_a(item, known)), types.SymbolKind.Field
+    children: list[types.DocumentSymbol] = []
+    if get_object_specs(type(owner)):
+        for _, member in owner.list_owned_objects():
+            children += _make_symbols(analysis, member)
+    if owner._index is None:
+        return children
+    element_span = analysis.find_span(owner._index)
+    name = analysis.find_name_range(owner._index)
+    start, end = name or (element_span.start + 1, element_span.start + 1 + len(element_span.tag))
+    cls = type(owner)
+    symbol_kind = next(
+        (
+            symbol_kind
+            for symbol_class, symbol_kind in _SYMBOLS.items()
+            if is_a(owner, symbol_class)
+        ),
+        types.SymbolKind.Field,
     )
     return [
         types.DocumentSymbol(
-            item.name or cls.tag,
-            kind,
-            analysis.text.range(span.start, span.end),
+            owner.name or cls.tag,
+            symbol_kind,
+            analysis.text.range(element_span.start, element_span.end),
             analysis.text.range(start, end),
-            detail=cls.tag if item.name else None,
-            children=inner,
+            detail=cls.tag if owner.name else None,
+            children=children,
         )
     ]
 
@@ -60,19 +65,19 @@ def _make_symbols(analysis: DocumentAnalysis, item: Object) -> list[types.Docume
 def list_folding_ranges(analysis: DocumentAnalysis) -> list[types.FoldingRange]:
     """Return the elements and comments that span several lines."""
     result, open_lines = [], []
-    for piece in find_markup(analysis.markup):
-        line = analysis.text.position(piece.start).line
-        if piece.kind == "open":
-            open_lines.append((piece.tag, line))
-        elif piece.kind == "comment":
-            last = analysis.text.position(piece.end).line
+    for markup in find_markup(analysis.markup):
+        line = analysis.text.position(markup.start).line
+        if markup.kind == "open":
+            open_lines.append((markup.tag, line))
+        elif markup.kind == "comment":
+            last = analysis.text.position(markup.end).line
             if last > line:
                 result.append(types.FoldingRange(line, last, kind=types.FoldingRangeKind.Comment))
         # A closing tag without an opening one is ignored; elements that are never closed do not fold.
         # A closing tag without an open element is ignored; elements inside that are not closed end here.
-        elif piece.kind == "close" and any(tag == piece.tag for tag, _ in open_lines):
+        elif markup.kind == "close" and any(tag == markup.tag for tag, _ in open_lines):
             tag, first = open_lines.pop()
-            while tag != piece.tag:
+            while tag != markup.tag:
                 tag, first = open_lines.pop()
             if line > first:
                 result.append(types.FoldingRange(first, line))

@@ -46,9 +46,9 @@ class Project:
 
     def get_analysis(self, path: str) -> DocumentAnalysis | None:
         """Return the analysis of a document, open or on disk; None if it cannot be read."""
-        known = self.open.get(self.find_uri(path))
-        if known is not None:
-            return known
+        open_analysis = self.open.get(self.find_uri(path))
+        if open_analysis is not None:
+            return open_analysis
         try:
             return DocumentAnalysis(Text(Source.from_file(path).text, self.unit), path)
         except OsimliteError:
@@ -65,15 +65,15 @@ class Project:
         # decoded the text already.
         # Readers of files get the text in the encoding of a byte-order mark, whatever the
         # declaration says.
-        held = codecs.BOM_UTF8 + analysis.source.data
-        before = unsaved.get(path)
-        if before is None:
+        content = codecs.BOM_UTF8 + analysis.source.data
+        previous = unsaved.get(path)
+        if previous is None:
             try:
-                before = codecs.BOM_UTF8 + read_file(path).removeprefix(codecs.BOM_UTF8)
+                previous = codecs.BOM_UTF8 + read_file(path).removeprefix(codecs.BOM_UTF8)
             except OsimliteError:
                 return False
-        unsaved[path] = held
-        return before != held
+        unsaved[path] = content
+        return previous != content
 
     def close(self, uri: str) -> DocumentAnalysis | None:
         """Remove a file from the open ones, so that readers see it as it is on disk.
@@ -91,9 +91,9 @@ class Project:
         """Return the URIs of the other open files whose findings depend on a document."""
         path = os.path.realpath(analysis.file)
         result = []
-        for uri, other in self.open.items():
-            if other is not analysis and other.is_checked:
-                outside = other.subject.list_outside_paths()
+        for uri, open_analysis in self.open.items():
+            if open_analysis is not analysis and open_analysis.is_checked:
+                outside = open_analysis.subject.list_outside_paths()
                 # Unknown dependencies count as possible ones.
                 if outside is None or path in map(os.path.realpath, outside):
                     result.append(uri)
@@ -121,27 +121,32 @@ class Project:
         It searches the folder of the target, its parent folder, and the folders directly in both, and
         skips documents whose text does not contain the name.
         """
-        own = self.get_analysis(target.file)
-        if own is None or target.item is None:
+        defining = self.get_analysis(target.file)
+        if defining is None or target.item is None:
             return
-        yield own
+        yield defining
         real = os.path.realpath(target.file)
-        here = Path(real).parent
-        folders = [here, here.parent, *list_folders(here), *list_folders(here.parent)]
+        folder_of_file = Path(real).parent
+        folders = [
+            folder_of_file,
+            folder_of_file.parent,
+            *list_folders(folder_of_file),
+            *list_folders(folder_of_file.parent),
+        ]
         for folder in dict.fromkeys(map(os.path.realpath, folders)):
             for path in list_documents(folder) or ():
-                other = self.get_analysis(path) if os.path.realpath(path) != real else None
+                analysis = self.get_analysis(path) if os.path.realpath(path) != real else None
                 # A search in the text is much cheaper than an analysis, which most files of a
                 # project do not need.
-                if other is not None and target.item.name in other.text.content:
-                    yield other
+                if analysis is not None and target.item.name in analysis.text.content:
+                    yield analysis
 
     def find_references(self, target: Target) -> list[types.Location]:
         """Return the locations of all names that refer to a target."""
         return [
-            types.Location(self.find_uri(analysis.file), analysis.text.range(*place))
+            types.Location(self.find_uri(analysis.file), analysis.text.range(*word_range))
             for analysis in self.find_documents_naming(target)
-            for place in analysis.find_references(target)
+            for word_range in analysis.find_references(target)
         ]
 
     def compute_rename(self, target: Target, name: str) -> dict[str, list[types.TextEdit]]:
@@ -157,66 +162,70 @@ class Project:
         Raises:
             ModelError: the name is illegal or in use, or the component has no name in the text.
         """
-        own = self.get_analysis(target.file)
-        item = None if own is None or target.number is None else own.objects.get(target.number)
-        place = (
+        defining = self.get_analysis(target.file)
+        component = (
             None
-            if own is None or item is None or item._index is None
-            else own.find_name_range(item._index)
+            if defining is None or target.number is None
+            else defining.objects.get(target.number)
+        )
+        name_range = (
+            None
+            if defining is None or component is None or component._index is None
+            else defining.find_name_range(component._index)
         )
         if (
-            own is None
-            or item is None
-            or place is None
+            defining is None
+            or component is None
+            or name_range is None
             or target.item is None
-            or item.name != target.item.name
+            or component.name != target.item.name
         ):
             raise ModelError(
                 f"the text does not give '{target.path or target.file}' a name; nothing can be renamed"
             )
-        path, changes = f"/{name}", {}
-        if own.document is not None and own.document.model is not None:
-            path, edits = _compute_model_edits(own, item, name)
+        path, edits_by_uri = f"/{name}", {}
+        if defining.document is not None and defining.document.model is not None:
+            path, edits = _compute_model_edits(defining, component, name)
         else:
             if not name or any(character in name for character in ILLEGAL_CHARACTERS):
                 raise ModelError(f"'{name}' is not a legal name")
-            edits = _compute_setup_edits(own, target, path)
+            edits = _compute_setup_edits(defining, target, path)
         # The name itself first, then all references.
-        edits.insert(0, types.TextEdit(own.text.range(*place), name))
-        changes[self.find_uri(own.file)] = edits
-        for other in self.find_documents_naming(target):
-            edits = _compute_setup_edits(other, target, path) if other is not own else []
+        edits.insert(0, types.TextEdit(defining.text.range(*name_range), name))
+        edits_by_uri[self.find_uri(defining.file)] = edits
+        for analysis in self.find_documents_naming(target):
+            edits = _compute_setup_edits(analysis, target, path) if analysis is not defining else []
             if edits:
-                changes[self.find_uri(other.file)] = edits
-        return changes
+                edits_by_uri[self.find_uri(analysis.file)] = edits
+        return edits_by_uri
 
 
 def _compute_model_edits(
-    analysis: DocumentAnalysis, item: object, name: str
+    analysis: DocumentAnalysis, component: object, name: str
 ) -> tuple[str, list[types.TextEdit]]:
     """Compute the edits of the references in the model that contains a component.
 
     Args:
         analysis: the document.
-        item: the component.
+        component: the component.
         name: its new name.
 
     Returns:
         The new path of the component, and the edits.
     """
-    assert isinstance(item, Component) and item._index is not None
+    assert isinstance(component, Component) and component._index is not None
     # Renaming changes the model, so a second one is read from the same text.
-    twin = DocumentAnalysis(analysis.text, analysis.file)
-    assert twin.document is not None and twin.document.model is not None
-    target, model = twin.objects[item._index], twin.document.model
+    copied = DocumentAnalysis(analysis.text, analysis.file)
+    assert copied.document is not None and copied.document.model is not None
+    target, model = copied.objects[component._index], copied.document.model
     assert isinstance(target, Component)
-    own, uses = twin.find_name_range(item._index), twin.uses
+    name_range, uses = copied.find_name_range(component._index), copied.uses
     rename_component(model, target, name)
     edits = []
     for use, start, end in uses:
         value = getattr(use.holder, use.spec.name)
         text = value if use.position is None else value[use.position]
-        if text != use.value and (start, end) != own:
+        if text != use.value and (start, end) != name_range:
             edits.append(types.TextEdit(analysis.text.range(start, end), str(text)))
     return model.tree().path_of(target) or f"/{name}", edits
 
@@ -234,13 +243,13 @@ def _compute_setup_edits(
     edits = []
     for use, start, end in analysis.uses:
         text = str(use.value)
-        led = analysis.resolve_use(use)
-        if led is None or os.path.realpath(led.file) != os.path.realpath(target.file):
+        use_target = analysis.resolve_use(use)
+        if use_target is None or os.path.realpath(use_target.file) != os.path.realpath(target.file):
             continue
         if text.startswith("/") and target.path and f"{text}/".startswith(f"{target.path}/"):
             edits.append(
                 types.TextEdit(analysis.text.range(start, end), path + text[len(target.path) :])
             )
-        elif target.is_same_as(led) and not text.startswith("/"):
+        elif target.is_same_as(use_target) and not text.startswith("/"):
             edits.append(types.TextEdit(analysis.text.range(start, end), get_last_name(path)))
     return edits

@@ -126,7 +126,7 @@ class Server(LanguageServer):
         # key press.
         await asyncio.sleep(max(pause, self._check_durations.get(uri, 0.0)))
         analysis = self.project.open[uri]
-        began = time.monotonic()
+        start_time = time.monotonic()
         try:
             result = list_diagnostics(analysis)
         except OsimliteError as error:
@@ -137,7 +137,7 @@ class Server(LanguageServer):
             # No caller awaits this task, so asyncio would drop the exception.
             self.report_server_error(error, FeatureRequestError)
             return
-        self._check_durations[uri] = min(time.monotonic() - began, MAX_CHECK_DELAY_S)
+        self._check_durations[uri] = min(time.monotonic() - start_time, MAX_CHECK_DELAY_S)
         self._publish(uri, result)
         # Completion and names use the last readable version while the text is half typed.
         if analysis.is_readable:
@@ -162,11 +162,11 @@ class Server(LanguageServer):
         version = None if document is None else document.version
         self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, result, version))
 
-    def get_position(self, place: DocumentPosition) -> tuple[DocumentAnalysis, int]:
+    def get_position(self, position: DocumentPosition) -> tuple[DocumentAnalysis, int]:
         """Return the analysis and the character offset that a request names.
 
         Args:
-            place: parameters of the request.
+            position: parameters of the request.
 
         Returns:
             The analysis of the open file, and the offset in its text in characters.
@@ -174,8 +174,8 @@ class Server(LanguageServer):
         Raises:
             JsonRpcInvalidParams: the file is not open.
         """
-        analysis = self.get_analysis(place.text_document)
-        return analysis, analysis.text.offset(place.position)
+        analysis = self.get_analysis(position.text_document)
+        return analysis, analysis.text.offset(position.position)
 
     def get_analysis(self, document: types.TextDocumentIdentifier) -> DocumentAnalysis:
         """Return the analysis of an open document.
@@ -188,9 +188,9 @@ class Server(LanguageServer):
             raise JsonRpcInvalidParams(f"{document.uri} is not open")
         return analysis
 
-    def find_target(self, place: DocumentPosition) -> Target | None:
+    def find_target(self, position: DocumentPosition) -> Target | None:
         """Return the object or file that the name at a position refers to; None without one."""
-        analysis, offset = self.get_position(place)
+        analysis, offset = self.get_position(position)
         return analysis.find_target(offset)
 
 
@@ -261,12 +261,12 @@ def _register_queries(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)
     def complete(_: Server, params: types.CompletionParams) -> types.CompletionList:
         analysis, offset = server.get_position(params)
-        known = (
+        readable = (
             analysis
             if analysis.is_readable
             else server.project.last_readable.get(params.text_document.uri)
         )
-        return types.CompletionList(False, list_completions(analysis, known, offset))
+        return types.CompletionList(False, list_completions(analysis, readable, offset))
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def find_definition(_: Server, params: types.DefinitionParams) -> types.Location | None:
@@ -278,9 +278,15 @@ def _register_queries(server: Server) -> None:
         target = server.find_target(params)
         if target is None:
             return []
-        places = server.project.find_references(target)
-        own = server.project.find_location(target) if params.context.include_declaration else None
-        return [own, *places] if own is not None and own not in places else places
+        locations = server.project.find_references(target)
+        definition = (
+            server.project.find_location(target) if params.context.include_declaration else None
+        )
+        return (
+            [definition, *locations]
+            if definition is not None and definition not in locations
+            else locations
+        )
 
     @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     def show_outline(_: Server, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
@@ -303,11 +309,12 @@ def _register_edits(server: Server) -> None:
         result = list_code_actions(
             server.get_analysis(params.text_document), params.text_document.uri, params.range
         )
-        wanted = params.context.only
+        requested_kinds = params.context.only
         return [
-            a
-            for a in result
-            if not wanted or any((a.kind or "").startswith(kind) for kind in wanted)
+            action
+            for action in result
+            if not requested_kinds
+            or any((action.kind or "").startswith(action_kind) for action_kind in requested_kinds)
         ]
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
@@ -318,11 +325,16 @@ def _register_edits(server: Server) -> None:
         target = analysis.find_target(offset)
         if target is None or target.item is None or server.project.find_location(target) is None:
             return None
-        spots = [*analysis.find_references(target)]
+        word_ranges = [*analysis.find_references(target)]
         if target.file == analysis.file and target.number is not None:
-            spots.append(analysis.find_label_range(target.number))
-        place = next((spot for spot in spots if spot[0] <= offset <= spot[1]), (offset, offset))
-        return types.PrepareRenamePlaceholder(analysis.text.range(*place), target.item.name)
+            word_ranges.append(analysis.find_label_range(target.number))
+        word_at_cursor = next(
+            (word_range for word_range in word_ranges if word_range[0] <= offset <= word_range[1]),
+            (offset, offset),
+        )
+        return types.PrepareRenamePlaceholder(
+            analysis.text.range(*word_at_cursor), target.item.name
+        )
 
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
     def rename(_: Server, params: types.RenameParams) -> types.WorkspaceEdit | None:
@@ -340,6 +352,6 @@ def _register_edits(server: Server) -> None:
         if not analysis.is_readable:
             return []
         content = analysis.text.content
-        after = format_source(analysis.source)
-        whole = analysis.text.range(0, len(content))
-        return [] if after == content else [types.TextEdit(whole, after)]
+        formatted = format_source(analysis.source)
+        full_range = analysis.text.range(0, len(content))
+        return [] if formatted == content else [types.TextEdit(full_range, formatted)]

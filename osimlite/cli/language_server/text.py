@@ -53,10 +53,10 @@ class Text:
     def position(self, offset: int) -> types.Position:
         """Convert an offset to a position."""
         line = bisect_right(self._starts, offset) - 1
-        before = self.content[self._starts[line] : offset]
-        if self._is_plain or before.isascii():
-            return types.Position(line, len(before))
-        return types.Position(line, sum(map(self._width, before)))
+        line_start = self.content[self._starts[line] : offset]
+        if self._is_plain or line_start.isascii():
+            return types.Position(line, len(line_start))
+        return types.Position(line, sum(map(self._width, line_start)))
 
     def range(self, start: int, end: int) -> types.Range:
         """Convert two offsets to a range.

@@ -41,9 +41,12 @@ def human() -> Model:
     for side in "rl":
         heel = forces[f"heel_{side}_force"]
         ball = forces[f"ball_{side}_force"]
-        (own,), (other,) = heel.contact_parameters.objects, ball.contact_parameters.objects
+        (heel_parameters,), (ball_parameters,) = (
+            heel.contact_parameters.objects,
+            ball.contact_parameters.objects,
+        )
         # SCONE expects one contact force per foot: heel and ball share it.
-        own.geometry = (*own.geometry[:1], *other.geometry)
+        heel_parameters.geometry = (*heel_parameters.geometry[:1], *ball_parameters.geometry)
         heel.name = f"foot_{side}"
         model.remove(ball)
     for coordinate in model.components(Coordinate):
