@@ -52,15 +52,21 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
     with build_simulation(job, model) as simulation:
         # Either states or coordinates define the motion; states have precedence.
         if states is None:
-            first, rows, record = _read_coordinate_motion(job, outcome, simulation, model)
+            first_row, rows, record = _read_coordinate_motion(job, outcome, simulation, model)
         else:
-            given = StateRows.read(job, states, simulation)
-            given.report_missing(outcome)
-            first, last = given.find_row(setup.initial_time), given.find_row(setup.final_time)
-            table, record = given.table, lambda: (given.table.times, given.read_speeds(simulation))
+            state_rows = StateRows.read(job, states, simulation)
+            state_rows.report_missing(outcome)
+            first_row, last_row = (
+                state_rows.find_row(setup.initial_time),
+                state_rows.find_row(setup.final_time),
+            )
+            table, record = (
+                state_rows.table,
+                lambda: (state_rows.table.times, state_rows.read_speeds(simulation)),
+            )
             rows = (
-                (float(table.times[k]), given.create_state(simulation, k))
-                for k in range(first, last + 1)
+                (float(table.times[k]), state_rows.create_state(simulation, k))
+                for k in range(first_row, last_row + 1)
             )
         moments = list(rows)
         if not moments:
@@ -79,9 +85,9 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
             result,
             record=record,
             unbalanced=unbalanced,
-            simulate=lambda changed: build_simulation(job, changed),
+            simulate=lambda changed_model: build_simulation(job, changed_model),
         )
-        compute_analyses(job, outcome, analyses, motion, first)
+        compute_analyses(job, outcome, analyses, motion, first_row)
     report_rows(job, outcome, motion)
 
 
@@ -139,8 +145,8 @@ def _describe_spans(times: Array, selected: BoolArray) -> str:
     # Padding with False makes every span begin and end with a change.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], selected, [False]]).astype(int)))
     spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
-    words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
-    return join_words(words, max_count=MAX_NAMED_SPANS)
+    descriptions = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
+    return join_words(descriptions, max_count=MAX_NAMED_SPANS)
 
 
 def _read_coordinate_motion(
@@ -162,25 +168,27 @@ def _read_coordinate_motion(
     mechanism = simulation.mechanism
     recorded = RecordedMotion.read(mechanism, job.require_path("coordinates_file"))
     infos = enumerate(mechanism.coordinates)
-    if absent := {
+    if missing_indices := {
         info.name: k for k, info in infos if info.name in recorded.missing and not info.locked
     }:
         # OpenSim's analyses use 0 here, and its inverse dynamics the default values.
-        recorded.values[:, [*absent.values()]] = 0.0
-        outcome.add_message("not in the file", f"{join_words([*absent])}: 0 is used, as in OpenSim")
+        recorded.values[:, [*missing_indices.values()]] = 0.0
+        outcome.add_message(
+            "not in the file", f"{join_words([*missing_indices])}: 0 is used, as in OpenSim"
+        )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)
-    before = recorded
+    complete_motion = recorded
     recorded = recorded.between(setup.initial_time, setup.final_time)
     # OpenSim uses the rates of the coordinates as speeds, before the constraints change the
     # values.
-    given = job.find_path("speeds_file")
-    others: dict[int, Array] = {}
-    if given is None:
+    speeds_path = job.find_path("speeds_file")
+    auxiliary_columns: dict[int, Array] = {}
+    if speeds_path is None:
         speeds = recorded.rates[0]
     else:
-        record, speeds, others = _read_speeds(job, given, recorded, simulation)
+        record, speeds, auxiliary_columns = _read_speeds(job, speeds_path, recorded, simulation)
     rows = zip(
         recorded.times.tolist(),
         *satisfy_constraints(recorded, speeds, simulation, model),
@@ -190,12 +198,18 @@ def _read_coordinate_motion(
     def states() -> Iterator[tuple[float, list[float]]]:
         for number, (t, q, u) in enumerate(rows):
             y = simulation.state.pack(q.tolist(), u.tolist())
-            for index, column in others.items():
+            for index, column in auxiliary_columns.items():
                 y[index] = float(column[number])
             yield t, y
 
-    first = int(np.searchsorted(before.times, recorded.times[0]))
-    return first, states(), lambda: (before.times, before.rates[0]) if given is None else record
+    first_row = int(np.searchsorted(complete_motion.times, recorded.times[0]))
+    return (
+        first_row,
+        states(),
+        lambda: (
+            (complete_motion.times, complete_motion.rates[0]) if speeds_path is None else record
+        ),
+    )
 
 
 def _read_speeds(
@@ -234,10 +248,10 @@ def _read_speeds(
     for name, index in columns.items():
         speeds[:, paths.index(name)] = table.rows[:, index]
     state = simulation.state
-    first = 2 * len(state.order)
-    auxiliary = match_state_columns(table.columns, state.paths)
-    others = {
-        first + state.paths.index(name): table.rows[rows, index]
-        for name, index in auxiliary.items()
+    first_auxiliary = 2 * len(state.order)
+    auxiliary_indices = match_state_columns(table.columns, state.paths)
+    auxiliary_columns = {
+        first_auxiliary + state.paths.index(name): table.rows[rows, index]
+        for name, index in auxiliary_indices.items()
     }
-    return (table.times, speeds), speeds[rows], others
+    return (table.times, speeds), speeds[rows], auxiliary_columns

@@ -75,29 +75,29 @@ class ActuatorControl:
     bounds: tuple[list[ControlLinearNode], list[ControlLinearNode]] = ((), ())  # type: ignore[assignment]
 
     @classmethod
-    def create(cls, actuator: Any, given: ControlSet | None) -> ActuatorControl:
+    def create(cls, actuator: Any, bounds_set: ControlSet | None) -> ActuatorControl:
         """Return the control of an actuator.
 
         Args:
             actuator: actuator of the model.
-            given: bounds from a document, by the name of the actuator; None without a document.
+            bounds_set: bounds from a document, by the name of the actuator; None without a document.
         """
         controls = (
             []
-            if given is None
-            else [item for item in given.objects if isinstance(item, ControlLinear)]
+            if bounds_set is None
+            else [control for control in bounds_set.objects if isinstance(control, ControlLinear)]
         )
         # Controls are named like the actuator, with or without the suffix of excitations.
         for name in (actuator.name + EXCITATION, actuator.name):
-            bounds = next((item for item in controls if item.name == name), None)
+            bounds = next((control for control in controls if control.name == name), None)
             if bounds is not None:
                 return cls._create_from_bounds(bounds)
-        low = (
+        lower = (
             max(actuator.min_control, -UNBOUNDED_CONTROL)
             if actuator.min_control == -inf
             else actuator.min_control
         )
-        high = (
+        upper = (
             min(actuator.max_control, UNBOUNDED_CONTROL)
             if actuator.max_control == inf
             else actuator.max_control
@@ -105,9 +105,9 @@ class ActuatorControl:
         is_muscle = isinstance(actuator, Muscle)
         # The bounds of muscles are raised, so that no muscle is switched off.
         if is_muscle:
-            low, high = max(low, MIN_MUSCLE_BOUND), max(high, MIN_MUSCLE_UPPER_BOUND)
+            lower, upper = max(lower, MIN_MUSCLE_BOUND), max(upper, MIN_MUSCLE_UPPER_BOUND)
         return cls(
-            actuator.name + EXCITATION, is_muscle, lambda t: low, lambda t: high, (low, high)
+            actuator.name + EXCITATION, is_muscle, lambda t: lower, lambda t: upper, (lower, upper)
         )
 
     @classmethod
@@ -153,12 +153,12 @@ class ActuatorControl:
             end: end of the window, s.
             value: control at the end.
         """
-        last = self.values[-1] if self.values else value
+        last_value = self.values[-1] if self.values else value
         if self.is_step:
-            return PiecewiseConstant((start, nextafter(start, inf)), (last, value))
-        before = self.times[-1] if self.times else start
-        slope = (value - last) / (end - before) if self.times else 0.0
-        return PiecewisePolynomial(np.array([before]), np.array([[last, slope]]))
+            return PiecewiseConstant((start, nextafter(start, inf)), (last_value, value))
+        last_time = self.times[-1] if self.times else start
+        slope = (value - last_value) / (end - last_time) if self.times else 0.0
+        return PiecewisePolynomial(np.array([last_time]), np.array([[last_value, slope]]))
 
     def create_document(self) -> ControlLinear:
         """Return the control as the object that OpenSim writes."""
@@ -254,7 +254,7 @@ class ComputedControl:
         result.times.append(start)
         result.states.append(list(y))
 
-        def note(t: float, state: list[float]) -> None:
+        def record_state(t: float, state: list[float]) -> None:
             result.times.append(t)
             result.states.append(state)
 
@@ -270,7 +270,7 @@ class ComputedControl:
             try:
                 # The integrator keeps its step size from window to window.
                 if stepper is None:
-                    stepper = self.engine.make_stepper(t, list(y), settings, note)
+                    stepper = self.engine.make_stepper(t, list(y), settings, record_state)
                 stepper.tabulate([stop])
                 stepper.catch_up()
             except SimulationError as error:
@@ -313,61 +313,68 @@ class ComputedControl:
         state = self.engine.state
         q = np.array(state.values(y))
         u = np.array(state.speeds(y))
-        now, ahead = self.desired.evaluate(np.array([t, target]))
+        desired_now, desired_ahead = self.desired.evaluate(np.array([t, target]))
         # The prediction adds the present deviation to the desired pose at the end of the window.
-        self._corrections = np.stack([q - now[0], u - now[1]])
-        errors = self.tasks.compute_errors(now, q, u)
+        self._corrections = np.stack([q - desired_now[0], u - desired_now[1]])
+        errors = self.tasks.compute_errors(desired_now, q, u)
         result.errors[t] = errors[0]
-        requested = self.tasks.compute_accelerations(errors, ahead)
-        low, high = (
-            np.array([getattr(item, name)(t) for item in self.controls]) for name in ("low", "high")
+        requested = self.tasks.compute_accelerations(errors, desired_ahead)
+        lower, upper = (
+            np.array([getattr(control, name)(t) for control in self.controls])
+            for name in ("low", "high")
         )
         z = np.array(y[self._first :])
         self._poses.clear()
         # Forces that the actuators can reach by the end of the window.
-        least = self._predict_forces(t, target, z, low)
-        most = self._predict_forces(t, target, z, high)
+        forces_at_lower = self._predict_forces(t, target, z, lower)
+        forces_at_upper = self._predict_forces(t, target, z, upper)
         # The pose at the end of the window is predicted, not computed: it depends on the forces
         # sought.
         end = self._predict_state(target, z)
         # A control that hardly changes its force has no unique value: keep the lower bound.
-        high = np.where(most - least < MIN_FORCE_RANGE, low, high)
+        upper = np.where(forces_at_upper - forces_at_lower < MIN_FORCE_RANGE, lower, upper)
         q_end = np.array(state.values(end))
         u_end = np.array(state.speeds(end))
-        bounds = np.minimum(least, most), np.maximum(least, most)
-        forces, lacking = self.sharing.compute_forces(
+        bounds = (
+            np.minimum(forces_at_lower, forces_at_upper),
+            np.maximum(forces_at_lower, forces_at_upper),
+        )
+        forces, missing_accelerations = self.sharing.compute_forces(
             target, q_end, u_end, requested, errors[0], bounds
         )
         # The failure ends the tool; the motion so far is still written.
-        if lacking:
+        if missing_accelerations:
             result.failure = (
                 f"the actuators cannot produce the accelerations that the tasks need at {t:g} s; "
-                f"missing: {lacking} "
+                f"missing: {missing_accelerations} "
                 "(rad/s², m/s²). Append reserve actuators, widen the bounds of controls, or lower "
                 "the weights"
             )
-            return low
+            return lower
         if self.has_states:
             values = find_roots(
-                lambda x: self._predict_forces(t, target, z, x) - forces, low, high, TOLERANCE
+                lambda trial_controls: self._predict_forces(t, target, z, trial_controls) - forces,
+                lower,
+                upper,
+                TOLERANCE,
             )
         else:
             # Without states the forces are proportional to the controls.
             values = forces / self.sharing.optimal
         self._drive_window(t, target, values)
-        for item, value in zip(self.controls, values.tolist(), strict=True):
+        for control, value in zip(self.controls, values.tolist(), strict=True):
             # A window that is computed again replaces its earlier result.
-            if item.times and item.times[-1] == target:
-                del item.times[-1], item.values[-1]
-            item.times.append(target)
-            item.values.append(value)
+            if control.times and control.times[-1] == target:
+                del control.times[-1], control.values[-1]
+            control.times.append(target)
+            control.values.append(value)
         return values
 
     def _drive_window(self, t: float, target: float, values: Array) -> None:
         """Drive the model with controls of one window."""
         pairs = zip(self.controls, values.tolist(), strict=True)
         self._drive_functions(
-            [item.create_window_function(t, target, value) for item, value in pairs]
+            [control.create_window_function(t, target, value) for control, value in pairs]
         )
 
     def _drive_functions(self, functions: Sequence[SmoothFunction]) -> None:
@@ -380,7 +387,7 @@ class ComputedControl:
 
     def drive_all_windows(self) -> None:
         """Drive the model with the computed controls of all windows."""
-        self._drive_functions([item.create_function() for item in self.controls])
+        self._drive_functions([control.create_function() for control in self.controls])
 
     def _predict_forces(self, t: float, target: float, z: Array, controls: Array) -> Array:
         """Predict the forces of the actuators at the end of a window.
@@ -429,7 +436,7 @@ class ComputedControl:
             self._poses[t] = y[: self._first]
 
     def _predict_auxiliary_states(
-        self, t: float, target: float, z: Array, controls: Array, *, held: bool = False
+        self, t: float, target: float, z: Array, controls: Array, *, is_pose_fixed: bool = False
     ) -> Array:
         """Integrate the auxiliary states over a window along predicted poses, by Merson's method.
 
@@ -438,7 +445,7 @@ class ComputedControl:
             target: end of the window, s.
             z: auxiliary states at the start.
             controls: controls at the end.
-            held: whether the pose stays as at the start, while the muscles settle.
+            is_pose_fixed: whether the pose stays as at the start, while the muscles settle.
 
         Returns:
             Auxiliary states at the end.
@@ -446,8 +453,8 @@ class ComputedControl:
         self._drive_window(t, target, controls)
         count = len(z)
 
-        def rate(time: float, z: Array) -> Array:
-            y = self._predict_state(t if held else time, z)
+        def compute_rate(time: float, z: Array) -> Array:
+            y = self._predict_state(t if is_pose_fixed else time, z)
             status = self.engine.realize(time, y, STAGE.FORCE)
             if status:
                 raise self.engine.make_evaluation_error(status, time, y)
@@ -457,21 +464,21 @@ class ComputedControl:
         time = t
         while time < target:
             h = min(step, target - time)
-            if not held:
+            if not is_pose_fixed:
                 self._predict_poses((time, time + h / 3, time + h / 2, time + h), z)
             # Stages of Kutta-Merson, with an error estimate from the embedded method.
-            k1 = rate(time, z)
-            k2 = rate(time + h / 3, z + h / 3 * k1)
-            k3 = rate(time + h / 3, z + h / 6 * (k1 + k2))
-            k4 = rate(time + h / 2, z + h / 8 * (k1 + 3 * k3))
-            k5 = rate(time + h, z + h / 2 * (k1 - 3 * k3 + 4 * k4))
-            new = z + h / 6 * (k1 + 4 * k4 + k5)
-            off = h * np.abs(2 * k1 - 9 * k3 + 8 * k4 - k5) / 30
-            error = float(np.sqrt(np.sum(off**2) / count))
+            k1 = compute_rate(time, z)
+            k2 = compute_rate(time + h / 3, z + h / 3 * k1)
+            k3 = compute_rate(time + h / 3, z + h / 6 * (k1 + k2))
+            k4 = compute_rate(time + h / 2, z + h / 8 * (k1 + 3 * k3))
+            k5 = compute_rate(time + h, z + h / 2 * (k1 - 3 * k3 + 4 * k4))
+            next_z = z + h / 6 * (k1 + 4 * k4 + k5)
+            error_estimate = h * np.abs(2 * k1 - 9 * k3 + 8 * k4 - k5) / 30
+            error = float(np.sqrt(np.sum(error_estimate**2) / count))
             # A step below 1 ns is accepted in any case, so that the prediction ends.
             if error <= PREDICTION_TOLERANCE or h < 1e-9:
                 time = target if h == target - time else time + h
-                z = new
+                z = next_z
             # Step control of a fourth-order method, with the usual limits of growth.
             factor = 0.9 * (PREDICTION_TOLERANCE / error) ** 0.25 if error else 5.0
             step = min(MAX_PREDICTION_STEP_S, h * min(5.0, max(0.1, factor)))
@@ -499,23 +506,25 @@ class ComputedControl:
         # Two rounds bring the states close to equilibrium at this control.
         small = np.full(len(self.controls), SETTLING_CONTROL)
         for _ in range(2):
-            z = self._predict_auxiliary_states(start, start + SETTLING_TIME_S, z, small, held=True)
+            z = self._predict_auxiliary_states(
+                start, start + SETTLING_TIME_S, z, small, is_pose_fixed=True
+            )
         target = start + FIRST_MUSCLE_WINDOW_S
-        for last in (False, True):
-            for item in self.controls:
-                item.times.clear()
-                item.values.clear()
+        for is_last in (False, True):
+            for control in self.controls:
+                control.times.clear()
+                control.values.clear()
             values = self.compute_controls(start, target, [*y[: self._first], *z.tolist()], result)
-            for item in self.controls:
-                item.times.clear()
-                item.values.clear()
+            for control in self.controls:
+                control.times.clear()
+                control.values.clear()
             if result.failure:
                 return start, y
-            if not last:
+            if not is_last:
                 z = self._predict_auxiliary_states(
-                    start, start + SETTLING_TIME_S, z, values, held=True
+                    start, start + SETTLING_TIME_S, z, values, is_pose_fixed=True
                 )
         y = self._predict_state(target, self._predict_auxiliary_states(start, target, z, values))
-        for item, value in zip(self.controls, values.tolist(), strict=True):
-            item.times, item.values = [target], [value]
+        for control, value in zip(self.controls, values.tolist(), strict=True):
+            control.times, control.values = [target], [value]
         return target, y

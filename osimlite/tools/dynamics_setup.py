@@ -42,20 +42,20 @@ def find_analyses(job: Job) -> Analyses:
     """
     setup: AbstractTool = job.setup
     result = []
-    for item in setup.analysis_set.objects:
-        if item.on:
-            tag = type(item).__name__
-            if tag not in ANALYSES:
+    for analysis in setup.analysis_set.objects:
+        if analysis.on:
+            class_name = type(analysis).__name__
+            if class_name not in ANALYSES:
                 raise job.create_unsupported_error(
-                    f"the analysis '{item.name}' is a {tag}, which osimlite cannot compute yet; "
+                    f"the analysis '{analysis.name}' is a {class_name}, which osimlite cannot compute yet; "
                     "switch it off with <on>false</on>"
                 )
-            result.append((item, import_function(ANALYSES[tag])))
+            result.append((analysis, import_function(ANALYSES[class_name])))
     return result
 
 
 def compute_analyses(
-    job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first: int = 0
+    job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first_row: int = 0
 ) -> None:
     """Compute analyses along the rows of a motion.
 
@@ -67,17 +67,23 @@ def compute_analyses(
         outcome: collects the tables.
         analyses: analyses with the functions that compute them.
         motion: all rows.
-        first: number of the first row in the file of the motion.
+        first_row: number of the first row in the file of the motion.
     """
-    numbers = np.arange(first, first + len(motion.times))
-    for item, write in analyses:
-        part = motion
-        if item.step_interval > 1:
-            selected = numbers % item.step_interval == 0
+    numbers = np.arange(first_row, first_row + len(motion.times))
+    for analysis, write in analyses:
+        selected_motion = motion
+        if analysis.step_interval > 1:
+            selected = numbers % analysis.step_interval == 0
             # OpenSim always analyses the first and the last row.
             selected[[0, -1]] = True
-            part = motion.select_times(selected)
-        write(item, part, AnalysisTables(job, outcome, item.name, part.times, describe_gaps(part)))
+            selected_motion = motion.select_times(selected)
+        write(
+            analysis,
+            selected_motion,
+            AnalysisTables(
+                job, outcome, analysis.name, selected_motion.times, describe_gaps(selected_motion)
+            ),
+        )
 
 
 def describe_gaps(motion: Motion) -> str:
@@ -124,24 +130,24 @@ def build_model(job: Job) -> Model:
     return model
 
 
-def _resolve_files(job: Job, item: Object) -> Any:
+def _resolve_files(job: Job, setup_object: Object) -> Any:
     """Make the paths in an object of the setup absolute, starting from the folder of the setup.
 
     The model that the object joins may be in another folder.
 
     Args:
         job: the setup.
-        item: object of the setup, which is changed.
+        setup_object: object of the setup, which is changed.
 
     Returns:
         The object.
     """
-    for part in item.walk():
-        for spec in get_file_specs(type(part), "file"):
-            path = job.resolve_name(str(getattr(part, spec.name) or ""))
+    for component in setup_object.walk():
+        for spec in get_file_specs(type(component), "file"):
+            path = job.resolve_name(str(getattr(component, spec.name) or ""))
             if path is not None:
-                part.assign(spec.name, str(path.absolute()))
-    return item
+                component.assign(spec.name, str(path.absolute()))
+    return setup_object
 
 
 def build_simulation(job: Job, model: Model) -> Simulation:
@@ -164,7 +170,7 @@ def build_simulation(job: Job, model: Model) -> Simulation:
 
 
 def build_static_optimization(
-    job: Job, model: Model, mechanism: Mechanism, **choices: Any
+    job: Job, model: Model, mechanism: Mechanism, **options: Any
 ) -> StaticOptimization:
     """Return the static optimization of a model under the loads of a setup, as in OpenSim.
 
@@ -172,7 +178,7 @@ def build_static_optimization(
         job: the setup.
         model: its model.
         mechanism: mechanism of the model.
-        choices: options of :class:`StaticOptimization`.
+        options: options of :class:`StaticOptimization`.
     """
     return StaticOptimization(
         model,
@@ -180,7 +186,7 @@ def build_static_optimization(
         external_loads=job.find_path("external_loads_file"),
         folder=job.require_path("model_file").parent,
         early_return=True,
-        **choices,
+        **options,
     )
 
 
@@ -259,16 +265,20 @@ class StateRows(NamedTuple):
             simulation: simulation of the model.
             row: number of the row.
         """
-        known = {path: float(self.table.rows[row, index]) for path, index in self.columns.items()}
-        auxiliary = [path for path in simulation.state.paths if path in known]
-        moving = {path: value for path, value in known.items() if path not in auxiliary}
-        q, u, _ = resolve_initial_values(simulation.mechanism, moving, {})
+        values_by_path = {
+            path: float(self.table.rows[row, index]) for path, index in self.columns.items()
+        }
+        auxiliary = [path for path in simulation.state.paths if path in values_by_path]
+        values_of_coordinates = {
+            path: value for path, value in values_by_path.items() if path not in auxiliary
+        }
+        q, u, _ = resolve_initial_values(simulation.mechanism, values_of_coordinates, {})
         if simulation.constraints:
             q = simulation.mechanism.assemble(q, float(self.table.times[row])).tolist()
         y = simulation.state.pack(q, u)
-        first = 2 * len(simulation.state.order)
+        first_auxiliary = 2 * len(simulation.state.order)
         for path in auxiliary:
-            y[first + simulation.state.paths.index(path)] = known[path]
+            y[first_auxiliary + simulation.state.paths.index(path)] = values_by_path[path]
         return y
 
     def read_speeds(self, simulation: Simulation) -> Array:

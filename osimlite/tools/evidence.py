@@ -85,14 +85,14 @@ class Steps(NamedTuple):
         return list(pairwise(self.strikes))
 
 
-def find_steps(loads: Path, up: int) -> dict[str, Steps]:
+def find_steps(loads: Path, up_axis: int) -> dict[str, Steps]:
     """Find the steps of the right ("r") and the left foot ("l") from vertical forces on bodies.
 
     The name of a body says its side, as in ``calcn_r``.
 
     Args:
         loads: file of ExternalLoads.
-        up: axis of ground that points up (0, 1, 2).
+        up_axis: axis of ground that points up (0, 1, 2).
 
     Returns:
         Steps by side.
@@ -105,7 +105,7 @@ def find_steps(loads: Path, up: int) -> dict[str, Steps]:
     result: dict[str, Array] = {}
     for force in document.objects:
         side = split_side(str(force.applied_to_body))[1]
-        label = f"{(force.force_identifier or '').strip()}{'xyz'[up]}"
+        label = f"{(force.force_identifier or '').strip()}{'xyz'[up_axis]}"
         # Several forces, for example of two plates, may act on one foot.
         if side and label in table.columns:
             result[side] = result.get(side, 0.0) + table[label]
@@ -114,22 +114,22 @@ def find_steps(loads: Path, up: int) -> dict[str, Steps]:
     }
 
 
-def _detect_steps(times: Array, stands: Any) -> Steps:
+def _detect_steps(times: Array, is_stance: Any) -> Steps:
     """Return strikes and toe-offs; merge phases that are shorter than `MIN_PHASE_S`."""
     # Phases of stance and swing between the changes.
-    changes = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
+    changes = [0, *(np.flatnonzero(np.diff(is_stance)) + 1).tolist(), len(is_stance)]
     spans = [(first, last) for first, last in pairwise(changes) if last > first]
-    kept: list[list[int]] = []
+    phases: list[list[int]] = []
     for first, last in spans:
         is_brief = times[min(last, len(times) - 1)] - times[first] < MIN_PHASE_S
         # A brief phase joins the one before, and so does the next of the same kind.
-        if kept and (is_brief or stands[kept[-1][0]] == stands[first]):
-            kept[-1][1] = last
+        if phases and (is_brief or is_stance[phases[-1][0]] == is_stance[first]):
+            phases[-1][1] = last
         else:
-            kept.append([first, last])
+            phases.append([first, last])
     # The first phase begins before the data, so it gives no event.
-    strikes = tuple(float(times[first]) for first, _ in kept if stands[first] and first > 0)
-    offs = tuple(float(times[first]) for first, _ in kept if not stands[first] and first > 0)
+    strikes = tuple(float(times[first]) for first, _ in phases if is_stance[first] and first > 0)
+    offs = tuple(float(times[first]) for first, _ in phases if not is_stance[first] and first > 0)
     return Steps(strikes, offs)
 
 
@@ -156,9 +156,9 @@ def find_root_coordinates(mechanism: Mechanism) -> tuple[int, ...]:
         only one has fewer than three coordinates.
     """
     roots = [body.mobilizer.coordinates for body in mechanism.bodies if body.parent == GROUND]
-    moving = [coordinates for coordinates in roots if coordinates]
+    moving_roots = [coordinates for coordinates in roots if coordinates]
     # A model that a hinge connects to ground does not move freely.
-    return moving[0] if len(moving) == 1 and len(moving[0]) >= 3 else ()
+    return moving_roots[0] if len(moving_roots) == 1 and len(moving_roots[0]) >= 3 else ()
 
 
 def try_find_steps(evidence: Evidence) -> dict[str, Steps]:

@@ -76,23 +76,23 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         measured=motion.measured,
         places=motion.places,
     )
-    if words := describe_unknown(model, NO_EFFECT):
-        outcome.add_warning("unknown classes", words)
+    if message := describe_unknown(model, NO_EFFECT):
+        outcome.add_warning("unknown classes", message)
     outcome.summary |= motion.summary
-    for words in describe_fit(motion):
-        outcome.add_message("markers", words)
+    for message in describe_fit(motion):
+        outcome.add_message("markers", message)
     requested = [
         task.name
         for task in setup.ik_task_set.objects
         if task.apply and isinstance(task, IKMarkerTask)
     ]
-    for what, names in (
+    for category, names in (
         ("not fitted", [name for name in data.names if name not in motion.markers]),
         ("not in the data", [name for name in requested if name not in data.names]),
     ):
         if names:
-            outcome.summary[what.replace(" ", "_")] = names
-            outcome.add_message(what, join_words(names))
+            outcome.summary[category.replace(" ", "_")] = names
+            outcome.add_message(category, join_words(names))
 
 
 def run_scale_tool(job: Job, outcome: Outcome) -> None:
@@ -115,8 +115,8 @@ def run_scale_tool(job: Job, outcome: Outcome) -> None:
             outcome.add_message("left out", note)
     if result.placed is not None:
         outcome.summary |= result.placed.pose.summary
-        for words in result.placed.describe_pose():
-            outcome.add_message("markers", words)
+        for message in result.placed.describe_pose():
+            outcome.add_message("markers", message)
 
 
 def run_imu_placer(job: Job, outcome: Outcome) -> None:
@@ -130,20 +130,22 @@ def run_imu_placer(job: Job, outcome: Outcome) -> None:
     model = job.read_model()
     data = OrientationData.from_source(job.require_path("orientation_file_for_calibration"))
     data = data.rotate_ground(setup.sensor_to_opensim_rotations)
-    placed = place_sensors(model, data, setup.base_imu_label, setup.base_heading_axis)
+    placement = place_sensors(model, data, setup.base_imu_label, setup.base_heading_axis)
     if setup.output_model_file.strip() not in NO_FILE:
         outcome.add_text(
             job.get_output_path(setup.output_model_file), to_text(model, numbers="opensim")
         )
-    outcome.summary |= placed._asdict()
-    outcome.add_message("placed", join_words(placed.names, max_count=100))
-    if placed.left_out:
+    outcome.summary |= placement._asdict()
+    outcome.add_message("placed", join_words(placement.names, max_count=100))
+    if placement.left_out:
         outcome.add_message(
-            "left out", f"{join_words(placed.left_out)}: the model has no frames with these names"
+            "left out",
+            f"{join_words(placement.left_out)}: the model has no frames with these names",
         )
-    if placed.heading is not None:
+    if placement.heading is not None:
         outcome.add_message(
-            "heading", f"rotated by {math.degrees(placed.heading):.6g} degrees about the vertical"
+            "heading",
+            f"rotated by {math.degrees(placement.heading):.6g} degrees about the vertical",
         )
 
 
@@ -170,10 +172,10 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     )
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}
     weights = {
-        item.name: item.weight
+        sensor_weight.name: sensor_weight.weight
         # Of several weights of one sensor the first counts.
-        for item in reversed(setup.orientation_weights.objects)
-        if item.name in frames
+        for sensor_weight in reversed(setup.orientation_weights.objects)
+        if sensor_weight.name in frames
     }
     motion = inverse_kinematics(model, orientations=data, weights=weights)
     requested, folder = (
@@ -181,7 +183,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         for name in (setup.output_motion_file, setup.results_directory)
     )
     # The setup may be from Windows.
-    beside, _, name = requested.replace("\\", "/").rpartition("/")
+    output_folder, _, name = requested.replace("\\", "/").rpartition("/")
     name = name or f"ik_{file.stem}"
     tables = {
         name if "." in name else f"{name}.mot": replace(
@@ -203,7 +205,9 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         if folder or job.output is not None:
             outcome.add_typed_table(job.get_results_path(file_name), table)
         elif requested:
-            outcome.add_typed_table(job.get_output_path(str(Path(beside) / file_name)), table)
+            outcome.add_typed_table(
+                job.get_output_path(str(Path(output_folder) / file_name)), table
+            )
     if not outcome.tables:
         outcome.add_message(
             "nothing written",
@@ -219,9 +223,9 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         angles=motion.orientation_errors,
     )
     outcome.summary |= motion.summary
-    for words in describe_fit(motion):
-        outcome.add_message("sensors", words)
-    if silent := [name for name in data.names if name not in frames]:
+    for message in describe_fit(motion):
+        outcome.add_message("sensors", message)
+    if ignored_names := [name for name in data.names if name not in frames]:
         outcome.add_message(
-            "left out", f"{join_words(silent)}: the model has no frames with these names"
+            "left out", f"{join_words(ignored_names)}: the model has no frames with these names"
         )

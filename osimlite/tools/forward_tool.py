@@ -87,12 +87,12 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
     if path is None:
         y = simulation.initial_state({}, {})
     else:
-        given = StateRows.read(job, path, simulation)
-        given.report_missing(outcome)
-        row = given.find_row(start)
+        state_rows = StateRows.read(job, path, simulation)
+        state_rows.report_missing(outcome)
+        row = state_rows.find_row(start)
         # OpenSim starts at the time of the row, not at the initial time of the setup.
-        start = float(given.table.times[row])
-        y = given.create_state(simulation, row)
+        start = float(state_rows.table.times[row])
+        y = state_rows.create_state(simulation, row)
         if start != setup.initial_time:
             outcome.add_message(
                 "start", f"{start:g} s, the time of the row of the states file that is used"
@@ -108,22 +108,23 @@ def _write_tables(job: Job, outcome: Outcome, motion: Motion) -> None:
     simulation = motion.simulation
     times = motion.times
     precision = setup.output_precision
-    turned = [
+    rotational_paths = [
         info.path for info in motion.mechanism.coordinates if info.motion_type == "rotational"
     ]
     # The file in degrees has rotational coordinates and their speeds in degrees; translations
     # remain.
-    turning = [
-        np.degrees(1.0) if path.rpartition("/")[0] in turned else 1.0 for path in simulation.paths
+    factors = [
+        np.degrees(1.0) if path.rpartition("/")[0] in rotational_paths else 1.0
+        for path in simulation.paths
     ]
     rows: Array = np.column_stack([*motion.histories.values()])
     name = setup.name
 
-    def add(ending: str, table: StoTable, description: str = "") -> None:
+    def write_table(ending: str, table: StoTable, description: str = "") -> None:
         outcome.add_table(job.get_results_path(f"{name}_{ending}"), table, description, precision)
 
     paths = tuple(simulation.paths)
-    add("states.sto", StoTable(name, times, paths, rows))
+    write_table("states.sto", StoTable(name, times, paths, rows))
     simm = f"""
 # SIMM Motion File Header:
 name {name}
@@ -131,8 +132,12 @@ datacolumns {len(paths) + 1}
 datarows {len(times)}
 otherdata 1
 range {times[0]:f} {times[-1]:f}"""
-    add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
+    write_table(
+        "states_degrees.mot", StoTable(name, times, paths, rows * factors, in_degrees=True), simm
+    )
     labels = tuple(path.rpartition("/")[2] for path in simulation.forces.controls.names)
     # For a model without actuators OpenSim writes a table without rows.
-    result = motion.evaluate_kernels(motion.system.control_offsets) if labels else np.empty((0, 0))
-    add("controls.sto", StoTable("controls", times[: len(result)], labels, result))
+    controls = (
+        motion.evaluate_kernels(motion.system.control_offsets) if labels else np.empty((0, 0))
+    )
+    write_table("controls.sto", StoTable("controls", times[: len(controls)], labels, controls))

@@ -63,11 +63,11 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     outcome.add_table(job.get_results_path(setup.output_gen_force_file), table)
     if joints:
         # The table has the order of the tree, joint loads need that of the mechanism.
-        result = np.empty_like(table.rows)
-        result[
+        forces_of_mechanism = np.empty_like(table.rows)
+        forces_of_mechanism[
             :, [index for body in recorded.mechanism.bodies for index in body.mobilizer.coordinates]
         ] = table.rows
-        at_joints = compute_joint_loads(model, joints, recorded, result)
+        at_joints = compute_joint_loads(model, joints, recorded, forces_of_mechanism)
         outcome.add_table(job.get_results_path(setup.output_body_forces_file), at_joints)
     outcome.evidence = Evidence.from_values(
         model,
@@ -78,8 +78,8 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
         loads=loads,
     )
     row, column = np.unravel_index(int(np.abs(table.rows).argmax()), table.rows.shape)
-    most = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
-    outcome.add_message("largest", most)
+    largest = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
+    outcome.add_message("largest", largest)
     _report_residuals(outcome, recorded.mechanism, table)
 
 
@@ -96,38 +96,43 @@ def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -
     """
     names = [mechanism.coordinates[index].name for index in find_root_coordinates(mechanism)]
     weight = mechanism.total_mass * float(np.linalg.norm(mechanism.gravity))
-    for what, unit in (("force", "N"), ("moment", "N m")):
+    for quantity, unit in (("force", "N"), ("moment", "N m")):
         columns = [
-            table[label] for label in (f"{name}_{what}" for name in names) if label in table.columns
+            table[label]
+            for label in (f"{name}_{quantity}" for name in names)
+            if label in table.columns
         ]
         if columns:
             sizes = np.linalg.norm(columns, axis=0)
             rms = float(np.sqrt(np.mean(sizes**2)))
-            most = float(sizes.max())
-            outcome.summary |= {f"rms_residual_{what}": rms, f"largest_residual_{what}": most}
-            part = (
-                f", {100.0 * most / weight:.3g} % of the weight"
-                if what == "force" and weight
+            largest = float(sizes.max())
+            outcome.summary |= {
+                f"rms_residual_{quantity}": rms,
+                f"largest_residual_{quantity}": largest,
+            }
+            comparison = (
+                f", {100.0 * largest / weight:.3g} % of the weight"
+                if quantity == "force" and weight
                 else ""
             )
             outcome.add_message(
-                f"residual {what}s",
-                f"{rms:.4g} {unit} (root mean square), at most {most:.4g} {unit}{part}",
+                f"residual {quantity}s",
+                f"{rms:.4g} {unit} (root mean square), at most {largest:.4g} {unit}{comparison}",
             )
 
 
 def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
     """Return the requested joints, and report unknown names, for which OpenSim warns."""
-    known = {joint.name: joint for joint in model.joint_set.objects}
+    joints_by_name = {joint.name: joint for joint in model.joint_set.objects}
     result: list[Joint] = []
     for name in map(str, job.setup.joints_to_report_body_forces):
         if name.upper() == "ALL":
-            result += known.values()
+            result += joints_by_name.values()
             break
-        if name in known:
-            result.append(known[name])
+        if name in joints_by_name:
+            result.append(joints_by_name[name])
         else:
-            message = f"unknown joint '{name}'{suggest_name(name, known)}: its loads are left out, as in OpenSim"
+            message = f"unknown joint '{name}'{suggest_name(name, joints_by_name)}: its loads are left out, as in OpenSim"
             outcome.add_message("joints_to_report_body_forces", message)
     return result
 
@@ -155,7 +160,7 @@ def compute_joint_loads(
     """
     mechanism = recorded.mechanism
     placements = Placements(model.tree())
-    carried = {body.path: index for index, body in enumerate(mechanism.bodies)}
+    body_indices = {body.path: index for index, body in enumerate(mechanism.bodies)}
     by_joint = {body.mobilizer.joint: index for index, body in enumerate(mechanism.bodies)}
     requested, labels = [], []
     for joint in joints:
@@ -163,13 +168,13 @@ def compute_joint_loads(
         base, _ = placements.resolve_frame(frame)
         # OpenSim adds the mobilizer of the child's body and the one that has the joint's
         # coordinates; they differ if the joint closes a loop.
-        requested.append((joint, {carried[base], by_joint[placements.path(joint)]}))
+        requested.append((joint, {body_indices[base], by_joint[placements.path(joint)]}))
         root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
-        labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
+        labels += [f"{root}_{letter}{axis}" for letter in "FM" for axis in "XYZ"]
     # OpenSim has two mobilizers for a scapula: along the ellipsoid, and about the winging axis.
     hinges = [
         [
-            _split_mobilizer(mechanism, body, apart=isinstance(joint, ScapulothoracicJoint))
+            _split_mobilizer(mechanism, body, is_split=isinstance(joint, ScapulothoracicJoint))
             for body in bodies
         ]
         for joint, bodies in requested
@@ -177,8 +182,10 @@ def compute_joint_loads(
     rows = np.zeros((len(recorded.times), len(joints), 2, 3))
     for row, q, row_forces in zip(rows, recorded.values, forces, strict=True):
         state = mechanism.at(q)
-        for number, each in enumerate(hinges):
-            row[number] = sum(_compute_joint_load(state, *hinge, row_forces) for hinge in each)
+        for number, joint_hinges in enumerate(hinges):
+            row[number] = sum(
+                _compute_joint_load(state, *hinge, row_forces) for hinge in joint_hinges
+            )
     title = "Inverse Dynamics Body Forces at Specified Joints"
     return StoTable(title, recorded.times, tuple(labels), rows.reshape(len(rows), -1))
 
@@ -188,62 +195,71 @@ _Hinge = tuple[list[int], Mechanism]
 
 
 def _split_mobilizer(
-    mechanism: Mechanism, body: int, *, apart: bool
+    mechanism: Mechanism, body: int, *, is_split: bool
 ) -> tuple[int, Array, list[_Hinge]]:
     """Split the mobilizer of a body into hinges, one after another.
 
     Args:
         mechanism: mechanism of the model.
         body: index of the body.
-        apart: whether each motion of the mobilizer is a hinge of its own.
+        is_split: whether each motion of the mobilizer is a hinge of its own.
 
     Returns:
         Index of the parent body; orientation of the mobilizer in that body (3, 3); and the hinges.
     """
     mobilizer = mechanism.bodies[body].mobilizer
-    groups = [[motion] for motion in mobilizer.motions] if apart else [[*mobilizer.motions]]
+    groups = [[motion] for motion in mobilizer.motions] if is_split else [[*mobilizer.motions]]
     hinges: list[_Hinge] = []
     # A reversed mobilizer runs from the child to the parent.
     for motions in groups[::-1] if mobilizer.reversed else groups:
-        used = sorted({index for motion in motions for index in motion.coordinates})
+        used_coordinates = sorted({index for motion in motions for index in motion.coordinates})
         renumbered: Any = [
-            replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions
+            replace(m, coordinates=tuple(map(used_coordinates.index, m.coordinates)))
+            for m in motions
         ]
-        indices = [mobilizer.coordinates[index] for index in used]
-        still = np.eye(4)
-        count = tuple(range(len(used)))
+        indices = [mobilizer.coordinates[index] for index in used_coordinates]
+        identity = np.eye(4)
+        count = tuple(range(len(used_coordinates)))
         # A mechanism with this hinge alone in ground has its Jacobian as that of its body.
-        alone = replace(
-            mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still
+        grounded_mobilizer = replace(
+            mobilizer,
+            motions=renumbered,
+            coordinates=count,
+            parent_frame=identity,
+            child_frame=identity,
         )
-        carried = replace(mechanism.bodies[body], parent=GROUND, mobilizer=alone)
+        grounded_body = replace(mechanism.bodies[body], parent=GROUND, mobilizer=grounded_mobilizer)
         infos = tuple(
             replace(mechanism.coordinates[index], locked=False, prescribed=None)
             for index in indices
         )
-        hinges.append((indices, Mechanism(mobilizer.joint, (carried,), infos)))
-    inner = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
-    return mechanism.bodies[body].parent, inner[:3, :3], hinges
+        hinges.append((indices, Mechanism(mobilizer.joint, (grounded_body,), infos)))
+    first_frame = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
+    return mechanism.bodies[body].parent, first_frame[:3, :3], hinges
 
 
 def _compute_joint_load(
-    state: MechanismKinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array
+    state: MechanismKinematics,
+    parent: int,
+    first_rotation: Array,
+    hinges: Sequence[_Hinge],
+    forces: Array,
 ) -> Array:
     """Return force and torque (2, 3) in ground for the generalized forces (n,) of some hinges.
 
     Args:
         state: kinematics of the mechanism.
         parent: index of the parent body.
-        inner: orientation of the first hinge in the parent body (3, 3).
+        first_rotation: orientation of the first hinge in the parent body (3, 3).
         hinges: hinges from the parent to the child.
         forces: generalized forces (n,).
     """
-    rotation = state.rotations[parent] @ inner
+    rotation = state.rotations[parent] @ first_rotation
     load = np.zeros((2, 3))
     for indices, hinge in hinges:
-        across = hinge.at(state.q[indices])
-        load += _compute_hinge_load(across.jacobians[0].T, forces[indices]) @ rotation.T
-        rotation = rotation @ across.rotations[0]
+        hinge_state = hinge.at(state.q[indices])
+        load += _compute_hinge_load(hinge_state.jacobians[0].T, forces[indices]) @ rotation.T
+        rotation = rotation @ hinge_state.rotations[0]
     return load
 
 
@@ -254,19 +270,19 @@ def _compute_hinge_load(hinge: Array, target_forces: Array) -> Array:
         hinge: Jacobian of the hinge's motion (k, 6), rotations first.
         target_forces: generalized forces (k,).
     """
-    turning = hinge[:, :3]
-    moving = hinge[:, 3:]
-    force = _solve_shortest(moving, target_forces)
-    torque = _solve_shortest(turning, target_forces)
-    by_force, by_torque = moving @ force, turning @ torque
+    rotation = hinge[:, :3]
+    translation = hinge[:, 3:]
+    force = _solve_shortest(translation, target_forces)
+    torque = _solve_shortest(rotation, target_forces)
+    by_force, by_torque = translation @ force, rotation @ torque
     size_by_force = np.linalg.norm(by_force)
     size_by_torque = np.linalg.norm(by_torque)
     # Both can do some of the work: the one that does more per size comes first.
     if size_by_force > SIGNIFICANT_REAL and size_by_torque > SIGNIFICANT_REAL:
         if size_by_torque * np.linalg.norm(force) > size_by_force * np.linalg.norm(torque):
-            force = _solve_shortest(moving, target_forces - by_torque)
+            force = _solve_shortest(translation, target_forces - by_torque)
         else:
-            torque = _solve_shortest(turning, target_forces - by_force)
+            torque = _solve_shortest(rotation, target_forces - by_force)
     return np.array((force, torque))
 
 

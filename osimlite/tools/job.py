@@ -59,10 +59,14 @@ class Job:
         name = name.strip()
         if name in NO_FILE:
             return None
-        there = self.file.parent / name
-        here = Path(name)
+        path_from_setup = self.file.parent / name
+        path_from_current = Path(name)
         # A file that is in neither folder is reported in that of the setup.
-        return here if not os.path.exists(there) and os.path.exists(here) else there
+        return (
+            path_from_current
+            if not os.path.exists(path_from_setup) and os.path.exists(path_from_current)
+            else path_from_setup
+        )
 
     def require_path(self, *tags: str) -> Path:
         """Return the path of the file that the first non-empty of some properties names.
@@ -115,8 +119,8 @@ class Job:
         name without suffix gets `.sto`.
         """
         folder = self.setup.results_directory.strip()
-        last = Path(name).name
-        file_name = Path(last if "." in last else f"{last}.sto")
+        base_name = Path(name).name
+        file_name = Path(base_name if "." in base_name else f"{base_name}.sto")
         return self._join_output(
             file_name, self.file.parent / ("" if folder in NO_FILE else folder)
         )

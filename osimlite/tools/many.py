@@ -67,37 +67,39 @@ class RunInterruption(OsimliteError):
     exit_code = 130
 
 
-def find_setups(words: Iterable[str | Path]) -> list[Path]:
+def find_setups(names_or_patterns: Iterable[str | Path]) -> list[Path]:
     """Return setup files by names and patterns such as ``subjects/*/setup_ik.xml``.
 
     Patterns skip models and sets, such as the loads or the markers that setups read. No file is
     returned twice.
 
     Args:
-        words: names and patterns.
+        names_or_patterns: names and patterns.
 
     Raises:
         OsimliteError: a pattern matches nothing, or a word names a folder.
     """
     files: dict[Path, None] = {}
-    for word in map(str, words):
+    for name_or_pattern in map(str, names_or_patterns):
         # A file whose name contains a bracket is no pattern.
-        if has_magic(word) and not os.path.exists(word):
-            matches = find_files(word)
+        if has_magic(name_or_pattern) and not os.path.exists(name_or_pattern):
+            matches = find_files(name_or_pattern)
             setups = [
                 Path(match) for match in matches if not isinstance(get_object(match), Model | Set)
             ]
             if not setups:
-                raise OsimliteError(f"no {'setup' if matches else 'file'} matches '{word}'")
+                raise OsimliteError(
+                    f"no {'setup' if matches else 'file'} matches '{name_or_pattern}'"
+                )
             files.update(dict.fromkeys(setups))
-        elif os.path.isdir(word):
+        elif os.path.isdir(name_or_pattern):
             raise OsimliteError(
                 "expected a setup, found a folder; name the setups in it, for example "
-                f"'{os.path.join(word, '*.xml')}'",
-                file=word,
+                f"'{os.path.join(name_or_pattern, '*.xml')}'",
+                file=name_or_pattern,
             )
         else:
-            files[Path(word)] = None
+            files[Path(name_or_pattern)] = None
     return list(files)
 
 
@@ -162,14 +164,14 @@ def run_many(
 
 def _report_clashes(trials: Sequence[RunRecord]) -> None:
     """Mark runs as failed that wrote the same file; which one wrote last depends on chance."""
-    owners: dict[str, RunRecord] = {}
+    writers: dict[str, RunRecord] = {}
     for trial in trials:
         for file in map(os.path.realpath, trial.files):
-            other = owners.setdefault(file, trial)
-            if other is not trial:
-                for one, another in ((trial, other), (other, trial)):
-                    one.status = FAILED
-                    one.message = (
+            writer = writers.setdefault(file, trial)
+            if writer is not trial:
+                for failed, another in ((trial, writer), (writer, trial)):
+                    failed.status = FAILED
+                    failed.message = (
                         f"'{another.setup}' writes '{file}' as well; "
                         "give each setup a results folder of its own, or use -o FOLDER"
                     )
@@ -190,46 +192,46 @@ def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Pa
         return dict.fromkeys(setups, output)
     paths = [os.path.abspath(setup) for setup in setups]
     # Results mirror the folders of the setups, so that equal names do not collide.
-    common = os.path.commonpath([os.path.dirname(path) for path in paths])
+    common_folder = os.path.commonpath([os.path.dirname(path) for path in paths])
     return {
-        setup: output / Path(os.path.relpath(path, common)).with_suffix("")
+        setup: output / Path(os.path.relpath(path, common_folder)).with_suffix("")
         for setup, path in zip(setups, paths, strict=True)
     }
 
 
 def find_substitutes(
-    setup: Path, needs: Sequence[Path], folders: Mapping[Path, Path | None]
+    setup: Path, writers: Sequence[Path], folders: Mapping[Path, Path | None]
 ) -> dict[str, str]:
     """Return the present paths of inputs that other setups wrote into other folders.
 
     Args:
         setup: setup that names the inputs.
-        needs: setups that write them.
+        writers: setups that write them.
         folders: folder of the results by setup; None if the setup names the folder itself.
 
     Returns:
         Present path of each input by its absolute path in the setup.
     """
     result = {}
-    named = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
-    for maker in needs:
-        folder = folders[maker]
+    input_paths = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
+    for writer in writers:
+        folder = folders[writer]
         if folder is None:
             continue
-        for path in named & {
-            os.path.realpath(name) for name in find_named_files(str(maker), "output-file")
+        for path in input_paths & {
+            os.path.realpath(name) for name in find_named_files(str(writer), "output-file")
         }:
-            new = folder / os.path.basename(path)
+            present_path = folder / os.path.basename(path)
             # The other setup may have failed to write this result.
-            if new.is_file():
-                result[path] = str(new.absolute())
+            if present_path.is_file():
+                result[path] = str(present_path.absolute())
     return result
 
 
 def _run_one(
     folders: dict[Path, Path | None],
-    needs: dict[Path, list[Path]],
-    kept: dict[str | Path, Outcome] | None,
+    needs_by_setup: dict[Path, list[Path]],
+    outcomes: dict[str | Path, Outcome] | None,
     overwrite: bool,
     write_outside: bool,
     setup: Path,
@@ -238,7 +240,7 @@ def _run_one(
     started = time.perf_counter()
     try:
         digest = compute_digest(setup)
-        substitutes = find_substitutes(setup, needs[setup], folders)
+        substitutes = find_substitutes(setup, needs_by_setup[setup], folders)
         outcome = run(
             setup,
             folders[setup],
@@ -250,8 +252,8 @@ def _run_one(
         return RunRecord(
             str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started
         )
-    if kept is not None:
-        kept[setup] = outcome
+    if outcomes is not None:
+        outcomes[setup] = outcome
     return RunRecord(
         str(setup),
         DONE if outcome.done else NO,
@@ -271,16 +273,16 @@ def _to_json_values(summary: dict[str, Any]) -> dict[str, Any]:
 
 def compute_digest(setup: Path) -> str:
     """Return a digest of the contents of a setup and of all files that it names."""
-    made = blake2b(digest_size=16)
+    digest = blake2b(digest_size=16)
     # Names are part of the digest, because a setup may name another file of the same content.
     for path in dict.fromkeys((str(setup), *find_named_files(str(setup), "file"))):
-        made.update(path.encode("utf-8", "surrogateescape"))
+        digest.update(path.encode("utf-8", "surrogateescape"))
         try:
-            made.update(read_file(path))
+            digest.update(read_file(path))
         except OsimliteError:
             # A missing input differs from an empty one.
-            made.update(b"\0")
-    return made.hexdigest()
+            digest.update(b"\0")
+    return digest.hexdigest()
 
 
 class _Journal:
@@ -354,12 +356,12 @@ def read_record(line: bytes) -> RunRecord | None:
                 "digest": str(),
                 "was_done": bool(),
             } as values if status in STATUSES:
-                pairs = [(name, said) for name, said in told]
-                words = (*files, *warnings, *(word for pair in pairs for word in pair))
+                messages = [(name, message) for name, message in told]
+                texts = (*files, *warnings, *(text for pair in messages for text in pair))
                 # The table of all runs is sorted by this number, so it must be one.
                 error = values["summary"].get("rms_marker_error", 0.0)
-                if isinstance(error, int | float) and all(isinstance(word, str) for word in words):
-                    return RunRecord(**{**values, "told": pairs})
+                if isinstance(error, int | float) and all(isinstance(text, str) for text in texts):
+                    return RunRecord(**{**values, "told": messages})
     # A damaged line only means that its setup runs again.
     except (ValueError, TypeError, RecursionError):
         pass
@@ -384,20 +386,24 @@ class _Schedule:
 
     def yield_ready(self) -> Iterator[Path]:
         """Yield setups whose inputs exist; record setups whose inputs cannot be made."""
-        moved = True
-        while moved:
-            moved = False
+        has_progress = True
+        while has_progress:
+            has_progress = False
             for setup in self.setups:
-                if setup in self._given or not all(one in self.trials for one in self.needs[setup]):
+                if setup in self._given or not all(
+                    need in self.trials for need in self.needs[setup]
+                ):
                     continue
-                moved = True
+                has_progress = True
                 self._given.add(setup)
-                needed = [str(one) for one in self.needs[setup]]
-                broken = [
-                    one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)
+                need_names = [str(need) for need in self.needs[setup]]
+                failed_needs = [
+                    need
+                    for need in need_names
+                    if self.trials[Path(need)].status in (FAILED, WAITED)
                 ]
-                if broken:
-                    message = f"it needs results of {join_words(broken)}, which failed"
+                if failed_needs:
+                    message = f"it needs results of {join_words(failed_needs)}, which failed"
                     self.record_run(RunRecord(str(setup), WAITED, message=message))
                 elif (trial := self.journal.find_finished(setup)) is not None:
                     self.record_run(trial)
@@ -425,29 +431,29 @@ class _Schedule:
         """
         from osimlite.base.pools import WorkerLostError, open_process_pool
 
-        alone: list[Path] = []
+        suspects: list[Path] = []
         while len(self.trials) < len(self.setups):
-            under_way: list[Path] = []
+            running: list[Path] = []
             try:
                 with open_process_pool(do, workers=workers, cluster=cluster) as pool:
                     while len(self.trials) < len(self.setups):
                         while (
                             # Two setups for each worker: one runs while the other waits.
-                            len(under_way) < 2 * pool.workers
+                            len(running) < 2 * pool.workers
                             and (setup := next(self.yield_ready(), None)) is not None
                         ):
-                            under_way.append(setup)
+                            running.append(setup)
                             pool.submit(setup, setup)
-                        if not under_way:
+                        if not running:
                             break
                         setup, trial = pool.result()
-                        under_way.remove(setup)
+                        running.remove(setup)
                         self.record_run(trial)
             except WorkerLostError:
                 # One of these setups ended the process; which one is not known.
-                alone = under_way
-            while alone:
-                setup = alone.pop(0)
+                suspects = running
+            while suspects:
+                setup = suspects.pop(0)
                 try:
                     with open_process_pool(do, workers=1) as pool:
                         pool.submit(setup, setup)
@@ -464,27 +470,35 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     Setups that need each other are run in the given order. Setups of unsupported tools count as
     finished: another program may have run them.
     """
-    makers: dict[str, Path] = {}
+    writers: dict[str, Path] = {}
     tools = list_runnable()
     for setup in setups:
         if type(get_object(str(setup))).__name__ not in tools:
             continue
-        makers.update(
+        writers.update(
             (os.path.realpath(name), setup) for name in find_named_files(str(setup), "output-file")
         )
-    needs: dict[Path, list[Path]] = {}
+    needs_by_setup: dict[Path, list[Path]] = {}
     for setup in setups:
         names = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
-        needs[setup] = list(
-            {makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup}
+        needs_by_setup[setup] = list(
+            {
+                writers[name]: None
+                for name in sorted(names & writers.keys())
+                if writers[name] != setup
+            }
         )
     # Setups that need each other are run in the given order.
-    done: set[Path] = set()
-    while len(done) < len(setups):
-        free = [setup for setup in setups if setup not in done and done.issuperset(needs[setup])]
-        if not free:
-            stuck = next(setup for setup in setups if setup not in done)
-            needs[stuck] = [one for one in needs[stuck] if one in done]
-            free = [stuck]
-        done.update(free)
-    return needs
+    ordered: set[Path] = set()
+    while len(ordered) < len(setups):
+        ready = [
+            setup
+            for setup in setups
+            if setup not in ordered and ordered.issuperset(needs_by_setup[setup])
+        ]
+        if not ready:
+            stuck = next(setup for setup in setups if setup not in ordered)
+            needs_by_setup[stuck] = [need for need in needs_by_setup[stuck] if need in ordered]
+            ready = [stuck]
+        ordered.update(ready)
+    return needs_by_setup

@@ -35,9 +35,9 @@ def run_moco_study(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.solution import solve_program
 
     study = job.setup
-    tell = make_progress_callback(outcome) if study.solver.verbosity > 0 else None
+    progress_callback = make_progress_callback(outcome) if study.solver.verbosity > 0 else None
     problem = Problem(study, job.file)
-    solution = solve_program(Program(problem), None, tell, job.refine)
+    solution = solve_program(Program(problem), None, progress_callback, job.refine)
     name = study.name or "MocoStudy"
     outcome.add_typed_table(
         job.get_results_path(f"{name}_solution.sto"), solution.trajectory.table()
@@ -49,8 +49,8 @@ def run_moco_study(job: Job, outcome: Outcome) -> None:
 
 def make_progress_callback(outcome: Outcome) -> Callable[[Progress], None] | None:
     """Return a function that reports each iteration; None if nothing listens."""
-    says = outcome.progress
-    return None if says is None else (lambda progress: says(str(progress)))
+    report = outcome.progress
+    return None if report is None else (lambda progress: report(str(progress)))
 
 
 def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome: Outcome) -> None:
@@ -70,14 +70,14 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
         "iterations": solution.iterations,
         "status": solution.status,
         "duration": solution.duration,
-        "rounds": [each._asdict() for each in solution.rounds],
+        "rounds": [refinement._asdict() for refinement in solution.rounds],
     }
     outcome.add_message(
         "status",
         f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s",
     )
-    for each in solution.rounds:
-        outcome.add_message("mesh", str(each))
+    for refinement in solution.rounds:
+        outcome.add_message("mesh", str(refinement))
     for goal, value in solution.terms.items():
         outcome.add_message(goal, f"{value:.8g}")
     outcome.add_message("objective", f"{solution.objective:.8g}")
@@ -103,13 +103,13 @@ def _collect_evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evi
     mechanism = build_mechanism(problem.model)
     columns = trajectory.columns
     values, speeds = (
-        np.column_stack([columns[f"{info.path}/{what}"] for info in mechanism.coordinates])
-        for what in ("value", "speed")
+        np.column_stack([columns[f"{info.path}/{quantity}"] for info in mechanism.coordinates])
+        for quantity in ("value", "speed")
     )
-    named = problem.phase.model.filepath.strip()
+    model_name = problem.phase.model.filepath.strip()
     return Evidence.from_values(
         problem.model,
-        problem.locate_file(named) if named else job.file,
+        problem.locate_file(model_name) if model_name else job.file,
         mechanism,
         trajectory.times,
         values,
@@ -138,10 +138,10 @@ def run_moco_track(job: Job, outcome: Outcome) -> None:
     problem, guess = build_track_problem(job.setup, job.file)
     solution = solve_program(Program(problem), guess, make_progress_callback(outcome), job.refine)
     name = job.setup.name or "MocoTrack"
-    for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
+    for goal, table_kind in (("state_tracking", "states"), ("marker_tracking", "markers")):
         if goal in problem.tables:
             outcome.add_typed_table(
-                job.get_output_path(f"{name}_tracked_{what}.sto"), problem.tables[goal]
+                job.get_output_path(f"{name}_tracked_{table_kind}.sto"), problem.tables[goal]
             )
     outcome.add_typed_table(
         job.get_output_path(f"{name}_solution.sto"), solution.trajectory.table()

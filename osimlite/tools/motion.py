@@ -123,17 +123,19 @@ class Motion:
         # Times with the same unbalanced muscles share one model.
         for pattern in np.unique(missing, axis=0):
             rows = (missing == pattern).all(axis=1)
-            part = self.select_times(rows)
+            part_motion = self.select_times(rows)
             if pattern.any():
-                part = self._switch_off_muscles(part, frozenset(np.array(names)[pattern].tolist()))
-            result.append((rows, part))
+                part_motion = self._switch_off_muscles(
+                    part_motion, frozenset(np.array(names)[pattern].tolist())
+                )
+            result.append((rows, part_motion))
         return result
 
-    def _switch_off_muscles(self, part: Motion, muscles: frozenset[str]) -> Motion:
+    def _switch_off_muscles(self, part_motion: Motion, muscles: frozenset[str]) -> Motion:
         """Return a part of the motion with a model in which some muscles are switched off.
 
         Args:
-            part: the motion at some times.
+            part_motion: the motion at some times.
             muscles: paths of the muscles.
         """
         assert self.simulate is not None
@@ -142,10 +144,15 @@ class Motion:
         for path in muscles:
             tree.find(path).appliesForce = False
         # States of muscles that are off have no effect, but must be finite.
-        states = np.nan_to_num(part.states)
+        states = np.nan_to_num(part_motion.states)
         simulation = self.simulate(model)
         return replace(
-            part, model=model, simulation=simulation, states=states, unbalanced={}, left_out=muscles
+            part_motion,
+            model=model,
+            simulation=simulation,
+            states=states,
+            unbalanced={},
+            left_out=muscles,
         )
 
     def compute_balanced(self, compute: Callable[[Motion], Array]) -> Array:
@@ -159,9 +166,9 @@ class Motion:
         """
         if not self.unbalanced:
             return compute(self)
-        part = compute(self.select_times(self.balanced))
-        result = np.full((len(self.times), *part.shape[1:]), np.nan)
-        result[self.balanced] = part
+        balanced_rows = compute(self.select_times(self.balanced))
+        result = np.full((len(self.times), *balanced_rows.shape[1:]), np.nan)
+        result[self.balanced] = balanced_rows
         return result
 
     def compute_by_parts(self, compute: Callable[[Motion], Array]) -> Array:
@@ -173,10 +180,10 @@ class Motion:
         Returns:
             Rows (t, ...).
         """
-        rows = [(selected, compute(part)) for selected, part in self.parts]
+        rows = [(selected, compute(part_motion)) for selected, part_motion in self.parts]
         result = np.full((len(self.times), *rows[0][1].shape[1:]), np.nan)
-        for selected, part in rows:
-            result[selected] = part
+        for selected, part_motion in rows:
+            result[selected] = part_motion
         return result
 
     @property
@@ -255,10 +262,10 @@ class Motion:
             Records (t, p, m).
         """
         result = np.full((len(self.times), len(paths), len(names)), np.nan)
-        there = [k for k, path in enumerate(paths) if path not in self.left_out]
-        offsets = [offset for k in there for offset in self.system.find_offsets(paths[k], names)]
-        result[:, there] = self.evaluate_kernels(offsets).reshape(
-            len(self.times), len(there), len(names)
+        indices = [k for k, path in enumerate(paths) if path not in self.left_out]
+        offsets = [offset for k in indices for offset in self.system.find_offsets(paths[k], names)]
+        result[:, indices] = self.evaluate_kernels(offsets).reshape(
+            len(self.times), len(indices), len(names)
         )
         return result
 
@@ -270,20 +277,20 @@ class Motion:
             paths: paths of p force elements.
             names: names of m quantities.
         """
-        requested = [k for k, name in enumerate(names) if name in PATH_RECORDS]
-        selected = [k for k, path in enumerate(paths) if path in self.unbalanced]
+        requested = [quantity for quantity, name in enumerate(names) if name in PATH_RECORDS]
+        selected = [quantity for quantity, path in enumerate(paths) if path in self.unbalanced]
         if not (requested and selected):
             return
         # Path lengths do not depend on the state of the muscle.
-        measured = Paths(self.model)
+        model_paths = Paths(self.model)
         for row in np.flatnonzero(~self.balanced):
-            lengths = measured.lengths(self.values[row])
-            speeds = measured.speeds(self.values[row], self.speeds[row])
+            lengths = model_paths.lengths(self.values[row])
+            speeds = model_paths.speeds(self.values[row], self.speeds[row])
             for muscle in selected:
                 if self.unbalanced[paths[muscle]][row]:
-                    for k in requested:
-                        source = lengths if PATH_RECORDS[names[k]] == "length" else speeds
-                        result[row, muscle, k] = source[paths[muscle]]
+                    for quantity in requested:
+                        source = lengths if PATH_RECORDS[names[quantity]] == "length" else speeds
+                        result[row, muscle, quantity] = source[paths[muscle]]
 
     @cached_property
     def accelerations(self) -> Array:
@@ -291,9 +298,9 @@ class Motion:
         order = list(self.simulation.state.order)
         result = np.zeros_like(self.values)
         # The derivative of the state follows the work vector: rates of coordinates, then of speeds.
-        first = self.system.work_size + len(order)
+        first_offset = self.system.work_size + len(order)
         result[:, order] = self.evaluate_kernels(
-            range(first, first + len(order)), STAGE.ACCELERATION
+            range(first_offset, first_offset + len(order)), STAGE.ACCELERATION
         )
         return result
 
@@ -320,17 +327,19 @@ class Motion:
         moments = np.column_stack([self.times, system.state.pack_rows(self.values, self.speeds)])
         return LinkMotion.compute(system, moments, self.accelerations[:, list(system.order)])
 
-    def find_frame_path(self, requested: str, kind: str, *parents: str) -> str | None:
+    def find_frame_path(self, requested: str, class_name: str, *parents: str) -> str | None:
         """Return the path of a frame that a name or relative path denotes, or None.
 
         Args:
             requested: name or path as in a setup.
-            kind: class of the frame.
+            class_name: class of the frame.
             parents: paths of components below which to search after the model itself.
         """
         tree = self.model.tree()
-        result = (tree.walk(requested, parent, kind).target for parent in ("", *parents))
-        return next((tree.path_of(item) for item in result if item is not None), None)
+        candidates = (tree.walk(requested, parent, class_name).target for parent in ("", *parents))
+        return next(
+            (tree.path_of(component) for component in candidates if component is not None), None
+        )
 
     def find_indices(self, requested: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
         """Return the indices of the names that an analysis requests; "all" requests all of them.
@@ -343,14 +352,14 @@ class Motion:
         Raises:
             SettingError: a requested name is unknown.
         """
-        words = [str(name) for name in requested]
+        requested_names = [str(name) for name in requested]
         # In OpenSim "all" counts wherever it stands in the list.
-        if "all" in words:
+        if "all" in requested_names:
             return list(range(len(names)))
-        for name in words:
+        for name in requested_names:
             if name not in names:
                 raise SettingError(f"unknown name '{name}' for {what}{suggest_name(name, names)}")
-        return [names.index(name) for name in words]
+        return [names.index(name) for name in requested_names]
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,7 +381,7 @@ class AnalysisTables:
         *,
         in_degrees: bool = False,
         description: str = "",
-        of: str = "",
+        name_part: str = "",
     ) -> None:
         """Add a table in the format of OpenSim's Storage, with the precision of the setup.
 
@@ -383,28 +392,33 @@ class AnalysisTables:
             rows: values (t, m).
             in_degrees: whether rotational values are in degrees.
             description: text that the header contains as well.
-            of: part of the file's name before the suffix, besides the name of the analysis.
+            name_part: part of the file's name before the suffix, besides the name of the analysis.
         """
         # Tables without missing numbers need no note about them.
         if self.note and np.isnan(rows).any():
             description = f"\n{self.note}{description}"
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
         self.outcome.add_table(
-            self._create_path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision
+            self._create_path(f"{name_part}_{suffix}"),
+            table,
+            description,
+            self.job.setup.output_precision,
         )
 
-    def add_typed_table(self, suffix: str, columns: Sequence[str], rows: Array, kind: str) -> None:
+    def add_typed_table(
+        self, suffix: str, columns: Sequence[str], rows: Array, value_type: str
+    ) -> None:
         """Add a table in the format of OpenSim's TimeSeriesTable, named after the tool alone.
 
         Args:
             suffix: end of the file's name.
             columns: a label for each value.
             rows: values (t, m); a value may take several columns.
-            kind: type of the values, for example ``"Vec3"``.
+            value_type: type of the values, for example ``"Vec3"``.
         """
-        labels = tuple(f"{column}{end}" for column in columns for end in list_suffixes(kind))
+        labels = tuple(f"{column}{end}" for column in columns for end in list_suffixes(value_type))
         path = self.job.get_results_path(f"{self.job.setup.name}_{suffix}")
-        self.outcome.add_typed_table(path, StoTable("", self.times, labels, rows, kind=kind))
+        self.outcome.add_typed_table(path, StoTable("", self.times, labels, rows, kind=value_type))
 
     def add_text(self, suffix: str, content: str) -> None:
         """Add a text in a file of the analysis.

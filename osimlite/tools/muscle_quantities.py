@@ -50,40 +50,40 @@ MuscleTables = dict[str, Array]
 """Rows (t, m) for m muscles, by the suffixes of MuscleAnalysis' files."""
 
 
-def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> MuscleTables:
+def compute_quantities(records: Mapping[str, Array], muscles: Sequence[Any]) -> MuscleTables:
     """Compute the tables of some muscles of one class.
 
     The formulas are those of OpenSim's base class; `CORRECTIONS` has those of other classes.
 
     Args:
-        known: rows (t, m) of `LAW_RECORDS`, and of SPRING if the law records it.
+        records: rows (t, m) of `LAW_RECORDS`, and of SPRING if the law records it.
         muscles: m muscles.
     """
-    length = known["fiber_length"]
-    cos = known["cos_pennation"]
-    speed = known["fiber_velocity"]
-    active = known["active_fiber_force"]
-    passive = known["passive_fiber_force"]
-    tension = known["tension"]
+    length = records["fiber_length"]
+    cos = records["cos_pennation"]
+    speed = records["fiber_velocity"]
+    active = records["active_fiber_force"]
+    passive = records["passive_fiber_force"]
+    tension = records["tension"]
     # OpenSim counts the power of damping as active, although its force counts as passive.
-    spring = known.get(SPRING, passive)
+    spring = records.get(SPRING, passive)
     optimal = np.array([muscle.optimal_fiber_length for muscle in muscles])
     fastest = np.array([muscle.max_contraction_velocity for muscle in muscles])
     # Rounding may leave the cosine slightly beyond 1.
     angle = np.arccos(np.clip(cos, -1.0, 1.0))
     # The width of the muscle, across the tendon, is constant.
-    turning = -speed / length * np.tan(angle)
+    pennation_rate = -speed / length * np.tan(angle)
     # Derivative of (fiber length * cos angle) by time.
-    along = speed * cos - length * np.sin(angle) * turning
+    speed_along_tendon = speed * cos - length * np.sin(angle) * pennation_rate
     result = {
         "PennationAngle": angle,
-        "Length": known["length"],
+        "Length": records["length"],
         "FiberLength": length,
-        "TendonLength": known["length"] - length * cos,
+        "TendonLength": records["length"] - length * cos,
         "NormalizedFiberLength": length / optimal,
         "FiberVelocity": speed,
         "NormFiberVelocity": speed / (optimal * fastest),
-        "PennationAngularVelocity": turning,
+        "PennationAngularVelocity": pennation_rate,
         "TendonForce": tension,
         "FiberForce": active + passive,
         "ActiveFiberForce": active,
@@ -93,8 +93,8 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
         "FiberActivePower": -(active + (passive - spring)) * speed,
         "FiberPassivePower": -spring * speed,
         # A tension does work against lengthening, hence the minus signs of all powers.
-        "TendonPower": -tension * (known["rate"] - along),
-        "MuscleActuatorPower": -tension * known["rate"],
+        "TendonPower": -tension * (records["rate"] - speed_along_tendon),
+        "MuscleActuatorPower": -tension * records["rate"],
     }
     return result | CORRECTIONS[type(muscles[0])](result, muscles)
 
@@ -104,8 +104,8 @@ def _correct_thelen(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTable
 
     That holds although there is a passive force.
     """
-    still = (tables["FiberVelocity"] == 0.0) & (tables["ActiveFiberForce"] == 0.0)
-    return {"FiberForce": np.where(still, 0.0, tables["FiberForce"])}
+    is_at_rest = (tables["FiberVelocity"] == 0.0) & (tables["ActiveFiberForce"] == 0.0)
+    return {"FiberForce": np.where(is_at_rest, 0.0, tables["FiberForce"])}
 
 
 def _correct_millard(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
@@ -129,10 +129,10 @@ def _correct_acceleration_muscle(tables: MuscleTables, muscles: Sequence[Any]) -
         for muscle in muscles
     ]
     damped = tables["FiberVelocity"] * np.array(damping)
-    along = tables["MuscleActuatorPower"] - tables["TendonPower"]
+    fiber_power = tables["MuscleActuatorPower"] - tables["TendonPower"]
     return {
         "FiberForce": tables["FiberForce"] + damped,
-        "FiberPassivePower": along - tables["FiberActivePower"],
+        "FiberPassivePower": fiber_power - tables["FiberActivePower"],
     }
 
 
@@ -153,11 +153,11 @@ def _correct_degroote(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTab
 def _correct_rigid_tendon(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct RigidTendonMuscle: the tendon has its slack length, even if the path is shorter."""
     slack = np.array([muscle.tendon_slack_length for muscle in muscles])
-    nothing = np.zeros_like(tables["Length"])
+    zeros = np.zeros_like(tables["Length"])
     return {
-        "TendonLength": nothing + slack,
-        "TendonPower": nothing,
-        "PennationAngularVelocity": nothing + np.nan,
+        "TendonLength": zeros + slack,
+        "TendonPower": zeros,
+        "PennationAngularVelocity": zeros + np.nan,
     }
 
 

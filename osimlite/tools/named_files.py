@@ -53,21 +53,25 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
             subject = load_subject(file, Config())
         if not isinstance(subject, Setup):
             continue
-        for item in subject.find_named_files(rule):
+        for naming in subject.find_named_files(rule):
             if rule == "file":
-                yield item.path
+                yield naming.path
             else:
                 folder = os.path.dirname(file)
                 results = str(getattr(subject.top, "results_directory", "")).strip()
                 # Which of the two folders a tool uses depends on the property.
-                yield os.path.join(folder, item.name.strip())
-                yield os.path.join(folder, results, item.name.strip())
-        for item in subject.find_named_files("file"):
-            real = os.path.realpath(item.path)
-            if item.path.lower().endswith(".xml") and real not in visited and os.path.isfile(real):
+                yield os.path.join(folder, naming.name.strip())
+                yield os.path.join(folder, results, naming.name.strip())
+        for naming in subject.find_named_files("file"):
+            real = os.path.realpath(naming.path)
+            if (
+                naming.path.lower().endswith(".xml")
+                and real not in visited
+                and os.path.isfile(real)
+            ):
                 visited.add(real)
                 limit_documents(visited, setup)
-                waiting.append(item.path)
+                waiting.append(naming.path)
 
 
 def limit_documents(documents: set[str], setup: str) -> None:
@@ -92,7 +96,7 @@ def find_inputs(paths: Iterable[Path], setup: Path) -> list[Path]:
         paths: files to compare, by any name or link.
         setup: path of the setup.
     """
-    there = [path for path in paths if os.path.isfile(path)]
-    names = (str(setup), *find_named_files(str(setup), "file")) if there else ()
+    existing = [path for path in paths if os.path.isfile(path)]
+    names = (str(setup), *find_named_files(str(setup), "file")) if existing else ()
     inputs = [name for name in dict.fromkeys(names) if os.path.isfile(name)]
-    return [path for path in there if any(os.path.samefile(path, name) for name in inputs)]
+    return [path for path in existing if any(os.path.samefile(path, name) for name in inputs)]

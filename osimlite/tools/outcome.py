@@ -29,10 +29,10 @@ DYNAMICS_TITLE = "Inverse Dynamics Generalized Forces"
 """Title of the table that inverse dynamics writes."""
 
 
-def _create_number_error(what: str, time: float) -> SimulationError:
+def _create_number_error(subject: str, time: float) -> SimulationError:
     """Return the error for a result that is infinite or not a number."""
     return SimulationError(
-        f"{what} at {time:g} s; check the data for a number that is far too large"
+        f"{subject} at {time:g} s; check the data for a number that is far too large"
     )
 
 
@@ -57,24 +57,24 @@ class Outcome:
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        words = "done" if self.done else "not done"
+        status = "done" if self.done else "not done"
         counts = (
             f"{format_count(len(self.tables), 'table')}, {format_count(len(self.files), 'file')}"
         )
-        lines = [f"Outcome: {words}, {counts}"]
-        lines += [f"{name}: {said}" for name, said in self.told[:MAX_LISTED]]
+        lines = [f"Outcome: {status}, {counts}"]
+        lines += [f"{name}: {message}" for name, message in self.told[:MAX_LISTED]]
         lines += [str(path) for path in self.files[:MAX_LISTED]]
-        if (more := len(self.files) - MAX_LISTED) > 0:
-            lines.append(f"... and {format_count(more, 'file')} more")
+        if (omitted_count := len(self.files) - MAX_LISTED) > 0:
+            lines.append(f"... and {format_count(omitted_count, 'file')} more")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><td>{escape(name)}</td><td>{escape(said)}</td></tr>"
-            for name, said in [*self.told, *(("file", str(path)) for path in self.files)]
+            f"<tr><td>{escape(name)}</td><td>{escape(message)}</td></tr>"
+            for name, message in [*self.told, *(("file", str(path)) for path in self.files)]
         )
-        words = "done" if self.done else "not done"
-        return f"<div>Outcome: {words}</div><table>{rows}</table>"
+        status = "done" if self.done else "not done"
+        return f"<div>Outcome: {status}</div><table>{rows}</table>"
 
     def add_table(
         self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION
@@ -119,24 +119,24 @@ class Outcome:
         """Add a text to write."""
         self._texts[path] = (content,)
 
-    def add_message(self, name: str, words: str) -> None:
+    def add_message(self, name: str, message: str) -> None:
         """Add a message about the results.
 
         Args:
             name: what the message is about, one to three words.
-            words: the message.
+            message: the message.
         """
-        self.told.append((name, words))
+        self.told.append((name, message))
 
-    def add_warning(self, name: str, words: str) -> None:
+    def add_warning(self, name: str, message: str) -> None:
         """Add a message that makes the results doubtful, and print it on standard error.
 
         Args:
             name: what the message is about, one to three words.
-            words: the message.
+            message: the message.
         """
-        self.add_message(name, words)
-        warn_caller(words)
+        self.add_message(name, message)
+        warn_caller(message)
 
     def _note_missing(self, path: Path, table: StoTable) -> str:
         """Return a note about missing values of a table, and add a message; "" if none is missing.
@@ -149,7 +149,7 @@ class Outcome:
             return ""
         names = join_words([f"'{table.columns[index]}'" for index in np.flatnonzero(missing)])
         # One message suffices: all tables of a motion lack numbers for the same reason.
-        if not any("NaN" in words for _, words in self.told):
+        if not any("NaN" in message for _, message in self.told):
             self.add_message(
                 "not a number", f"{path.name} has NaN where there is no value: {names}"
             )
@@ -167,21 +167,23 @@ class Outcome:
                 f"'{motion.coordinates[index]}' is {motion.values[row, index]}", motion.times[row]
             )
         for table in self.tables.values():
-            odd = ~np.isfinite(table.rows) if table.name == DYNAMICS_TITLE else np.isinf(table.rows)
-            if odd.any():
-                row, index = np.argwhere(odd)[0]
+            is_invalid = (
+                ~np.isfinite(table.rows) if table.name == DYNAMICS_TITLE else np.isinf(table.rows)
+            )
+            if is_invalid.any():
+                row, index = np.argwhere(is_invalid)[0]
                 raise _create_number_error(
                     f"'{table.columns[index]}' is {table.rows[row, index]}", table.times[row]
                 )
 
     def _protect_inputs(self, setup: Path) -> None:
         """Raise an error if a result would replace an input; a model may replace its source."""
-        kept = [
+        protected_paths = [
             path
             for path in self._texts
             if path.name in self.tables or path.suffix.lower() != ".osim"
         ]
-        for path in find_inputs(kept, setup):
+        for path in find_inputs(protected_paths, setup):
             message = f"a result would replace '{path}', from which it is computed; give it another name or folder"
             raise DocumentError(message, file=str(setup))
 

@@ -46,15 +46,15 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
         if reader is not None:
             return reader
     path = motion.model.tree().path_of(component) or ""
-    known = name not in LAW_OUTPUTS or (
+    is_supported = name not in LAW_OUTPUTS or (
         isinstance(component, Muscle) and motion.system.has_quantity(path, LAW_OUTPUTS[name])
     )
-    known &= name not in UNSUPPORTED_OUTPUTS.get(type(component), ())
+    is_supported &= name not in UNSUPPORTED_OUTPUTS.get(type(component), ())
     if (
         isinstance(component, Muscle)
         and type(component) in CORRECTIONS
         and name in MUSCLE_OUTPUTS
-        and known
+        and is_supported
     ):
         return lambda motion, muscle, path: _read_muscle_output(
             motion, muscle, path, MUSCLE_OUTPUTS[name]
@@ -65,7 +65,7 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
     return None
 
 
-def _create_frame_reader(part: str) -> Reader:
+def _create_frame_reader(quantity: str) -> Reader:
     """Return a reader of the position, velocity or acceleration of a frame."""
 
     def read(motion: Motion, frame: Frame, path: str) -> Array:
@@ -80,16 +80,16 @@ def _create_frame_reader(part: str) -> Reader:
             "angular_acceleration": lambda: turning[1],
             "linear_acceleration": lambda: moving[2],
             "acceleration": lambda: np.hstack((turning[1], moving[2])),
-        }[part]()
+        }[quantity]()
 
     return read
 
 
-def _create_station_reader(which: int) -> Reader:
+def _create_station_reader(derivative_order: int) -> Reader:
     """Return a reader of a point that is fixed in a frame.
 
     Args:
-        which: 0 for the position, 1 for the velocity, 2 for the acceleration.
+        derivative_order: 0 for the position, 1 for the velocity, 2 for the acceleration.
     """
 
     def read(motion: Motion, station: Station | PathPoint, path: str) -> Array:
@@ -101,17 +101,17 @@ def _create_station_reader(which: int) -> Reader:
         frame = tree.target(station, "socket_parent_frame", station.socket_parent_frame)
         body, placed = motion.mechanism.placement(tree.path_of(frame) or "")
         point = placed[:3, :3] @ np.array(station.location, dtype=float) + placed[:3, 3]
-        return motion.links.compute_point_motion(body, point)[which]
+        return motion.links.compute_point_motion(body, point)[derivative_order]
 
     return read
 
 
-def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
+def _create_momentum_reader(about_origin: bool, components: slice) -> Reader:
     """Return a reader of the momentum of a body.
 
     Args:
         about_origin: whether the angular momentum is about the body's origin, not its mass centre.
-        part: components to return, angular part first.
+        components: components to return, angular part first.
     """
 
     def read(motion: Motion, body: Body, path: str) -> Array:
@@ -129,7 +129,7 @@ def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
         linear = mass.mass * velocity
         if about_origin:
             angular = angular + np.cross(center - origin, linear)
-        return np.hstack((angular, linear))[:, part]
+        return np.hstack((angular, linear))[:, components]
 
     return read
 
@@ -160,11 +160,15 @@ def _compute_com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -
     state = mechanism.at(q, u)
     for index, body in enumerate(mechanism.bodies):
         arm = state.rotations[index] @ body.mass_properties.center
-        w = state.velocities[index][:3]
+        omega = state.velocities[index][:3]
         acceleration = accelerations[index]
         rows.append(
             body.mass_properties.mass
-            * (acceleration[3:] + np.cross(acceleration[:3], arm) + np.cross(w, np.cross(w, arm)))
+            * (
+                acceleration[3:]
+                + np.cross(acceleration[:3], arm)
+                + np.cross(omega, np.cross(omega, arm))
+            )
         )
     # Without mass the sum is zero, and so is the result.
     return np.asarray(np.sum(rows, axis=0) / (mechanism.total_mass or 1.0))
@@ -187,8 +191,8 @@ SYSTEM_OUTPUTS: dict[str, Callable[..., Any]] = {
 def _read_potential_energy(motion: Motion, model: Model, path: str) -> Array:
     """Return the potential energy of gravity and of all forces, J."""
     return motion.compute_balanced(
-        lambda part: np.array(
-            [sum(part.system.compute_energies(t, y)[1:]) for t, y in part.moments]
+        lambda part_motion: np.array(
+            [sum(part_motion.system.compute_energies(t, y)[1:]) for t, y in part_motion.moments]
         ).reshape(-1, 1)
     )
 
@@ -225,8 +229,8 @@ def _read_power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
     """Return the power of an actuator, W; a tension does work against the lengthening speed."""
     # A positive actuation of a path is a tension, which shortens it.
     sense = -1.0 if isinstance(actuator, PathActuator) else 1.0
-    known = motion.read_records([path], "actuation", "speed")
-    return sense * known["actuation"] * known["speed"]
+    records = motion.read_records([path], "actuation", "speed")
+    return sense * records["actuation"] * records["speed"]
 
 
 def _read_excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
@@ -269,7 +273,7 @@ def _read_joint_power(motion: Motion, joint: Joint, path: str) -> Array:
 
 
 def _read_muscle_output(
-    motion: Motion, muscle: Any, path: str, of: Callable[[dict[str, Array]], Array]
+    motion: Motion, muscle: Any, path: str, compute_output: Callable[[dict[str, Array]], Array]
 ) -> Array:
     """Return an output of a muscle from the quantities of MuscleAnalysis and of its law.
 
@@ -277,28 +281,28 @@ def _read_muscle_output(
         motion: the motion.
         muscle: the muscle.
         path: path of the muscle.
-        of: computes the output (t, 1) from these quantities.
+        compute_output: computes the output (t, 1) from these quantities.
     """
     extra = [
         name
         for name in dict.fromkeys(LAW_OUTPUTS.values())
         if motion.system.has_quantity(path, name)
     ]
-    known = motion.read_records([path], *LAW_RECORDS, *extra)
+    records = motion.read_records([path], *LAW_RECORDS, *extra)
     # Fibers without equilibrium have NaN, and numpy would warn.
     with np.errstate(invalid="ignore", divide="ignore"):
-        quantities = known | compute_quantities(known, [muscle])
-        turning = (
+        quantities = records | compute_quantities(records, [muscle])
+        speed_of_rotation = (
             quantities["FiberLength"]
             * np.sin(quantities["PennationAngle"])
             * quantities["PennationAngularVelocity"]
         )
         # The fiber's length along the tendon is l cos(α); this is its derivative.
         quantities["along"] = (
-            quantities["FiberVelocity"] * np.cos(quantities["PennationAngle"]) - turning
+            quantities["FiberVelocity"] * np.cos(quantities["PennationAngle"]) - speed_of_rotation
         )
         quantities["slack"] = np.full_like(quantities["along"], muscle.tendon_slack_length)
-        return of(quantities)
+        return compute_output(quantities)
 
 
 MUSCLE_OUTPUTS: dict[str, Callable[[dict[str, Array]], Array]] = {

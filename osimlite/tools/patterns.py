@@ -24,13 +24,17 @@ def find_files(pattern: str) -> list[str]:
     Raises:
         OsimliteError: the search would read more than `MAX_ENTRIES` entries.
     """
-    drive, rest = os.path.splitdrive(pattern)
-    rooted = rest.startswith(("/", os.sep))
-    parts = [part for part in rest.replace(os.sep, "/").split("/") if part]
+    drive, path_pattern = os.path.splitdrive(pattern)
+    rooted = path_pattern.startswith(("/", os.sep))
+    name_patterns = [
+        name_pattern
+        for name_pattern in path_pattern.replace(os.sep, "/").split("/")
+        if name_pattern
+    ]
     search = _FileSearch(pattern)
     paths = [drive + os.sep if rooted else drive]
-    for part in parts:
-        paths = list(dict.fromkeys(search.match_part(paths, part)))
+    for name_pattern in name_patterns:
+        paths = list(dict.fromkeys(search.match_part(paths, name_pattern)))
     return sorted(filter(os.path.isfile, paths))
 
 
@@ -40,26 +44,26 @@ class _FileSearch:
     def __init__(self, pattern: str) -> None:
         self.pattern, self.left = pattern, MAX_ENTRIES
 
-    def match_part(self, folders: Iterable[str], part: str) -> Iterator[str]:
+    def match_part(self, folders: Iterable[str], name_pattern: str) -> Iterator[str]:
         """Yield the paths that match one part of a pattern.
 
         Args:
             folders: folders in which to match.
-            part: name or pattern between two slashes.
+            name_pattern: name or pattern between two slashes.
         """
-        if part == "**":
+        if name_pattern == "**":
             yield from self._walk_folders(folders)
             return
         for folder in folders:
             # A plain name needs no listing of the folder.
-            if not has_magic(part):
-                path = os.path.join(folder, part)
+            if not has_magic(name_pattern):
+                path = os.path.join(folder, name_pattern)
                 if os.path.lexists(path):
                     yield path
                 continue
             for entry in self._list_entries(folder):
-                is_shown = not entry.name.startswith(".") or part.startswith(".")
-                if is_shown and fnmatch(entry.name, part):
+                is_shown = not entry.name.startswith(".") or name_pattern.startswith(".")
+                if is_shown and fnmatch(entry.name, name_pattern):
                     yield os.path.join(folder, entry.name)
 
     def _walk_folders(self, folders: Iterable[str]) -> Iterator[str]:

@@ -50,24 +50,26 @@ class ConstraintForces:
         """
         mechanism, system = motion.mechanism, motion.system
         order = list(system.order)
-        kept, _ = select_constraints(mechanism, order)
-        needed = system.compute_required_forces(motion.table, motion.accelerations[:, order])
+        constraints, _ = select_constraints(mechanism, order)
+        required_forces = system.compute_required_forces(
+            motion.table, motion.accelerations[:, order]
+        )
         for t, q, u, missing in zip(
-            motion.times.tolist(), motion.values, motion.speeds, needed, strict=True
+            motion.times.tolist(), motion.values, motion.speeds, required_forces, strict=True
         ):
             state = mechanism.at(q, u, t)
             # Rows of the constraint Jacobian G.
-            blocks = [item.acceleration_equations(state)[0] for item in kept]
+            blocks = [matrix.acceleration_equations(state)[0] for matrix in constraints]
             rows = np.concatenate(blocks)[:, order].T
             # The mass matrix is singular if constraints drive massless bodies.
             with suppress(np.linalg.LinAlgError):
                 factor = np.linalg.cholesky(mass_matrix(state)[np.ix_(order, order)])
                 rows, missing = (
-                    np.asarray(np.linalg.solve(factor, item), float) for item in (rows, missing)
+                    np.asarray(np.linalg.solve(factor, matrix), float) for matrix in (rows, missing)
                 )
             result = solve_least_norm(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
-            parts = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
-            yield cls(state, list(zip(kept, parts, strict=True)))
+            multipliers = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
+            yield cls(state, list(zip(constraints, multipliers, strict=True)))
 
     def compute_wrenches(self, constraint: ConstraintEquations, multipliers: Array) -> Array:
         """Compute the wrenches of a constraint on its bodies.
@@ -82,17 +84,17 @@ class ConstraintForces:
         mechanism = self.state.mechanism
         state = self.state
         bodies = [body for body in constraint.bodies if body != GROUND]
-        held: Any = constraint
-        program = _build_separate_bodies(mechanism, held)
+        equations: Any = constraint
+        program = _build_separate_bodies(mechanism, equations)
         data, y, f = program.state(
             np.zeros(6 * len(mechanism.bodies)), np.zeros(6 * len(mechanism.bodies))
         )
         columns = np.frombuffer(data)[program.model[MODEL.WORK_COLUMN] :]
         for body in bodies:
             columns[36 * body : 36 * body + 36] = np.eye(6).ravel()
-            here = np.frombuffer(link_work(program.model, data, body))
-            here[: LINK_WORK.POSITION] = state.rotations[body].ravel()
-            here[LINK_WORK.POSITION : LINK_WORK.VELOCITY] = (
+            link_record = np.frombuffer(link_work(program.model, data, body))
+            link_record[: LINK_WORK.POSITION] = state.rotations[body].ravel()
+            link_record[LINK_WORK.POSITION : LINK_WORK.VELOCITY] = (
                 *state.origins[body],
                 *state.origins[body],
             )
@@ -118,9 +120,9 @@ def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> PackedMecha
     """
     count = len(mechanism.bodies)
     links = [Link(GROUND, []) for _ in range(count)]
-    places = Places(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
+    placements = Places(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
     return PackedMechanism(
-        LinkTree(links, [*range(0, 6 * count + 1, 6)], tuple(range(6 * count)), places),
+        LinkTree(links, [*range(0, 6 * count + 1, 6)], tuple(range(6 * count)), placements),
         (constraint,),
     )
 
@@ -138,13 +140,16 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
         Labels of m columns, and rows (t, m).
     """
     if motion.unbalanced and motion.balanced.any():
-        columns, part = compute_constraint_records(motion.select_times(motion.balanced))
+        columns, balanced_rows = compute_constraint_records(motion.select_times(motion.balanced))
         result = np.full((len(motion.times), len(columns)), np.nan)
-        result[motion.balanced] = part
+        result[motion.balanced] = balanced_rows
         return columns, result
     mechanism = motion.mechanism
     tree = motion.model.tree()
-    names = {tree.path_of(item): item.name for item in motion.model.components(schema.Constraint)}
+    names = {
+        tree.path_of(component): component.name
+        for component in motion.model.components(schema.Constraint)
+    }
     labels: list[str] = []
     rows = []
     for moment, forces in enumerate(ConstraintForces.compute_along(motion)):
@@ -165,9 +170,9 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
                     ).ravel()
                 )
                 columns = [
-                    f"{_get_body_name(mechanism, body)}_{what}{axis}"
+                    f"{_get_body_name(mechanism, body)}_{letter}{axis}"
                     for body in constraint.bodies
-                    for what in "FM"
+                    for letter in "FM"
                     for axis in "xyz"
                 ]
             else:
@@ -190,12 +195,12 @@ def _get_body_name(mechanism: Mechanism, body: int) -> str:
 def _find_mobilities(mechanism: Mechanism, constraint: ConstraintEquations) -> list[int]:
     """Return the indices of all coordinates of the joints of a coupler, the dependent one last."""
     assert isinstance(constraint, Coupler)
-    owners = {
+    joint_coordinates = {
         index: body.mobilizer.coordinates
         for body in mechanism.bodies
         for index in body.mobilizer.coordinates
     }
-    joints = dict.fromkeys(owners[index] for index in constraint.coordinates)
+    joints = dict.fromkeys(joint_coordinates[index] for index in constraint.coordinates)
     return [index for joint in joints for index in joint]
 
 
@@ -237,11 +242,13 @@ class JointWrenches:
     def _add_unbalanced_times(self, motion: Motion) -> Array:
         """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
         # Without forces the wrenches are unknown, but the kinematics of the links is not.
-        still = System(self.mechanism.without_constraints(), Forces(()), apart=True)
+        unloaded = System(self.mechanism.without_constraints(), Forces(()), apart=True)
         moments = np.column_stack(
-            [motion.times, still.state.pack_rows(motion.values, motion.speeds)]
+            [motion.times, unloaded.state.pack_rows(motion.values, motion.speeds)]
         )
-        links = still.compute_accelerated_links(moments, motion.accelerations[:, list(still.order)])
+        links = unloaded.compute_accelerated_links(
+            moments, motion.accelerations[:, list(unloaded.order)]
+        )
         links[motion.balanced] = self.moved.links
         return links
 
@@ -257,10 +264,10 @@ class JointWrenches:
                 constraint.bodies, forces.compute_wrenches(constraint, multipliers), strict=True
             ):
                 force = wrench[3:]
-                here = forces.state.origins[body]
+                origin = forces.state.origins[body]
                 # All bodies between this one and ground carry the wrench as well.
                 while body != GROUND:
-                    arm = here - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+                    arm = origin - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
                     about = np.concatenate([wrench[:3] + np.cross(arm, force), force])
                     links[body, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6] += about
                     body = self.mechanism.bodies[body].parent
@@ -276,15 +283,15 @@ class JointWrenches:
             Force (N), moment (N m), and the origin of the joint's frame at which they act (m), each
             (t, 3) in ground.
         """
-        outer = self.carried[joint.path]
-        body = self.mechanism.bodies[outer]
-        link = self.moved.links[:, outer]
+        outer_index = self.carried[joint.path]
+        body = self.mechanism.bodies[outer_index]
+        link = self.moved.links[:, outer_index]
         mobilizer = body.mobilizer
         # The outer body of the joint in the tree receives the wrench, the inner body the
         # opposite.
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
-        _, point = self.moved.locate_frame(outer if is_outer else body.parent, frame)
+        _, point = self.moved.locate_frame(outer_index if is_outer else body.parent, frame)
         arm = point - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), point

@@ -93,7 +93,7 @@ class TrialOutcomes(NamedTuple):
     def evidence(self) -> Evidence | None:
         """Motion of the trial, preferably one with measured markers; None without any."""
         result = [outcome.evidence for outcome in self.outcomes if outcome.evidence is not None]
-        return min(result, key=lambda item: item.measured is None, default=None)
+        return min(result, key=lambda evidence: evidence.measured is None, default=None)
 
     @property
     def steps(self) -> dict[str, Steps]:
@@ -143,12 +143,12 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     if all(trial.evidence is None for trial in trials):
         raise OsimliteError("nothing to report: no setup has a motion")
     with plain_lettering():
-        parts = "".join([*_render_trials(trials), *_render_verdicts(outcomes)])
+        sections = "".join([*_render_trials(trials), *_render_verdicts(outcomes)])
     title = html.escape(join_words([trial.name for trial in trials]))
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '
         f'content="width=device-width, initial-scale=1"><title>{title}</title>'
-        f"<style>{STYLE}</style></head><body><h1>{title}</h1>{parts}</body></html>\n"
+        f"<style>{STYLE}</style></head><body><h1>{title}</h1>{sections}</body></html>\n"
     )
     write_atomically(path, page)
     return Path(path)
@@ -161,9 +161,9 @@ def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[TrialOutcomes
         by_folder.setdefault(Path(setup).resolve().parent, {})[Path(setup)] = outcome
     titles = [outcome.title for outcome in outcomes.values()]
     # The name of a single study says more than that of its folder.
-    alone = titles[0] if len(titles) == 1 else ""
+    study_name = titles[0] if len(titles) == 1 else ""
     return [
-        TrialOutcomes(alone or folder.name, [*group.values()], [*group])
+        TrialOutcomes(study_name or folder.name, [*group.values()], [*group])
         for folder, group in by_folder.items()
     ]
 
@@ -176,15 +176,15 @@ def _render_trials(trials: Sequence[TrialOutcomes]) -> Iterator[str]:
         yield f"{heading}<table>{facts}</table>"
         if trial.evidence is not None:
             yield _render_viewer(trial.evidence, read_muscle_states(trial))
-    shown = [trial for trial in trials if trial.evidence is not None]
-    yield from _render_section("Joint angles", collect_angles(shown))
-    yield from _render_section("Joint moments", collect_moments(shown))
-    for title, note, panels in collect_actuators(shown):
+    moving_trials = [trial for trial in trials if trial.evidence is not None]
+    yield from _render_section("Joint angles", collect_angles(moving_trials))
+    yield from _render_section("Joint moments", collect_moments(moving_trials))
+    for title, note, panels in collect_actuators(moving_trials):
         yield from _render_panels(title, note, panels)
-    yield from _render_section("Controls", collect_controls(shown))
-    yield from _render_section("Contact forces", collect_contacts(shown))
-    for trial in shown:
-        name = f": {trial.name}" if len(shown) > 1 else ""
+    yield from _render_section("Controls", collect_controls(moving_trials))
+    yield from _render_section("Contact forces", collect_contacts(moving_trials))
+    for trial in moving_trials:
+        name = f": {trial.name}" if len(moving_trials) > 1 else ""
         yield from _render_residuals(trial, name)
         yield from _render_errors(trial, name)
 
@@ -197,39 +197,41 @@ def _render_messages(trial: TrialOutcomes) -> Iterator[str]:
             setup = trial.setups[index]
             tool = f"{type(get_object(str(setup))).__name__}, {setup.name}"
         source = html.escape(tool)
-        for name, words in outcome.told:
+        for name, message in outcome.told:
             yield (
                 f'<tr><td class="source">{source}</td><th>{html.escape(name)}</th>'
-                f"<td>{html.escape(words)}</td></tr>"
+                f"<td>{html.escape(message)}</td></tr>"
             )
 
 
 def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     """Yield the HTML of the results' quality by published limits."""
-    written = [file for outcome in outcomes.values() for file in outcome.files]
+    result_files = [file for outcome in outcomes.values() for file in outcome.files]
     setups = [setup for setup in outcomes if type(get_object(str(setup))).__name__ in SETUPS]
     try:
-        result = check_trial(*setups, written=written) if setups else None
+        result = check_trial(*setups, written=result_files) if setups else None
     # A trial without checkable results has no verdicts, but it has a report.
     except OsimliteError:
         return
     if result is None or not result.verdicts:
         return
     rows = "".join(
-        f'<tr><td class="{item.verdict}">{item.verdict}</td><td '
-        f'class="number">{html.escape(item.shown)}</td>'
-        f'<td class="number">{item.limits}</td><td>{html.escape(item.words)} '
-        f'<span class="source">{html.escape(item.source)}</span></td></tr>'
-        for item in result.worst
+        f'<tr><td class="{verdict.verdict}">{verdict.verdict}</td><td '
+        f'class="number">{html.escape(verdict.shown)}</td>'
+        f'<td class="number">{verdict.limits}</td><td>{html.escape(verdict.words)} '
+        f'<span class="source">{html.escape(verdict.source)}</span></td></tr>'
+        for verdict in result.worst
     )
-    left = "".join(f"<li>{html.escape(why)}</li>" for why in result.unchecked)
-    left = f'<p class="note">Not checked:</p><ul class="note">{left}</ul>' if left else ""
+    unchecked = "".join(f"<li>{html.escape(reason)}</li>" for reason in result.unchecked)
+    unchecked = (
+        f'<p class="note">Not checked:</p><ul class="note">{unchecked}</ul>' if unchecked else ""
+    )
     yield (
         '<h2>Is it good enough?</h2><p class="note">The worst value of each kind. Good: within '
         "every published limit; okay: "
         "beyond the stricter of two limits; bad: beyond "
         "all.</p><table><tr><th></th><th></th><th>limits</th><th></th></tr>"
-        f"{rows}</table>{left}"
+        f"{rows}</table>{unchecked}"
     )
 
 
@@ -308,19 +310,21 @@ def _divide_actuators(table: StoTable, names: ColumnNames) -> dict[str, list[Col
     """Return the columns of activations, of muscle forces and of other actuators of a table."""
     result: dict[str, list[Column]] = {}
     if table.name == ACTIVATION_TITLE:
-        columns = [item for item in describe_columns(table, names) if item.name in names.regions]
-        result["activation"] = [_limit(item, names.control_limits) for item in columns]
+        columns = [
+            column for column in describe_columns(table, names) if column.name in names.regions
+        ]
+        result["activation"] = [_limit(column, names.control_limits) for column in columns]
     elif table.name in ("ActuatorForces", "ModelForces"):
-        for item in describe_columns(table, names):
-            if item.name in names.regions:
-                result.setdefault("muscle", []).append(_limit(item, names.force_limits))
-            elif item.name in names.units:
-                result.setdefault("other", []).append(_limit(item, names.force_limits))
+        for column in describe_columns(table, names):
+            if column.name in names.regions:
+                result.setdefault("muscle", []).append(_limit(column, names.force_limits))
+            elif column.name in names.units:
+                result.setdefault("other", []).append(_limit(column, names.force_limits))
     else:
         columns = [
-            _limit(item._replace(section=""), names.control_limits)
-            for item in describe_columns(table, names)
-            if item.section == SECTIONS["activation"]
+            _limit(column._replace(section=""), names.control_limits)
+            for column in describe_columns(table, names)
+            if column.section == SECTIONS["activation"]
         ]
         result["activation"] = columns
     return result
@@ -333,9 +337,9 @@ def _limit(column: Column, limits: Mapping[str, tuple[float, ...]]) -> Column:
 
 def _render_panels(title: str, note: str, panels: Sequence[Panel]) -> Iterator[str]:
     """Yield the HTML of pages of panels."""
-    over = "Over the gait cycle." if has_cycles(panels) else "Over time."
+    axis_note = "Over the gait cycle." if has_cycles(panels) else "Over time."
     pictures = "".join(_render_image(figure) for figure in draw_pages("", panels))
-    yield f'<h2>{title}</h2><p class="note">{over} {note}</p>{pictures}'
+    yield f'<h2>{title}</h2><p class="note">{axis_note} {note}</p>{pictures}'
 
 
 def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
@@ -351,20 +355,22 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
         stations_by_name = {
             path.rpartition("/")[2]: station for path, station in mechanism.stations.items()
         }
-        known = [index for index, name in enumerate(evidence.markers) if name in stations_by_name]
-        names = [evidence.markers[index] for index in known]
+        known_indices = [
+            index for index, name in enumerate(evidence.markers) if name in stations_by_name
+        ]
+        names = [evidence.markers[index] for index in known_indices]
         stations = [
             (stations_by_name[name].body, np.asarray(stations_by_name[name].location))
             for name in names
         ]
-        measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
+        measured = MeasuredMarkers(names, stations, evidence.measured[:, known_indices])
     motion = _create_recording(
         replace(evidence, states={**evidence.states, **states}), mechanism, measured
     )
-    shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
+    viewer = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
     # A report shows no findings about the model.
     page = (
-        replace(shown, findings=())
+        replace(viewer, findings=())
         .page_text()
         .replace("</style>", f"{NO_SIDEBAR_STYLE}</style>", 1)
     )
@@ -443,13 +449,13 @@ def collect_moments(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
             root = _find_root_names(outcome.evidence)
             for table in _select_dynamics_tables(outcome):
                 for label in table.columns:
-                    name, _, kind = label.rpartition("_")
+                    name, _, quantity = label.rpartition("_")
                     # Generalized forces at the root are residuals, which have a section of their
                     # own.
-                    if name in root or kind not in ("moment", "force"):
+                    if name in root or quantity not in ("moment", "force"):
                         continue
                     stem, side = split_side(name)
-                    unit = "N m" if kind == "moment" else "N"
+                    unit = "N m" if quantity == "moment" else "N"
                     line = _Curve(
                         table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps
                     )
@@ -475,8 +481,10 @@ def collect_controls(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]
             stem, side = split_side(label.rpartition("/")[2])
             column = evidence.controls[label]
             times = evidence.controls.times
-            known = np.isfinite(column)
-            line = _Curve(times[known], column[known], side, STYLES[number % 3], trial.name, {})
+            is_known = np.isfinite(column)
+            line = _Curve(
+                times[is_known], column[is_known], side, STYLES[number % 3], trial.name, {}
+            )
             panels.setdefault(stem, []).append(line)
     return panels
 
@@ -593,7 +601,7 @@ def _render_residuals(trial: TrialOutcomes, name: str) -> Iterator[str]:
     for outcome in trial.outcomes:
         root = _find_root_names(outcome.evidence)
         for table in _select_dynamics_tables(outcome):
-            kinds = {
+            labels_by_unit = {
                 unit: [
                     label
                     for label in table.columns
@@ -601,10 +609,12 @@ def _render_residuals(trial: TrialOutcomes, name: str) -> Iterator[str]:
                 ]
                 for ending, unit in (("_force", "force (N)"), ("_moment", "moment (N m)"))
             }
-            if not any(kinds.values()):
+            if not any(labels_by_unit.values()):
                 continue
             figure = make_figure("", (11.0, 3.0))
-            for panel, (unit, labels) in zip(figure.subplots(1, 2), kinds.items(), strict=True):
+            for panel, (unit, labels) in zip(
+                figure.subplots(1, 2), labels_by_unit.items(), strict=True
+            ):
                 for color, label in zip(COLORS, labels, strict=False):
                     panel.plot(
                         table.times,
@@ -661,26 +671,31 @@ def _draw_errors(
     Returns:
         The figure.
     """
-    seen = np.isfinite(errors)
-    filled = np.where(seen, errors, 0.0)
+    is_measured = np.isfinite(errors)
+    known_errors = np.where(is_measured, errors, 0.0)
     # A frame without any measured marker divides by 1, not by 0.
-    rms = np.sqrt((filled**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1))
+    rms = np.sqrt((known_errors**2).sum(axis=1) / np.maximum(is_measured.sum(axis=1), 1))
     figure = make_figure("", (11.0, 3.4))
-    over, beside = figure.subplots(1, 2, width_ratios=(2, 1))
-    over.plot(times, rms, color=COLORS[0], lw=1.6, label="root mean square")
-    over.plot(times, filled.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
+    time_axes, name_axes = figure.subplots(1, 2, width_ratios=(2, 1))
+    time_axes.plot(times, rms, color=COLORS[0], lw=1.6, label="root mean square")
+    time_axes.plot(times, known_errors.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
     for limit, color in zip(limits, COLORS, strict=False):
-        over.axhline(limit, color=color, lw=0.8, ls="--")
-    over.set_ylabel(f"{noun} error ({unit})")
-    over.set_ylim(bottom=0.0)
-    over.legend(frameon=False, fontsize=8)
-    _style_axes(over, "time (s)")
-    each = np.sqrt((filled**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
-    worst = np.argsort(-each)[:MAX_NAMED_MARKERS][::-1]
-    beside.barh([names[index] for index in worst], each[worst], color=COLORS[0], height=0.7)
-    beside.tick_params(axis="y", labelsize=8)
-    beside.set_title(f"worst {noun}s", fontsize=10, loc="left")
-    _style_axes(beside, f"root mean square ({unit})")
+        time_axes.axhline(limit, color=color, lw=0.8, ls="--")
+    time_axes.set_ylabel(f"{noun} error ({unit})")
+    time_axes.set_ylim(bottom=0.0)
+    time_axes.legend(frameon=False, fontsize=8)
+    _style_axes(time_axes, "time (s)")
+    rms_by_name = np.sqrt((known_errors**2).sum(axis=0) / np.maximum(is_measured.sum(axis=0), 1))
+    worst_indices = np.argsort(-rms_by_name)[:MAX_NAMED_MARKERS][::-1]
+    name_axes.barh(
+        [names[index] for index in worst_indices],
+        rms_by_name[worst_indices],
+        color=COLORS[0],
+        height=0.7,
+    )
+    name_axes.tick_params(axis="y", labelsize=8)
+    name_axes.set_title(f"worst {noun}s", fontsize=10, loc="left")
+    _style_axes(name_axes, f"root mean square ({unit})")
     return figure
 
 
@@ -689,7 +704,7 @@ def _add_legend(figure: Any, lines: Sequence[_Curve]) -> None:
     # matplotlib is optional, so that this module can be imported without it.
     from matplotlib.lines import Line2D
 
-    sides = [
+    side_handles = [
         Line2D([], [], color=color, label=name)
         for side, (color, name) in SIDES.items()
         if name and any(line.side == side for line in lines)
@@ -700,9 +715,13 @@ def _add_legend(figure: Any, lines: Sequence[_Curve]) -> None:
         if len(trials) > 1
         else []
     )
-    if sides or styles:
+    if side_handles or styles:
         figure.legend(
-            handles=[*sides, *styles], loc="outside upper right", ncols=6, frameon=False, fontsize=9
+            handles=[*side_handles, *styles],
+            loc="outside upper right",
+            ncols=6,
+            frameon=False,
+            fontsize=9,
         )
 
 
@@ -718,9 +737,7 @@ def _style_axes(panel: Any, label: str) -> None:
 
 def _render_image(figure: Any) -> str:
     """Return the HTML of a figure as an embedded image."""
-    out = io.BytesIO()
+    stream = io.BytesIO()
     # Vector graphics remain sharp when the page is enlarged or printed.
-    figure.savefig(out, format="svg")
-    return (
-        f'<img alt="" src="data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}">'
-    )
+    figure.savefig(stream, format="svg")
+    return f'<img alt="" src="data:image/svg+xml;base64,{base64.b64encode(stream.getvalue()).decode()}">'

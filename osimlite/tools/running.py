@@ -49,10 +49,15 @@ class FaultySetup(DocumentError):
     """
 
     def __init__(self, report: Report) -> None:
-        first, *others = report.errors
-        more = f"; and {format_count(len(others), 'error')} more" if others else ""
+        first_error, *other_errors = report.errors
+        count_note = (
+            f"; and {format_count(len(other_errors), 'error')} more" if other_errors else ""
+        )
         super().__init__(
-            f"{first.message}{more}", file=first.file, line=first.line, column=first.column
+            f"{first_error.message}{count_note}",
+            file=first_error.file,
+            line=first_error.line,
+            column=first_error.column,
         )
         self.report = report
 
@@ -104,46 +109,46 @@ def run(
     if not isinstance(setup, str | os.PathLike):
         raise OsimliteError(f"expected the path of a setup file, found a {type(setup).__name__}")
     file = Path(setup)
-    top = read_any(file)
-    tag = type(top).__name__
-    if tag not in TOOLS:
+    setup_object = read_any(file)
+    class_name = type(setup_object).__name__
+    if class_name not in TOOLS:
         raise NotRunnable(
-            f"osimlite cannot run a {tag}; it runs {join_words(list_runnable())}",
+            f"osimlite cannot run a {class_name}; it runs {join_words(list_runnable())}",
             file=str(file),
         )
     # An option without effect would suggest results that it does not give.
-    if refine is not None and not tag.startswith("Moco"):
-        raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
+    if refine is not None and not class_name.startswith("Moco"):
+        raise SettingError(f"a {class_name} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
-    replaced = substitute_inputs(top, file.parent, substitutes or {})
+    replaced = substitute_inputs(setup_object, file.parent, substitutes or {})
     # Errors are cheaper to find before a tool that may run for hours.
     if check:
         report_stage("checking the setup")
-        away: dict[str, None] = {}
-        report = merge_reports(_check_documents(str(file), away))
+        files_elsewhere: dict[str, None] = {}
+        report = merge_reports(_check_documents(str(file), files_elsewhere))
         # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
         ]:
             raise FaultySetup(Report(errors, report.texts))
-        if away:
+        if files_elsewhere:
             outcome.add_message(
                 "current folder",
-                f"contains {join_words(away)}, which the folder of the setup lacks",
+                f"contains {join_words(files_elsewhere)}, which the folder of the setup lacks",
             )
         outcome.warnings = sorted(
-            report.errors + report.warnings, key=lambda found: found.suggestion is None
+            report.errors + report.warnings, key=lambda finding: finding.suggestion is None
         )
-        misspelt = [found for found in outcome.warnings if found.suggestion is not None]
+        misspelt = [finding for finding in outcome.warnings if finding.suggestion is not None]
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))
-    run_tool = import_function(TOOLS[tag])
+    run_tool = import_function(TOOLS[class_name])
     writer = ResultWriter.for_document(file, output, overwrite=overwrite, outside=write_outside)
     try:
         folder = None if output is None else Path(output)
-        report_stage(f"{tag}: computing")
-        run_tool(Job(top, file, folder, refine, simulates), outcome)
-        report_stage(f"{tag}: writing results")
+        report_stage(f"{class_name}: computing")
+        run_tool(Job(setup_object, file, folder, refine, simulates), outcome)
+        report_stage(f"{class_name}: writing results")
         outcome.write(file, writer)
     except OsimliteError as error:
         # Importing the simulation here keeps setups that need none fast.
@@ -153,19 +158,24 @@ def run(
         error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
         error.file = error.file or str(file)
         subject = load_subject(str(file), Config()) if isinstance(error, MissingFileError) else None
-        if isinstance(subject, Setup) and (maker := subject.find_writer(error.file)) is not None:
+        if (
+            isinstance(subject, Setup)
+            and (writing_setup := subject.find_writer(error.file)) is not None
+        ):
             error.message += (
-                f"; run '{get_relative_path(maker, Path.cwd())}' first, which writes it"
+                f"; run '{get_relative_path(writing_setup, Path.cwd())}' first, which writes it"
             )
         raise
     return outcome
 
 
-def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str]) -> list[str]:
+def substitute_inputs(
+    setup_object: Object, folder: Path, substitutes: Mapping[str, str]
+) -> list[str]:
     """Replace the names of some input files in a document.
 
     Args:
-        top: object of the document, which is changed.
+        setup_object: object of the document, which is changed.
         folder: folder from which the paths in the document start.
         substitutes: by absolute path of an input, the path of its replacement.
 
@@ -181,13 +191,13 @@ def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str])
         replaced.append(name.strip())
         return new
 
-    for item in top.walk() if substitutes else ():
-        for spec in get_file_specs(type(item), "file"):
-            value = getattr(item, spec.name)
+    for component in setup_object.walk() if substitutes else ():
+        for spec in get_file_specs(type(component), "file"):
+            value = getattr(component, spec.name)
             if isinstance(value, str):
-                setattr(item, spec.name, substitute(value))
+                setattr(component, spec.name, substitute(value))
             elif isinstance(value, tuple):
-                setattr(item, spec.name, tuple(substitute(str(name)) for name in value))
+                setattr(component, spec.name, tuple(substitute(str(name)) for name in value))
     return replaced
 
 
@@ -211,15 +221,15 @@ def _is_run_by_opensim(error: Finding) -> bool:
 
 def list_runnable() -> list[str]:
     """Return the names of the classes whose setups osimlite can run."""
-    return [tag for tag in MODULES if tag in TOOLS]
+    return [class_name for class_name in MODULES if class_name in TOOLS]
 
 
-def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
+def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[Report]:
     """Yield reports on a document and on documents and tables that it names, without models.
 
     Args:
         setup: path of the document.
-        away: receives the files that are in the current folder, but not in the folder of the
+        files_elsewhere: receives the files that are in the current folder, but not in the folder of the
             document that names them.
     """
     waiting = deque([setup])
@@ -231,18 +241,18 @@ def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
         yield checked(subject, measure=False)
         if not isinstance(subject, Setup):
             continue
-        named: list[str] = []
+        document_paths: list[str] = []
         for naming in subject.find_named_files("file"):
             path = naming.path
             if not os.path.isfile(path):
                 continue
             # The file was found relative to the current folder, not to that of the document.
             if path == naming.name.strip() and not os.path.isabs(path):
-                away[path] = None
+                files_elsewhere[path] = None
             real = os.path.realpath(path)
             if real not in visited and (is_table(path) or path.lower().endswith(".xml")):
                 visited.add(real)
                 limit_documents(visited, setup)
-                named.append(path)
+                document_paths.append(path)
         # Depth first: files that a document names come before those of the next document.
-        waiting.extendleft(reversed(named))
+        waiting.extendleft(reversed(document_paths))

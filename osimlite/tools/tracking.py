@@ -139,8 +139,8 @@ class DesiredMotion:
         """Return values, rates, speeds and accelerations (k, 4, n) at some times (k,) in s."""
         moments = np.atleast_1d(times)
         q, rates = self._curves[0].derivatives(moments, (0, 1))
-        (others,) = self._curves[1].derivatives(moments, (0,))
-        return np.stack([q, rates, *np.split(others, 2, axis=1)], axis=1)
+        (derivatives,) = self._curves[1].derivatives(moments, (0,))
+        return np.stack([q, rates, *np.split(derivatives, 2, axis=1)], axis=1)
 
 
 def _apply_locks(
@@ -158,12 +158,12 @@ def _apply_locks(
         if not info.locked:
             continue
         values[:, index] = info.default_value
-        apart = float(np.abs(info.default_value - recorded.values[:, index]).max())
-        if info.name not in recorded.missing and apart > LOCK_TOLERANCE:
+        deviation = float(np.abs(info.default_value - recorded.values[:, index]).max())
+        if info.name not in recorded.missing and deviation > LOCK_TOLERANCE:
             unit = "rad" if info.motion_type == "rotational" else "m"
             outcome.add_message(
                 info.name,
-                f"locked at {info.default_value:g} {unit}, up to {apart:.3g} {unit} from the "
+                f"locked at {info.default_value:g} {unit}, up to {deviation:.3g} {unit} from the "
                 "desired motion; "
                 "as in OpenSim, the lock wins, and a task of this coordinate has no effect",
             )
@@ -214,32 +214,35 @@ class TrackingTasks:
         path = job.require_path("task_set_file")
         result = []
         names = mechanism.coordinate_names
-        for item in job.read_object(path, CMC_TaskSet).objects:
+        for task in job.read_object(path, CMC_TaskSet).objects:
             # Subclasses would be tracked by other rules.
-            if type(item) is not CMC_Joint:
-                message = f"the task '{item.name}' is a {type(item).__name__}, which osimlite cannot track yet"
+            if type(task) is not CMC_Joint:
+                message = f"the task '{task.name}' is a {type(task).__name__}, which osimlite cannot track yet"
                 raise NotRunnable(message, file=str(path))
-            for tag in ("active", "weight", "kp", "kv", "ka"):
-                if not getattr(item, tag):
+            for property_name in ("active", "weight", "kp", "kv", "ka"):
+                if not getattr(task, property_name):
                     raise job.create_error(
-                        f"the task '{item.name}' of '{path}' has an empty '{tag}'; set a value"
+                        f"the task '{task.name}' of '{path}' has an empty '{property_name}'; set a value"
                     )
             # As in OpenSim, `on` has no effect.
-            if not item.active[0]:
+            if not task.active[0]:
                 continue
-            for name in (item.name, str(item.coordinate)):
+            for name in (task.name, str(task.coordinate)):
                 if name not in names:
-                    near = suggest_name(name, names)
+                    suggestion = suggest_name(name, names)
                     raise job.create_error(
-                        f"the task '{item.name}' of '{path}' names an unknown coordinate "
-                        f"'{name}'{near}"
+                        f"the task '{task.name}' of '{path}' names an unknown coordinate "
+                        f"'{name}'{suggestion}"
                     )
             weight, kp, kv, ka = (
-                float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka")
+                float(getattr(task, property_name)[0])
+                for property_name in ("weight", "kp", "kv", "ka")
             )
-            index = names.index(str(item.coordinate))
-            wanted = names.index(item.name)
-            result.append(CoordinateTask(item.name, index, wanted, weight, kp, kv, ka, item.limit))
+            index = names.index(str(task.coordinate))
+            desired_index = names.index(task.name)
+            result.append(
+                CoordinateTask(task.name, index, desired_index, weight, kp, kv, ka, task.limit)
+            )
         if not result:
             raise job.create_error(
                 f"no task of '{path}' is active; set the first of its 'active' to true"
@@ -268,19 +271,21 @@ class TrackingTasks:
             Errors of the values and of the speeds, each (k,) for k tasks.
         """
         followers = self.coordinates
-        other = [task.wanted for task in self.tasks]
-        return desired[0, other] - q[followers], desired[2, other] - u[followers]
+        desired_indices = [task.wanted for task in self.tasks]
+        return desired[0, desired_indices] - q[followers], desired[2, desired_indices] - u[
+            followers
+        ]
 
-    def compute_accelerations(self, errors: tuple[Array, Array], ahead: Array) -> Array:
+    def compute_accelerations(self, errors: tuple[Array, Array], desired: Array) -> Array:
         """Compute the accelerations (k,) that correct errors: ka u̇ + kv ėrr + kp err.
 
         Args:
             errors: errors of values and speeds.
-            ahead: desired motion (4, n) at the end of the window.
+            desired: desired motion (4, n) at the end of the window.
         """
         kp, kv, ka = np.array([(task.kp, task.kv, task.ka) for task in self.tasks]).T
-        ends: Array = ka * ahead[3, [task.wanted for task in self.tasks]]
-        return ends + kv * errors[1] + kp * errors[0]
+        accelerations: Array = ka * desired[3, [task.wanted for task in self.tasks]]
+        return accelerations + kv * errors[1] + kp * errors[0]
 
     def compute_force_weight(self, errors: Array) -> float:
         """Return the weight of the forces, which falls as errors approach the limits of tasks."""
@@ -361,26 +366,36 @@ class ForceDistribution:
         Returns:
             Forces (a,), and the missing accelerations in words; "" if none is missing.
         """
-        still, each, lightness = self.compute_responses(t, q, u)
+        free_accelerations, responses, lightness = self.compute_responses(t, q, u)
         followers = self.tasks.coordinates
-        columns = each[followers]
-        rest = requested - still[followers]
+        columns = responses[followers]
+        missing_accelerations = requested - free_accelerations[followers]
         if self.exact:
             return self._compute_exact_forces(
-                t, q, u, columns, rest, lightness[np.ix_(followers, followers)], bounds
+                t,
+                q,
+                u,
+                columns,
+                missing_accelerations,
+                lightness[np.ix_(followers, followers)],
+                bounds,
             )
         # Squares of errors and of forces are minimized together, so weights enter by their roots.
         weights = np.sqrt(self.tasks.weights)
-        share = math.sqrt(self.tasks.compute_force_weight(errors))
+        force_weight = math.sqrt(self.tasks.compute_force_weight(errors))
         # The acceleration errors are unknowns as well, and their squares are minimized together with
         # those of the forces.
         size = len(followers)
-        scale = self.optimal / max(share, MIN_FORCE_WEIGHT)
-        given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
-        free = np.full(size, np.inf)
-        ends = np.hstack([np.sort(np.array(bounds) / scale, axis=0), [-free, free]])
-        found, _, _ = minimize_effort(given.T[None], (weights * rest)[None], 2.0, ends)
-        return found[0, : len(scale)] * scale, ""
+        scale = self.optimal / max(force_weight, MIN_FORCE_WEIGHT)
+        matrix = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
+        unbounded = np.full(size, np.inf)
+        scaled_bounds = np.hstack(
+            [np.sort(np.array(bounds) / scale, axis=0), [-unbounded, unbounded]]
+        )
+        solution, _, _ = minimize_effort(
+            matrix.T[None], (weights * missing_accelerations)[None], 2.0, scaled_bounds
+        )
+        return solution[0, : len(scale)] * scale, ""
 
     def _compute_exact_forces(
         self,
@@ -388,7 +403,7 @@ class ForceDistribution:
         q: Array,
         u: Array,
         columns: Array,
-        rest: Array,
+        accelerations: Array,
         lightness: Array,
         bounds: tuple[Array, Array],
     ) -> tuple[Array, str]:
@@ -399,7 +414,7 @@ class ForceDistribution:
             q: values (n,).
             u: speeds (n,).
             columns: accelerations of the tasks by each force (k, a).
-            rest: accelerations that the forces must give (k,).
+            accelerations: accelerations that the forces must give (k,).
             lightness: accelerations of the tasks by each generalized force (k, k).
             bounds: lower and upper bounds of the forces (a,).
 
@@ -415,8 +430,8 @@ class ForceDistribution:
         # Forces cannot change the acceleration of a locked coordinate.
         infos = [self.mechanism.coordinates[k] for k in self.tasks.coordinates]
         has_target = (self.tasks.weights != 0.0) & ~np.array([info.locked for info in infos])
-        each = columns[has_target][:, able]
-        left = (rest - columns[:, ~able] @ forces[~able])[has_target]
+        responses = columns[has_target][:, able]
+        target = (accelerations - columns[:, ~able] @ forces[~able])[has_target]
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
         # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force
@@ -425,14 +440,15 @@ class ForceDistribution:
         mass = np.linalg.pinv(
             lightness[np.ix_(has_target, has_target)], RANK_TOLERANCE, hermitian=True
         )
-        rows = np.ascontiguousarray((mass @ (each * scale)).T)
-        result, _, solved = minimize_effort(rows[None], (mass @ left)[None], 2.0, scaled)
+        rows = np.ascontiguousarray((mass @ (responses * scale)).T)
+        result, _, solved = minimize_effort(rows[None], (mass @ target)[None], 2.0, scaled)
         forces[able] = result[0] * scale
-        lacking = left - each @ forces[able]
+        deficits = target - responses @ forces[able]
         if (
             solved[0]
             and (
-                np.abs(lacking) <= ACCELERATION_TOLERANCE * (np.abs(each) @ np.abs(forces[able]))
+                np.abs(deficits)
+                <= ACCELERATION_TOLERANCE * (np.abs(responses) @ np.abs(forces[able]))
             ).all()
         ):
             return forces, ""
@@ -441,12 +457,14 @@ class ForceDistribution:
             for task, info, counts in zip(self.tasks.tasks, infos, has_target, strict=True)
             if counts
         ]
-        off = np.abs(lacking)
+        deficit_sizes = np.abs(deficits)
         # Small deficits beside the largest one are noise.
-        worst = [
-            f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()
+        largest_deficits = [
+            f"{deficits[k]:.4g} at {names[k]}"
+            for k in np.argsort(-deficit_sizes)
+            if deficit_sizes[k] > 0.1 * deficit_sizes.max()
         ]
-        return forces, join_words(worst, max_count=3)
+        return forces, join_words(largest_deficits, max_count=3)
 
 
 def refuse_controllers(job: Job, model: Model) -> None:

@@ -57,13 +57,15 @@ def run_rra_tool(job: Job, outcome: Outcome) -> None:
     """
     setup: RRATool = job.setup
     model = build_model(job)
-    whole = job.read_model()
+    file_model = job.read_model()
     with build_simulation(job, model) as simulation:
         desired = DesiredMotion.read(job, outcome, simulation, model)
     # The desired motion has coordinates only, so that it remains valid when a mass centre moves.
     if setup.adjust_com_to_reduce_residuals:
-        _move_mass_center(job, outcome, model, whole, desired)
-        outcome.add_text(_get_model_output(job, setup.output_model_file.strip()), to_text(whole))
+        _move_mass_center(job, outcome, model, file_model, desired)
+        outcome.add_text(
+            _get_model_output(job, setup.output_model_file.strip()), to_text(file_model)
+        )
     motion = _track_motion(job, outcome, model, desired, RRA_WINDOW_S, exact=False)
     if motion is None:
         return
@@ -72,8 +74,8 @@ def run_rra_tool(job: Job, outcome: Outcome) -> None:
     forces = outcome.tables[f"{setup.name}_Actuation_force.sto"]
     averages = _average_residual_columns(forces.times, forces.columns, forces.rows)
     outcome.summary["average_residuals"] = dict(zip(RESIDUALS, averages, strict=True))
-    if words := _describe_residuals(averages):
-        outcome.add_message("average residuals", words)
+    if description := _describe_residuals(averages):
+        outcome.add_message("average residuals", description)
     lines = "".join(
         f"{name} average = {value:g}\n" for name, value in zip(RESIDUALS, averages, strict=True)
     )
@@ -83,7 +85,7 @@ def run_rra_tool(job: Job, outcome: Outcome) -> None:
 
 
 def _move_mass_center(
-    job: Job, outcome: Outcome, model: Model, whole: Model, desired: DesiredMotion
+    job: Job, outcome: Outcome, model: Model, file_model: Model, desired: DesiredMotion
 ) -> None:
     """Move the mass centre of a body so that average moments about the horizontal axes vanish.
 
@@ -93,7 +95,7 @@ def _move_mass_center(
         job: the setup.
         outcome: collects messages.
         model: model with the forces of the setup, which is changed.
-        whole: model as in its file, which is changed.
+        file_model: model as in its file, which is changed.
         desired: motion to follow.
     """
     setup: RRATool = job.setup
@@ -115,19 +117,23 @@ def _move_mass_center(
         return
     # The weight W acts along -y, so that a mass centre that moves by (x, 0, z) adds the moments z W
     # about x and -x W about z; these are to replace the residual moments.
-    before = _compute_average_residuals(job, model, desired)
-    dx, dz = np.clip([before[5] / weight, -before[3] / weight], -MAX_SHIFT_M, MAX_SHIFT_M).tolist()
+    averages_before = _compute_average_residuals(job, model, desired)
+    dx, dz = np.clip(
+        [averages_before[5] / weight, -averages_before[3] / weight], -MAX_SHIFT_M, MAX_SHIFT_M
+    ).tolist()
     x, y, z = body.mass_center
-    # `whole`, which is written, lacks the actuators that the setup adds to `model`.
-    for each in (model, whole):
-        next(item for item in each.components(Body) if item.name == name).mass_center = (
+    # `file_model`, which is written, lacks the actuators that the setup adds to `model`.
+    for changed_model in (model, file_model):
+        next(
+            candidate for candidate in changed_model.components(Body) if candidate.name == name
+        ).mass_center = (
             x - dx,
             y,
             z - dz,
         )
-    total = sum(item.mass for item in bodies.values())
+    total = sum(candidate.mass for candidate in bodies.values())
     # The vertical residual is carried by a mass of this size.
-    change = before[1] / gravity[1]
+    change = averages_before[1] / gravity[1]
     outcome.summary |= {"mass_center_moved": [-dx, 0.0, -dz], "mass_change": change}
     outcome.add_message(
         "mass center", f"of {name} moved by {-dx:.4g} m along x and {-dz:.4g} m along z"
@@ -137,11 +143,11 @@ def _move_mass_center(
         f"{total:.6g} kg; {'add' if change > 0 else 'remove'} {abs(change):.4g} kg to remove the vertical residual "
         "(not applied, as in OpenSim)",
     )
-    for when, averages in (
-        ("before", before),
+    for moment_name, averages in (
+        ("before", averages_before),
         ("after", _compute_average_residuals(job, model, desired)),
     ):
-        outcome.add_message(f"residuals {when}", _describe_residuals(averages))
+        outcome.add_message(f"residuals {moment_name}", _describe_residuals(averages))
 
 
 def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -> list[float]:
@@ -149,21 +155,20 @@ def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -
     setup: RRATool = job.setup
     mechanism: Mechanism = build_mechanism(model, opensim_derivatives=True)
     sharing = build_static_optimization(job, model, mechanism, muscles="isometric")
-    given = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
+    requested_range = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
     desired_range = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     # -1, the default of both times, means that none is given.
-    first, last = desired_range if given == (-1.0, -1.0) else given
+    start, end = desired_range if requested_range == (-1.0, -1.0) else requested_range
     # As in OpenSim, a time means the last row that is not later.
     rows = [
-        max(0, int(np.searchsorted(desired.times, time, side="right")) - 1)
-        for time in (first, last)
+        max(0, int(np.searchsorted(desired.times, time, side="right")) - 1) for time in (start, end)
     ]
     selected = slice(rows[0], rows[1] + 1)
     times = desired.times[selected]
     values = desired.values[selected]
     speeds = desired.speeds[selected]
-    (wanted,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))
-    forces = sharing.balance_accelerations(times, values, speeds, wanted)
+    (accelerations,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))
+    forces = sharing.balance_accelerations(times, values, speeds, accelerations)
     return _average_residual_columns(times, sharing.names, forces)
 
 
@@ -212,9 +217,9 @@ def _track_motion(
     refuse_controllers(job, model)
     analyses = find_analyses(job)
     # OpenSim adds both analyses to every RRATool and CMCTool: their tables are the results.
-    have = {type(item) for item, _ in analyses}
+    present_classes = {type(item) for item, _ in analyses}
     for cls in (Actuation, Kinematics):
-        if cls not in have:
+        if cls not in present_classes:
             setup.analysis_set.objects.append(cls(name=cls.__name__))
     for item in setup.analysis_set.objects:
         if isinstance(item, Kinematics):
@@ -242,9 +247,9 @@ def _track_motion(
         if not followed.failure:
             bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
             settings = EngineSettings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
-            before = followed.errors
+            settling_errors = followed.errors
             followed = tracker.follow_motion(start, y, end - window, settings)
-            followed.errors = before | followed.errors
+            followed.errors = settling_errors | followed.errors
         if followed.failure:
             outcome.done = False
             outcome.add_message("ended early", followed.failure)
@@ -265,9 +270,9 @@ def _track_motion(
 def _create_controls(job: Job, sharing: ForceDistribution, model: Model) -> list[ActuatorControl]:
     """Return a control for each actuator, with the bounds of the setup."""
     path = job.find_path("constraints_file")
-    given = None if path is None else job.read_object(path, ControlSet)
+    bounds_set = None if path is None else job.read_object(path, ControlSet)
     actuators = {item.name: item for item in model.force_set.objects}
-    return [ActuatorControl.create(actuators[name], given) for name in sharing.names]
+    return [ActuatorControl.create(actuators[name], bounds_set) for name in sharing.names]
 
 
 def _compute_first_state(
@@ -283,8 +288,8 @@ def _compute_first_state(
         isinstance(job.setup, RRATool) or job.setup.solve_for_equilibrium_for_auxiliary_states
     )
     default = simulation.initial_state({}, {}, equilibrate=in_equilibrium)
-    (wanted,) = desired.evaluate(start)
-    q, u = wanted[0], wanted[2]
+    (desired_row,) = desired.evaluate(start)
+    q, u = desired_row[0], desired_row[2]
     return simulation.state.pack(q.tolist(), u.tolist(), default[2 * len(simulation.state.order) :])
 
 
@@ -295,15 +300,15 @@ def _write_tables(
     name = job.setup.name
     precision = job.setup.output_precision
 
-    def add(ending: str, table: StoTable) -> None:
+    def write_table(ending: str, table: StoTable) -> None:
         outcome.add_table(job.get_results_path(f"{name}_{ending}.sto"), table, precision=precision)
 
     paths = tuple(motion.simulation.paths)
-    add(
+    write_table(
         "states", StoTable(name, motion.times, paths, np.column_stack([*motion.histories.values()]))
     )
     labels = tuple(path.rpartition("/")[2] for path in motion.simulation.forces.controls.names)
-    add(
+    write_table(
         "controls",
         StoTable(
             "controls",
@@ -319,9 +324,9 @@ def _write_tables(
         columns,
         np.array([*followed.errors.values()]),
     )
-    add("pErr", errors)
+    write_table("pErr", errors)
     controls = ControlSet(
-        name=motion.model.name, objects=[item.create_document() for item in tracker.controls]
+        name=motion.model.name, objects=[control.create_document() for control in tracker.controls]
     )
     outcome.add_text(
         job.get_results_path(f"{name}_controls.xml"), to_text(controls, numbers="opensim")
@@ -335,16 +340,17 @@ def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: Tracked
     infos = motion.mechanism.coordinates
     turning = [info.name for info in infos if info.motion_type == "rotational"]
     table = outcome.tables[f"{job.setup.name}_pErr.sto"]
-    for what, unit, factor, selected in (
+    for quantity, unit, factor, selected in (
         ("angle", "deg", np.degrees(1.0), [k for k, n in enumerate(table.columns) if n in turning]),
         ("translation", "m", 1.0, [k for k, n in enumerate(table.columns) if n not in turning]),
     ):
         if selected:
-            worst = int(np.argmax(errors[:, selected].max(axis=0)))
+            worst_column = int(np.argmax(errors[:, selected].max(axis=0)))
             largest = factor * float(errors[:, selected].max())
-            outcome.summary[f"worst_{what}"] = largest
+            outcome.summary[f"worst_{quantity}"] = largest
             outcome.add_message(
-                f"worst {what}", f"{largest:.3g} {unit} off, {table.columns[selected[worst]]}"
+                f"worst {quantity}",
+                f"{largest:.3g} {unit} off, {table.columns[selected[worst_column]]}",
             )
 
 

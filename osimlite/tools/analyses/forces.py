@@ -45,15 +45,17 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
     """
     mechanism, model = motion.mechanism, motion.model
     joints = _find_joints(analysis, model, tables)
-    sides = _expand_words("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
+    body_words = _expand_words(
+        "apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables
+    )
     frames = _expand_words(
         "express_in_frame", analysis.express_in_frame or ("ground",), joints, tables
     )
     loads = JointWrenches.compute_along(*_override_forces(analysis, motion, tables))
     columns: list[str] = []
     rows: list[Array] = []
-    for joint, word, requested in zip(joints, sides, frames, strict=True):
-        side = word.lower()
+    for joint, body_word, requested in zip(joints, body_words, frames, strict=True):
+        side = body_word.lower()
         if side not in ("child", "parent"):
             raise tables.job.create_error(f"apply_on_bodies has '{side}'; expected child or parent")
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
@@ -61,8 +63,11 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
         force, moment, point = loads.get_reaction(joint, side)
         rotation, origin = loads.moved.locate_frame(*mechanism.placement(frame))
         # From ground to the frame in which the results are expressed.
-        back = rotation.transpose(0, 2, 1)
-        rows += [(back @ item[..., None])[..., 0] for item in (force, moment, point - origin)]
+        ground_to_frame = rotation.transpose(0, 2, 1)
+        rows += [
+            (ground_to_frame @ vectors[..., None])[..., 0]
+            for vectors in (force, moment, point - origin)
+        ]
         root = f"{joint.name}_on_{_get_last_name(bases[side])}_in_{_get_last_name(frame)}"
         columns += [f"{root}_{ending}" for ending in REACTION_ENDINGS]
     tables.add_table(
@@ -79,31 +84,31 @@ def _find_joints(analysis: JointReaction, model: Model, tables: AnalysisTables) 
 
     OpenSim searches for each joint only after the one before, and ignores the others.
     """
-    every = model.joint_set.objects
+    all_joints = model.joint_set.objects
     names = list(map(str, analysis.joint_names)) or ["ALL"]
     # OpenSim looks at the first word only.
     if names[0].upper() == "ALL":
-        return list(every)
-    known = {joint.name: joint for joint in every}
+        return list(all_joints)
+    joints_by_name = {joint.name: joint for joint in all_joints}
     for name in names:
-        if name not in known:
+        if name not in joints_by_name:
             raise tables.job.create_error(
-                f"unknown joint '{name}' for '{analysis.name}'{suggest_name(name, known)}"
+                f"unknown joint '{name}' for '{analysis.name}'{suggest_name(name, joints_by_name)}"
             )
-    return [known[name] for name in names]
+    return [joints_by_name[name] for name in names]
 
 
 def _expand_words(
-    what: str, given: Sequence[object], joints: Sequence[Joint], tables: AnalysisTables
+    property_name: str, values: Sequence[object], joints: Sequence[Joint], tables: AnalysisTables
 ) -> list[str]:
     """Return a word for each joint; a single word holds for all."""
-    words = list(map(str, given))
+    words = list(map(str, values))
     if len(words) == 1:
         return words * len(joints)
     if len(words) != len(joints):
         count = format_count(len(joints), "joint")
         raise tables.job.create_error(
-            f"{what} has {len(words)} words for {count}; write one word, or one for each joint"
+            f"{property_name} has {len(words)} words for {count}; write one word, or one for each joint"
         )
     return words
 
@@ -162,12 +167,12 @@ def _override_forces(
         return motion, None
     table = read_sto(path)
     model = motion.model.copy_deep()
-    actuators = [item for item in model.components(ScalarActuator)]
-    lacking = [item.name for item in actuators if item.name not in table.columns]
-    if lacking:
+    actuators = [actuator for actuator in model.components(ScalarActuator)]
+    missing_names = [actuator.name for actuator in actuators if actuator.name not in table.columns]
+    if missing_names:
         tables.outcome.add_message(
             analysis.name,
-            f"'{path}' has no column for {join_words(lacking)}: the forces follow from the states, "
+            f"'{path}' has no column for {join_words(missing_names)}: the forces follow from the states, "
             "as in OpenSim",
         )
         return motion, None
@@ -177,29 +182,25 @@ def _override_forces(
     # replaced below.
     model.probe_set.objects.clear()
     indices = {id(force): number for number, force in enumerate(model.force_set.objects)}
-    for item in actuators:
+    for actuator in actuators:
         # An ideal actuator with optimal force 1 has its control as its force.
-        other = make_ideal_actuator(item, 1.0)
-        if other is None or id(item) not in indices:
+        ideal_actuator = make_ideal_actuator(actuator, 1.0)
+        if ideal_actuator is None or id(actuator) not in indices:
             raise tables.job.create_unsupported_error(
-                f"the {type(item).__name__} '{item.name}' cannot take its force from '{path}'; "
+                f"the {type(actuator).__name__} '{actuator.name}' cannot take its force from '{path}'; "
                 "osimlite does not support that yet"
             )
-        model.force_set.objects[indices[id(item)]] = other
+        model.force_set.objects[indices[id(actuator)]] = ideal_actuator
     simulation = build_simulation(tables.job, model)
-    forces = {item.name: (table.times, table[item.name]) for item in actuators}
-    first, last = (float(time) for time in motion.times[[0, -1]])
+    forces = {actuator.name: (table.times, table[actuator.name]) for actuator in actuators}
+    start, end = (float(time) for time in motion.times[[0, -1]])
     controls = add_controls(
-        simulation.forces.controls,
-        forces,
-        last,
-        start=first,
-        description=f"forces of '{path.name}'",
+        simulation.forces.controls, forces, end, start=start, description=f"forces of '{path.name}'"
     )
     simulation.engine.set_controls(controls)
-    pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
+    poses = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
     return Motion(
-        model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])
+        model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in poses])
     ), controls
 
 
@@ -226,26 +227,28 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
         tables: writer of the tables.
     """
     actuators = [
-        item
-        for item in motion.model.force_set.objects
-        if isinstance(item, Actuator) and item.appliesForce
+        actuator
+        for actuator in motion.model.force_set.objects
+        if isinstance(actuator, Actuator) and actuator.appliesForce
     ]
-    for item in actuators:
+    for actuator in actuators:
         # The table has one column per actuator.
-        if item.control_count != 1:
+        if actuator.control_count != 1:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' needs one force of '{item.name}', a {type(item).__name__}, "
+                f"'{analysis.name}' needs one force of '{actuator.name}', a {type(actuator).__name__}, "
                 "which has several; "
                 "OpenSim crashes on such a model"
             )
     tree = motion.model.tree()
-    known = motion.read_records(
-        [tree.path_of(item) or "" for item in actuators], "actuation", "speed"
+    records = motion.read_records(
+        [tree.path_of(actuator) or "" for actuator in actuators], "actuation", "speed"
     )
-    force, speed = known["actuation"], known["speed"]
+    force, speed = records["actuation"], records["speed"]
     # A tension does work against the lengthening speed.
-    sense = np.array([-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators])
-    names = [item.name for item in actuators]
+    sense = np.array(
+        [-1.0 if isinstance(actuator, PathActuator) else 1.0 for actuator in actuators]
+    )
+    names = [actuator.name for actuator in actuators]
     for suffix, title, rows in (
         ("force", "ActuatorForces", force),
         ("speed", "ActuatorSpeeds", speed),

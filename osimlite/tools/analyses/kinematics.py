@@ -23,7 +23,9 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: AnalysisTable
     infos = motion.mechanism.coordinates
     names = [info.name for info in infos]
     indices = motion.find_indices(analysis.coordinates, names, f"coordinates of '{analysis.name}'")
-    turns = [analysis.in_degrees and infos[index].motion_type == "rotational" for index in indices]
+    shown_in_degrees = [
+        analysis.in_degrees and infos[index].motion_type == "rotational" for index in indices
+    ]
     for suffix, name, rows in (
         ("q", "Coordinates", motion.values),
         ("u", "Speeds", motion.speeds),
@@ -34,7 +36,7 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: AnalysisTable
             suffix,
             name,
             [names[index] for index in indices],
-            np.where(turns, np.degrees(selected), selected),
+            np.where(shown_in_degrees, np.degrees(selected), selected),
             in_degrees=analysis.in_degrees,
             description=f"\n{UNITS}",
         )
@@ -61,12 +63,12 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     local = analysis.express_results_in_body_local_frame
     total = sum(body.mass for body in bodies) or 1.0
     result = []
-    whole = np.zeros((3, len(motion.times), 3))
+    center_rows = np.zeros((3, len(motion.times), 3))
     for body in bodies:
         index = indices[tree.path_of(body) or ""]
         linear = np.array(motion.links.compute_point_motion(index, np.array(body.mass_center)))
         # The motion of the mass centre is the weighted mean of those of the bodies.
-        whole += body.mass / total * linear
+        center_rows += body.mass / total * linear
         rotation, _ = motion.links.locate_frame(index, np.eye(4))
         rows = np.stack(
             [linear, [angles_xyz(rotation), *motion.links.get_angular_motion(index)]], axis=2
@@ -84,17 +86,17 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     )
     body_indices = [index for index in selected if index < len(names)]
     columns = [
-        f"{names[index]}_{what}"
+        f"{names[index]}_{component}"
         for index in body_indices
-        for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+        for component in ("X", "Y", "Z", "Ox", "Oy", "Oz")
     ]
-    parts = [np.empty((3, len(motion.times), 0)), *(result[index] for index in body_indices)]
+    blocks = [np.empty((3, len(motion.times), 0)), *(result[index] for index in body_indices)]
     if len(names) in selected:
-        parts.append(whole)
+        blocks.append(center_rows)
         columns += [f"{CENTER_OF_MASS}_{axis}" for axis in "XYZ"]
     frame = "bodyLocal" if local else "global"
     for rows, (suffix, title) in zip(
-        np.concatenate(parts, axis=2),
+        np.concatenate(blocks, axis=2),
         (
             ("pos_global", "Positions"),
             (f"vel_{frame}", "Velocities"),
@@ -136,25 +138,25 @@ def write_point_kinematics(
     """
     mechanism = motion.mechanism
     body_name = str(analysis.body_name)
-    beside = str(analysis.relative_to_body_name)
-    body, placed = mechanism.placement(
+    reference_name = str(analysis.relative_to_body_name)
+    body, placement = mechanism.placement(
         motion.find_frame_path(body_name, *FRAME_SEARCH) or body_name
     )
     result = np.array(
         motion.links.compute_point_motion(
-            body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3]
+            body, placement[:3, :3] @ np.array(analysis.point) + placement[:3, 3]
         )
     )
-    path = motion.find_frame_path(beside, *FRAME_SEARCH)
+    path = motion.find_frame_path(reference_name, *FRAME_SEARCH)
     if path is not None:
         rotation, origin = motion.links.locate_frame(*mechanism.placement(path))
         # Only the position is relative to the other body; the velocities are those in ground, along
         # its axes.
         result[0] -= origin
         result = (result[..., None, :] @ rotation)[..., 0, :]
-    elif beside not in ("", "none"):
+    elif reference_name not in ("", "none"):
         tables.outcome.add_message(
-            analysis.name, f"unknown frame '{beside}': results are in ground, as in OpenSim"
+            analysis.name, f"unknown frame '{reference_name}': results are in ground, as in OpenSim"
         )
     labels = [f"state_{axis}" for axis in range(3)]
     for rows, (suffix, title) in zip(result, POINT_TABLES, strict=True):
@@ -164,7 +166,7 @@ def write_point_kinematics(
             labels,
             rows,
             description="No description.",
-            of=f"_{analysis.point_name}",
+            name_part=f"_{analysis.point_name}",
         )
 
 

@@ -37,18 +37,20 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
         motion: the motion.
         tables: writer of the tables.
     """
-    every = list(motion.model.components(Muscle))
+    all_muscles = list(motion.model.components(Muscle))
     selected = motion.find_indices(
-        analysis.muscle_list, [muscle.name for muscle in every], f"muscles of '{analysis.name}'"
+        analysis.muscle_list,
+        [muscle.name for muscle in all_muscles],
+        f"muscles of '{analysis.name}'",
     )
-    muscles = [every[index] for index in selected]
+    muscles = [all_muscles[index] for index in selected]
     for muscle in muscles:
         # Corrections reproduce OpenSim's numbers; they are known for certain classes only.
-        why = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
-        why = why or ("" if muscle.appliesForce else "which applies no force")
-        if why:
+        reason = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
+        reason = reason or ("" if muscle.appliesForce else "which applies no force")
+        if reason:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' requests '{muscle.name}', a {type(muscle).__name__}, {why}"
+                f"'{analysis.name}' requests '{muscle.name}', a {type(muscle).__name__}, {reason}"
             )
     names = [muscle.name for muscle in muscles]
     result = _compute_tables(motion, muscles)
@@ -107,8 +109,11 @@ def _add_moments(
     ):
         names = [muscle.name for muscle in muscles]
         coordinate_arms = arms[:, :, index]
-        for what, result in (("MomentArm", coordinate_arms), ("Moment", coordinate_arms * tension)):
-            title = f"{what}_{infos[index].name}"
+        for quantity, result in (
+            ("MomentArm", coordinate_arms),
+            ("Moment", coordinate_arms * tension),
+        ):
+            title = f"{quantity}_{infos[index].name}"
             tables.add_table(title, title, names, result, description=MUSCLE_DESCRIPTION)
 
 
@@ -139,11 +144,11 @@ def write_static_optimization(
     problem = build_static_optimization(
         job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles
     )
-    shared = problem.solve_motion(
+    shared_forces = problem.solve_motion(
         motion.times, motion.values, motion.speeds, motion.measured_accelerations
     )
-    forces = problem.report_forces(shared, motion.values, motion.speeds)
-    activations = shared.to_table()
+    forces = problem.report_forces(shared_forces, motion.values, motion.speeds)
+    activations = shared_forces.to_table()
     tables.add_table(
         "activation",
         activations.name,
@@ -155,13 +160,13 @@ def write_static_optimization(
         "force", forces.name, forces.columns, forces.rows, description=FORCES_DESCRIPTION
     )
     tables.add_text("controls.xml", "".join(format_control_set(activations)))
-    _report_unsolved(shared, analysis.name, tables)
+    _report_unsolved(shared_forces, analysis.name, tables)
 
 
-def _report_unsolved(shared: SharedForces, name: str, tables: AnalysisTables) -> None:
+def _report_unsolved(shared_forces: SharedForces, name: str, tables: AnalysisTables) -> None:
     """Report the times without a solution, and the coordinates that lack strength there."""
     outcome = tables.outcome
-    outcome.summary[f"{name}_unsolved"] = np.count_nonzero(~shared.solved)
-    if said := shared.describe_unsolved():
+    outcome.summary[f"{name}_unsolved"] = np.count_nonzero(~shared_forces.solved)
+    if description := shared_forces.describe_unsolved():
         outcome.done = False
-        outcome.add_message(name, said)
+        outcome.add_message(name, description)

@@ -42,50 +42,52 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         tables: writer of the tables.
     """
     tree = motion.model.tree()
-    columns = {kind: list[str]() for kind in OUTPUT_FILES}
-    rows = {kind: [np.empty((len(motion.times), 0))] for kind in OUTPUT_FILES}
+    columns = {value_type: list[str]() for value_type in OUTPUT_FILES}
+    rows = {value_type: [np.empty((len(motion.times), 0))] for value_type in OUTPUT_FILES}
     left_out = []
     for requested in map(str, analysis.output_paths):
-        parts = OUTPUT_PATTERN.fullmatch(requested.strip())
-        if parts is None:
+        match = OUTPUT_PATTERN.fullmatch(requested.strip())
+        if match is None:
             raise tables.job.create_error(
                 f"'{analysis.name}' requests '{requested}', which is not an output; write path|output"
             )
-        path = "/" + parts["path"].strip("/")
+        path = "/" + match["path"].strip("/")
         component = tree.walk(path, "", "Component").target if path != "/" else motion.model
         if not isinstance(component, Component):
             raise tables.job.create_error(
                 f"'{analysis.name}' requests an output of '{path}', which is not in the model"
             )
         outputs = list_outputs(type(component))
-        reader = find_reader(motion, component, parts["output"])
+        reader = find_reader(motion, component, match["output"])
         # Outputs that the class does not list, such as those of states, are single numbers.
-        kind = outputs[parts["output"]].type if parts["output"] in outputs else "double"
-        if kind not in OUTPUT_FILES:
+        value_type = outputs[match["output"]].type if match["output"] in outputs else "double"
+        if value_type not in OUTPUT_FILES:
             left_out.append(requested)
             continue
-        if parts["output"] not in outputs and reader is None:
-            near = suggest_name(parts["output"], outputs)
+        if match["output"] not in outputs and reader is None:
+            suggestion = suggest_name(match["output"], outputs)
             raise tables.job.create_error(
-                f"'{path}' has no output '{parts['output']}' for '{analysis.name}'{near}"
+                f"'{path}' has no output '{match['output']}' for '{analysis.name}'{suggestion}"
             )
         # Channels belong to list outputs, which have no reader.
-        if reader is None or parts["channel"]:
+        if reader is None or match["channel"]:
             raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' requests '{requested}' of a {type(component).__name__}, which "
                 "osimlite cannot compute yet"
             )
-        columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")
-        rows[kind].append(reader(motion, component, path))
+        columns[value_type].append(match["alias"] or f"{path}|{match['output']}")
+        rows[value_type].append(reader(motion, component, path))
     if left_out:
-        kinds = join_words([*OUTPUT_FILES])
+        type_names = join_words([*OUTPUT_FILES])
         tables.outcome.add_message(
             analysis.name,
-            f"{join_words(left_out)}: left out, as only {kinds} are reported, as in OpenSim",
+            f"{join_words(left_out)}: left out, as only {type_names} are reported, as in OpenSim",
         )
-    for kind, name in OUTPUT_FILES.items():
-        if columns[kind]:
-            tables.add_typed_table(name, columns[kind], np.hstack(rows[kind]), kind)
+    for value_type, name in OUTPUT_FILES.items():
+        if columns[value_type]:
+            tables.add_typed_table(
+                name, columns[value_type], np.hstack(rows[value_type]), value_type
+            )
 
 
 FORCES_DESCRIPTION = (
@@ -104,12 +106,14 @@ def write_forces(analysis: ForceReporter, motion: Motion, tables: AnalysisTables
         motion: the motion.
         tables: writer of the tables.
     """
-    rows = motion.compute_by_parts(lambda part: collect_force_records(part, motion.system))
+    rows = motion.compute_by_parts(
+        lambda part_motion: collect_force_records(part_motion, motion.system)
+    )
     labels = label_as_opensim(motion.system.columns)
     if analysis.include_constraint_forces and motion.simulation.constraints:
-        more, result = compute_constraint_records(motion)
-        labels = labels + more
-        rows = np.hstack([rows, result])
+        constraint_labels, constraint_rows = compute_constraint_records(motion)
+        labels = labels + constraint_labels
+        rows = np.hstack([rows, constraint_rows])
     tables.add_table("forces", "ModelForces", labels, rows, description=FORCES_DESCRIPTION)
 
 
@@ -121,10 +125,10 @@ def collect_force_records(motion: Motion, system: System) -> Array:
         system: engine with all forces, which has the columns.
     """
     result = np.full((len(motion.times), len(system.columns)), np.nan)
-    owners = [element.path for element in system.forces.elements for _ in element.columns]
+    element_paths = [element.path for element in system.forces.elements for _ in element.columns]
     # Columns of muscles that are off stay NaN.
-    there = [k for k, path in enumerate(owners) if path not in motion.left_out]
-    result[:, there] = motion.system.force_table(motion.times, motion.states)
+    column_indices = [k for k, path in enumerate(element_paths) if path not in motion.left_out]
+    result[:, column_indices] = motion.system.force_table(motion.times, motion.states)
     return result
 
 
@@ -145,26 +149,26 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
     """
     engine = motion.simulation.engine
     tree = motion.model.tree()
-    computed = {probe.path for probe in engine.probes}
+    computed_paths = {probe.path for probe in engine.probes}
     for probe in motion.model.components(Probe):
         # A table without a requested probe could be mistaken for a complete one.
-        if probe.enabled and tree.path_of(probe) not in computed:
+        if probe.enabled and tree.path_of(probe) not in computed_paths:
             raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' requests '{probe.name}', a {type(probe).__name__} that "
                 "osimlite cannot compute"
             )
     rows = motion.compute_balanced(_compute_probe_rows)
     # A run reports outputs of other components as well, which are no probes of OpenSim.
-    shown = [
+    is_probe_column = [
         issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels
     ]
     labels = [
         label
-        for label, is_shown in zip(list_probe_labels(engine.probes), shown, strict=True)
+        for label, is_shown in zip(list_probe_labels(engine.probes), is_probe_column, strict=True)
         if is_shown
     ]
     tables.add_table(
-        "probes", "ModelProbes", labels, rows[:, shown], description=PROBES_DESCRIPTION
+        "probes", "ModelProbes", labels, rows[:, is_probe_column], description=PROBES_DESCRIPTION
     )
 
 

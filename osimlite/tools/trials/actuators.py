@@ -91,7 +91,7 @@ def measure_residuals(
     file: Path,
     units: Mapping[str, str],
     scale: LoadScale,
-    what: str,
+    tool_name: str,
     *,
     is_final: bool = True,
 ) -> Numbers:
@@ -102,7 +102,7 @@ def measure_residuals(
         file: table with the residuals.
         units: unit of each residual column.
         scale: force and moment with which residuals are compared.
-        what: name of the tool, for messages.
+        tool_name: name of the tool, for messages.
         is_final: whether no later tool reduces these residuals.
     """
     table = folder.read_table(file)
@@ -116,18 +116,34 @@ def measure_residuals(
                 if unit == "N"
                 else ("residual-moment", scale.moment)
             )
-            of = f"{column} of {what}"
-            where = f"at {table.times[row]:g} s"
-            at = folder.locate_row(file, row)
+            subject = f"{column} of {tool_name}"
+            time_note = f"at {table.times[row]:g} s"
+            position = folder.locate_row(file, row)
             yield (
                 file,
-                Measurement(rule, "peak", of, float(values[row]), unit, size, where, at, is_final),
+                Measurement(
+                    rule,
+                    "peak",
+                    subject,
+                    float(values[row]),
+                    unit,
+                    size,
+                    time_note,
+                    position,
+                    is_final,
+                ),
             )
             rms = float(np.sqrt(np.mean(values**2)))
             yield (
                 file,
                 Measurement(
-                    rule, "rms", of, rms, unit, at=folder.locate_row(file, 0), is_final=is_final
+                    rule,
+                    "rms",
+                    subject,
+                    rms,
+                    unit,
+                    at=folder.locate_row(file, 0),
+                    is_final=is_final,
                 ),
             )
 
@@ -155,7 +171,7 @@ def measure_inverse_dynamics(tool: TrialTool, *, is_final: bool) -> Numbers:
 
 
 def measure_reserves(
-    tool: TrialTool, file: Path, actuators: ActuatorRoles, others: Sequence[TrialTool]
+    tool: TrialTool, file: Path, actuators: ActuatorRoles, tools: Sequence[TrialTool]
 ) -> Numbers:
     """Yield the moments of reserve actuators relative to the joint moments of the motion.
 
@@ -165,7 +181,7 @@ def measure_reserves(
         tool: tool with the reserve actuators.
         file: table of actuator forces.
         actuators: roles of the actuators.
-        others: all tools of the trial.
+        tools: all tools of the trial.
     """
     table = tool.folder.read_table(file)
     columns = {
@@ -174,30 +190,37 @@ def measure_reserves(
     crossed = tool.folder.compute_once(
         ("crossed", tool.model_file), lambda: _find_crossed_coordinates(tool)
     )
-    wanted = [name for name in columns if name in crossed]
-    if not actuators.muscles or not wanted:
+    crossed_names = [name for name in columns if name in crossed]
+    if not actuators.muscles or not crossed_names:
         raise MissingInput(f"{tool} has no reserve actuators besides muscles")
-    moments = _find_joint_moments(tool, table, others)
-    judged = 0
-    for name in wanted:
+    moments = _find_joint_moments(tool, table, tools)
+    judged_count = 0
+    for name in crossed_names:
         reserve = np.abs(table[columns[name]])
         moment = moments.get(name)
         row = int(np.argmax(reserve))
         # A ratio to a small moment would be large, although the reserve hardly matters.
         if moment is None or reserve[row] < MIN_RESERVE_NM:
             continue
-        judged += 1
-        of = f"the reserve of '{name}', of its joint moment"
-        where = f"{reserve[row]:.3g} N m at {table.times[row]:g} s, the motion takes {np.abs(moment).max():.3g} N m"
+        judged_count += 1
+        subject = f"the reserve of '{name}', of its joint moment"
+        comparison = f"{reserve[row]:.3g} N m at {table.times[row]:g} s, the motion takes {np.abs(moment).max():.3g} N m"
         peak = 100.0 * float(reserve[row] / np.abs(moment).max())
-        at = tool.folder.locate_row(file, row)
-        yield file, Measurement("reserve-moment", "peak", of, peak, "%", where=where, at=at)
+        position = tool.folder.locate_row(file, row)
+        yield (
+            file,
+            Measurement(
+                "reserve-moment", "peak", subject, peak, "%", where=comparison, at=position
+            ),
+        )
         rms = 100.0 * float(np.sqrt(np.mean(reserve**2) / np.mean(moment**2)))
         yield (
             file,
-            Measurement("reserve-moment", "rms", of, rms, "%", at=tool.folder.locate_row(file, 0)),
+            Measurement(
+                "reserve-moment", "rms", subject, rms, "%", at=tool.folder.locate_row(file, 0)
+            ),
         )
-    if not judged:
+    if not judged_count:
         yield (
             file,
             Measurement(
@@ -238,7 +261,7 @@ def _find_crossed_coordinates(tool: TrialTool) -> set[str]:
 
 
 def _find_joint_moments(
-    tool: TrialTool, table: StoTable, others: Sequence[TrialTool]
+    tool: TrialTool, table: StoTable, tools: Sequence[TrialTool]
 ) -> dict[str, Array]:
     """Return the moments of the complete motion around a table, by coordinate.
 
@@ -247,7 +270,7 @@ def _find_joint_moments(
     Args:
         tool: tool whose motion it is.
         table: table whose times the moments must cover.
-        others: all tools of the trial.
+        tools: all tools of the trial.
 
     Returns:
         Moments (t,) by coordinate, N m.
@@ -257,36 +280,40 @@ def _find_joint_moments(
     """
     names = [info.name for info in tool.mechanism.coordinates]
     # Results of the user's own tools come first: they have the user's filter.
-    for tag in ("InverseDynamicsTool", "RRATool"):
-        for other in (other for other in others if other.tag == tag):
-            if tag == "RRATool":
-                name = f"{other.setup.name}_Actuation_force.sto"
+    for tool_class in ("InverseDynamicsTool", "RRATool"):
+        for source in (source for source in tools if source.tag == tool_class):
+            if tool_class == "RRATool":
+                name = f"{source.setup.name}_Actuation_force.sto"
                 # RRA has no muscles, so that its reserves carry the whole joint moments.
-                columns = find_actuators(other).reserves
+                columns = find_actuators(source).reserves
             else:
                 name, columns = (
-                    other.setup.output_gen_force_file,
+                    source.setup.output_gen_force_file,
                     {f"{name}_moment": name for name in names},
                 )
-            file = other.find_result(name)
-            known = None if file is None else tool.folder.read_table(file)
+            file = source.find_result(name)
+            moments = None if file is None else tool.folder.read_table(file)
             if (
-                known is not None
-                and known.times[0] <= table.times[0] + TIME_SLACK_S
-                and known.times[-1] >= table.times[-1] - TIME_SLACK_S
+                moments is not None
+                and moments.times[0] <= table.times[0] + TIME_SLACK_S
+                and moments.times[-1] >= table.times[-1] - TIME_SLACK_S
             ):
-                return {columns[label]: known[label] for label in known.columns if label in columns}
+                return {
+                    columns[label]: moments[label] for label in moments.columns if label in columns
+                }
     if tool.find_input(*MOTIONS) is None:
         raise MissingInput(
             f"no joint moments to compare with the reserves of {tool}; run inverse dynamics"
         )
-    known = inverse_dynamics(
+    moments = inverse_dynamics(
         tool.model,
         tool.motion,
         tool.find_input(LOADS),
         lowpass=tool.cutoff if tool.cutoff > 0.0 else None,
     )
-    return {name: known[f"{name}_moment"] for name in names if f"{name}_moment" in known.columns}
+    return {
+        name: moments[f"{name}_moment"] for name in names if f"{name}_moment" in moments.columns
+    }
 
 
 def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str]) -> Numbers:
@@ -298,7 +325,7 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
         muscles: names of the muscles.
     """
     table = folder.read_table(file)
-    most = 0
+    saturated_count = 0
     for index, label in enumerate(table.columns):
         # Labels of OpenSim 4, of OpenSim 3, and of static optimization.
         name = label.removesuffix("/activation").removesuffix(".activation").rpartition("/")[2]
@@ -306,20 +333,26 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
             label != name and not label.endswith(("/activation", ".activation"))
         ):
             continue
-        full = np.flatnonzero(table.rows[:, index] >= FULL_ACTIVATION)
-        if len(full):
-            most += 1
-            share = 100.0 * len(full) / len(table.times)
-            time = table.times[full[0]]
-            of = f"share of the time that '{name}' is fully active"
-            at = folder.locate_row(file, int(full[0]))
+        saturated_rows = np.flatnonzero(table.rows[:, index] >= FULL_ACTIVATION)
+        if len(saturated_rows):
+            saturated_count += 1
+            percentage = 100.0 * len(saturated_rows) / len(table.times)
+            time = table.times[saturated_rows[0]]
+            subject = f"share of the time that '{name}' is fully active"
+            position = folder.locate_row(file, int(saturated_rows[0]))
             yield (
                 file,
                 Measurement(
-                    "full-activation", "share", of, share, "%", where=f"first at {time:g} s", at=at
+                    "full-activation",
+                    "share",
+                    subject,
+                    percentage,
+                    "%",
+                    where=f"first at {time:g} s",
+                    at=position,
                 ),
             )
-    if not most:
+    if not saturated_count:
         yield (
             file,
             Measurement(

@@ -114,21 +114,21 @@ def check_trial(
         MissingFileError: a path does not exist.
         OsimliteError: there is no part of a trial, or no rule has a code in `select` or `ignore`.
     """
-    given = config or Config(parse_codes(select), parse_codes(ignore))
+    base_config = config or Config(parse_codes(select), parse_codes(ignore))
     folder = TrialFolder(paths or (".",), written)
     numbers: dict[Path, list[Measurement]] = {}
     unchecked: dict[str, None] = {}
-    looked: dict[str, None] = {}
+    checked_files: dict[str, None] = {}
     measures = [*_plan_measurements(folder)]
-    for count, (what, measure) in enumerate(measures, start=1):
+    for count, (description, measure) in enumerate(measures, start=1):
         try:
             for file, number in measure():
                 numbers.setdefault(file, []).append(number)
         # One missing input must not hide all other results.
         except OsimliteError as error:
-            unchecked[f"{what}: {error.message if isinstance(error, MissingInput) else error}"] = (
-                None
-            )
+            unchecked[
+                f"{description}: {error.message if isinstance(error, MissingInput) else error}"
+            ] = None
         if progress is not None:
             progress(count, len(measures))
     if not folder.tools and not numbers:
@@ -140,26 +140,28 @@ def check_trial(
     report = TrialReport(texts=SourceTexts(), unchecked=[*unchecked])
     findings: list[Finding] = []
     for file, file_numbers in numbers.items():
-        looked[str(file)] = None
+        checked_files[str(file)] = None
         trial = Trial(
             str(file),
             Source.from_file(file).data,
             file_numbers,
-            find_settings(str(file)).config_for(file, given),
+            find_settings(str(file)).config_for(file, base_config),
         )
         findings += run_rules(trial).findings
         report.verdicts += trial.verdicts
     for name in _find_documents(folder):
-        own_config = find_settings(name).config_for(name, given)
+        own_config = find_settings(name).config_for(name, base_config)
         subject = load_subject(name, own_config)
         findings += [
-            item for item in run_rules(subject, measure=False) if item.code.startswith(SETUP_RULES)
+            finding
+            for finding in run_rules(subject, measure=False)
+            if finding.code.startswith(SETUP_RULES)
         ]
-        looked[name] = None
+        checked_files[name] = None
     report.findings = sorted(
-        dict.fromkeys(findings), key=lambda item: (item.severity.rank, item.file or "")
+        dict.fromkeys(findings), key=lambda finding: (finding.severity.rank, finding.file or "")
     )
-    report.checked = len(looked)
+    report.checked = len(checked_files)
     return report
 
 
@@ -262,13 +264,13 @@ def _raise_missing(error: MissingInput) -> Numbers:
 
 
 def _plan_tracking(
-    tool: TrialTool, others: Sequence[TrialTool], claimed: set[Path]
+    tool: TrialTool, tools: Sequence[TrialTool], claimed: set[Path]
 ) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results of RRA and CMC.
 
     Args:
         tool: the tool.
-        others: all tools of the trial.
+        tools: all tools of the trial.
         claimed: receives the files that are measured.
     """
     folder = tool.folder
@@ -276,15 +278,15 @@ def _plan_tracking(
     error = _find_result(tool, "_pErr.sto")
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
-        gone = MissingInput(
+        missing_error = MissingInput(
             f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it "
             "in OpenSim"
         )
-        yield "residuals", partial(_raise_missing, gone)
+        yield "residuals", partial(_raise_missing, missing_error)
     else:
         yield "residuals", partial(_measure_residuals, tool, force)
         if tool.tag == "CMCTool":
-            yield "reserves", partial(_measure_reserves, tool, force, others)
+            yield "reserves", partial(_measure_reserves, tool, force, tools)
     if error is None:
         yield (
             "errors of tracking",
@@ -317,33 +319,33 @@ def _plan_tracking(
 
 
 def _plan_static_optimization(
-    tool: TrialTool, others: Sequence[TrialTool], claimed: set[Path]
+    tool: TrialTool, tools: Sequence[TrialTool], claimed: set[Path]
 ) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results of StaticOptimization.
 
     Args:
         tool: the tool.
-        others: all tools of the trial.
+        tools: all tools of the trial.
         claimed: receives the files that are measured.
     """
-    for item in tool.setup.analysis_set.objects:
-        if type(item).__name__ != "StaticOptimization" or not item.on:
+    for analysis in tool.setup.analysis_set.objects:
+        if type(analysis).__name__ != "StaticOptimization" or not analysis.on:
             continue
         for ending in ("force", "activation"):
-            file = _find_result(tool, f"_{item.name}_{ending}.sto")
+            file = _find_result(tool, f"_{analysis.name}_{ending}.sto")
             if file is None:
-                gone = MissingInput(
-                    f"'{tool.setup.name}_{item.name}_{ending}.sto' of {tool} is missing; run it"
+                missing_error = MissingInput(
+                    f"'{tool.setup.name}_{analysis.name}_{ending}.sto' of {tool} is missing; run it"
                 )
                 yield (
                     ("residuals and reserves" if ending == "force" else "activations"),
-                    partial(_raise_missing, gone),
+                    partial(_raise_missing, missing_error),
                 )
                 continue
             claimed.add(file)
             if ending == "force":
                 yield "residuals", partial(_measure_residuals, tool, file)
-                yield "reserves", partial(_measure_reserves, tool, file, others)
+                yield "reserves", partial(_measure_reserves, tool, file, tools)
             else:
                 yield "activations", partial(_measure_activations, tool, file)
         # StaticOptimization writes no states of fibers.
@@ -358,9 +360,9 @@ def _measure_residuals(tool: TrialTool, file: Path) -> Numbers:
     return measure_residuals(tool.folder, file, units, compute_scale(tool), TOOL_NAMES[tool.tag])
 
 
-def _measure_reserves(tool: TrialTool, file: Path, others: Sequence[TrialTool]) -> Numbers:
+def _measure_reserves(tool: TrialTool, file: Path, tools: Sequence[TrialTool]) -> Numbers:
     """Yield the reserves of a tool."""
-    return measure_reserves(tool, file, find_actuators(tool), others)
+    return measure_reserves(tool, file, find_actuators(tool), tools)
 
 
 def _measure_activations(tool: TrialTool, file: Path) -> Numbers:
@@ -372,9 +374,9 @@ def _plan_results_without_setup(
     folder: TrialFolder, claimed: set[Path]
 ) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results without a setup, by their names and labels."""
-    has = {tool.tag for tool in folder.tools}
+    present_classes = {tool.tag for tool in folder.tools}
     # With a setup, its own results are measured already.
-    if not has & {"RRATool", "CMCTool"}:
+    if not present_classes & {"RRATool", "CMCTool"}:
         for file in folder.find_files("_Actuation_force.sto", "_StaticOptimization_force.sto"):
             if file not in claimed:
                 units = find_actuators(None).residuals
@@ -384,12 +386,14 @@ def _plan_results_without_setup(
                 )
         for file in folder.find_files("_pErr.sto"):
             yield "errors of tracking", partial(measure_tracking_errors, folder, file, None)
-    if "InverseKinematicsTool" not in has:
+    if "InverseKinematicsTool" not in present_classes:
         for file in folder.find_files("_ik_marker_errors.sto"):
             yield "errors of markers", partial(measure_written_errors, folder, file)
-    lacking = [tag for tag in SETUPS if tag not in has]
-    if lacking:
+    missing_classes = [tool_class for tool_class in SETUPS if tool_class not in present_classes]
+    if missing_classes:
         yield (
             "other results",
-            partial(_raise_missing, MissingInput(f"there is no setup of {join_words(lacking)}")),
+            partial(
+                _raise_missing, MissingInput(f"there is no setup of {join_words(missing_classes)}")
+            ),
         )

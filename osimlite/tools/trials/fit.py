@@ -55,21 +55,30 @@ def measure_scale_errors(tool: TrialTool) -> Numbers:
         task for task in placer.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)
     ]
     weights = {task.name: float(task.weight) for task in tasks}
-    most = max(weights.values(), default=0.0)
+    largest_weight = max(weights.values(), default=0.0)
     pose = result.pose
     selected = [
-        index for index, name in enumerate(pose.markers) if weights.get(name, 1.0) > 0.1 * most
+        index
+        for index, name in enumerate(pose.markers)
+        if weights.get(name, 1.0) > 0.1 * largest_weight
     ]
     errors = pose.marker_errors[:, selected]
     if not np.isfinite(errors).any():
         raise MissingInput(f"{tool} fits no marker")
     name = pose.markers[selected[int(np.nanargmax(np.nanmax(errors, axis=0)))]]
-    of = "the errors of the markers in the static pose"
-    for kind, value in (("rms", np.sqrt(np.nanmean(errors**2))), ("peak", np.nanmax(errors))):
-        where = name if kind == "peak" else ""
+    subject = "the errors of the markers in the static pose"
+    for statistic, value in (("rms", np.sqrt(np.nanmean(errors**2))), ("peak", np.nanmax(errors))):
+        worst_name = name if statistic == "peak" else ""
         yield (
             tool.job.file,
-            Measurement("scale-marker-error", kind, of, 100.0 * float(value), "cm", where=where),
+            Measurement(
+                "scale-marker-error",
+                statistic,
+                subject,
+                100.0 * float(value),
+                "cm",
+                where=worst_name,
+            ),
         )
 
 
@@ -89,36 +98,46 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
             raise MissingInput(f"{error.message}; and there is no file of marker errors") from error
         yield from measure_written_errors(folder, errors)
         return
-    found = motion.summary
-    of = "the errors of the markers"
-    rms = 100.0 * found["rms_marker_error"]
-    peak = 100.0 * found["largest_marker_error"]
-    time = found["worst_time"]
-    at = folder.locate_time(file, time)
-    where = f"{found['worst_marker']} at {time:g} s"
-    each = np.sqrt(
+    summary = motion.summary
+    subject = "the errors of the markers"
+    rms = 100.0 * summary["rms_marker_error"]
+    peak = 100.0 * summary["largest_marker_error"]
+    time = summary["worst_time"]
+    position = folder.locate_time(file, time)
+    location = f"{summary['worst_marker']} at {time:g} s"
+    rms_by_marker = np.sqrt(
         np.nanmean(
             np.where(np.isfinite(motion.marker_errors), motion.marker_errors, np.nan) ** 2, axis=0
         )
     )
-    worst = f"most of {motion.markers[int(np.nanargmax(each))]}, {100.0 * np.nanmax(each):.3g} cm"
+    worst_note = f"most of {motion.markers[int(np.nanargmax(rms_by_marker))]}, {100.0 * np.nanmax(rms_by_marker):.3g} cm"
     yield (
         file,
         Measurement(
-            "marker-error", "rms", of, rms, "cm", where=worst, at=folder.locate_row(file, 0)
+            "marker-error",
+            "rms",
+            subject,
+            rms,
+            "cm",
+            where=worst_note,
+            at=folder.locate_row(file, 0),
         ),
     )
-    yield file, Measurement("marker-error", "peak", of, peak, "cm", where=where, at=at)
+    yield (
+        file,
+        Measurement("marker-error", "peak", subject, peak, "cm", where=location, at=position),
+    )
     data = tool.require_input("marker_file")
     pairs = [*_find_swapped_markers(tool, motion)]
-    for one, other, frames in pairs:
-        share = 100.0 * len(frames) / SWAP_FRAMES
+    for first_name, second_name, frames in pairs:
+        percentage = 100.0 * len(frames) / SWAP_FRAMES
         times = motion.times[frames]
-        of = (
-            f"share of frames in which the markers '{one}' and '{other}' would fit better exchanged"
+        subject = f"share of frames in which the markers '{first_name}' and '{second_name}' would fit better exchanged"
+        location = f"from {times[0]:g} to {times[-1]:g} s"
+        yield (
+            data,
+            Measurement("swapped-markers", "share", subject, percentage, "%", where=location),
         )
-        where = f"from {times[0]:g} to {times[-1]:g} s"
-        yield data, Measurement("swapped-markers", "share", of, share, "%", where=where)
     if not pairs:
         yield (
             data,
@@ -136,19 +155,27 @@ def measure_written_errors(folder: TrialFolder, file: Path) -> Numbers:
         file: table of marker errors.
     """
     table = folder.read_table(file)
-    of = "the errors of the markers"
+    subject = "the errors of the markers"
     rms = float(np.sqrt(np.mean(table["marker_error_RMS"] ** 2)))
     row = int(np.argmax(table["marker_error_max"]))
     yield (
         file,
-        Measurement("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0)),
+        Measurement(
+            "marker-error", "rms", subject, 100.0 * rms, "cm", at=folder.locate_row(file, 0)
+        ),
     )
     peak = 100.0 * float(table["marker_error_max"][row])
-    where = f"at {table.times[row]:g} s"
+    time_note = f"at {table.times[row]:g} s"
     yield (
         file,
         Measurement(
-            "marker-error", "peak", of, peak, "cm", where=where, at=folder.locate_row(file, row)
+            "marker-error",
+            "peak",
+            subject,
+            peak,
+            "cm",
+            where=time_note,
+            at=folder.locate_row(file, row),
         ),
     )
 
@@ -175,30 +202,36 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
         [*stations], {task.name: task.weight for task in tasks if task.weight > 0.0} or None
     )
     # Find the frame of the markers that is nearest to each time of the motion.
-    after = np.clip(np.searchsorted(data.times, recorded.times), 1, max(1, len(data.times) - 1))
-    after = np.minimum(after, len(data.times) - 1)
-    before = np.maximum(after - 1, 0)
-    is_before = recorded.times - data.times[before] < data.times[after] - recorded.times
-    rows = np.where(is_before, before, after)
+    rows_after = np.clip(
+        np.searchsorted(data.times, recorded.times), 1, max(1, len(data.times) - 1)
+    )
+    rows_after = np.minimum(rows_after, len(data.times) - 1)
+    rows_before = np.maximum(rows_after - 1, 0)
+    is_before = recorded.times - data.times[rows_before] < data.times[rows_after] - recorded.times
+    rows = np.where(is_before, rows_before, rows_after)
     step = float(np.median(np.diff(data.times))) if len(data.times) > 1 else 1.0
     # Times in files are rounded, so that those of one frame may differ slightly.
-    near = np.flatnonzero(np.abs(data.times[rows] - recorded.times) < 0.1 * step)
-    if not len(near):
+    matched_rows = np.flatnonzero(np.abs(data.times[rows] - recorded.times) < 0.1 * step)
+    if not len(matched_rows):
         raise MissingInput(f"'{file}' and the markers of {tool} have no times in common")
-    near = near[np.unique(np.linspace(0, len(near) - 1, min(len(near), MAX_FRAMES)).astype(int))]
-    values = recorded.values[near]
+    matched_rows = matched_rows[
+        np.unique(
+            np.linspace(0, len(matched_rows) - 1, min(len(matched_rows), MAX_FRAMES)).astype(int)
+        )
+    ]
+    values = recorded.values[matched_rows]
     states = [mechanism.at(q) for q in values]
     positions = np.array([[state.point(*stations[name]) for name in names] for state in states])
-    nothing = np.zeros(len(values))
+    zeros = np.zeros(len(values))
     return FittedMotion(
         mechanism,
-        recorded.times[near],
+        recorded.times[matched_rows],
         values,
         tuple(names),
-        data.select_values(names)[rows[near]],
+        data.select_values(names)[rows[matched_rows]],
         positions,
-        nothing,
-        nothing,
+        zeros,
+        zeros,
     )
 
 
@@ -217,39 +250,48 @@ def _find_swapped_markers(
         Names of both markers, and the numbers of the frames in which the exchange fits better.
     """
     errors = motion.marker_errors
-    seen = np.where(np.isfinite(errors), errors, 0.0)
-    worst = int(np.argmax(seen.max(axis=1)))
-    if seen[worst].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
+    known_errors = np.where(np.isfinite(errors), errors, 0.0)
+    worst_frame = int(np.argmax(known_errors.max(axis=1)))
+    if known_errors[worst_frame].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
         return
     stations = find_marker_stations(tool.model, motion.mechanism)
     weights = {task.name: float(task.weight) for task in tool.setup.ik_task_set.objects}
-    fit = PoseFit(
+    pose_fit = PoseFit(
         motion.mechanism,
         [MarkerTarget(stations[name], weights.get(name, 1.0)) for name in motion.markers],
     )
 
-    def cost(frame: int, pair: tuple[int, int] = (0, 0)) -> float:
+    def compute_cost(frame: int, pair: tuple[int, int] = (0, 0)) -> float:
         order = np.arange(len(motion.markers))
         # The default pair exchanges a marker with itself, which keeps the order.
         order[list(pair)] = order[list(reversed(pair))]
         measured = motion.measured[frame : frame + 1, order].reshape(1, -1)
         return float(
-            fit.fit_frames(measured, motion.times[frame : frame + 1], motion.values[frame]).costs[0]
+            pose_fit.fit_frames(
+                measured, motion.times[frame : frame + 1], motion.values[frame]
+            ).costs[0]
         )
 
     frames = np.unique(np.linspace(0, len(motion.times) - 1, SWAP_FRAMES).astype(int))
-    costs_in_order = {frame: cost(frame) for frame in (worst, *frames.tolist())}
+    costs_in_order = {frame: compute_cost(frame) for frame in (worst_frame, *frames.tolist())}
     # All pairs are tried in the worst frame only: m markers have m (m - 1) / 2 pairs, and each
     # needs a fit.
-    costs = {pair: cost(worst, pair) for pair in combinations(range(len(motion.markers)), 2)}
-    one, other = min(costs, key=lambda pair: costs[pair])
-    if costs[one, other] < MAX_COST_RATIO * costs_in_order[worst]:
-        better = [
+    costs = {
+        pair: compute_cost(worst_frame, pair)
+        for pair in combinations(range(len(motion.markers)), 2)
+    }
+    first, second = min(costs, key=lambda pair: costs[pair])
+    if costs[first, second] < MAX_COST_RATIO * costs_in_order[worst_frame]:
+        better_frames = [
             frame
             for frame in frames.tolist()
-            if cost(frame, (one, other)) < MAX_COST_RATIO * costs_in_order[frame]
+            if compute_cost(frame, (first, second)) < MAX_COST_RATIO * costs_in_order[frame]
         ]
-        yield motion.markers[one], motion.markers[other], np.array(better or [worst])
+        yield (
+            motion.markers[first],
+            motion.markers[second],
+            np.array(better_frames or [worst_frame]),
+        )
 
 
 def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
@@ -264,34 +306,34 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
     motion = tool.folder.read_motion(file, tool.model_file)
     mechanism = tool.mechanism
     root = find_root_coordinates(mechanism)
-    beyond = 0
+    violation_count = 0
     for index, info in enumerate(mechanism.coordinates):
-        low, high = info.range
-        excess = np.maximum(low - motion.values[:, index], motion.values[:, index] - high)
+        lower, upper = info.range
+        excess = np.maximum(lower - motion.values[:, index], motion.values[:, index] - upper)
         row = int(np.argmax(excess))
         # Up to 0.05 degrees or cm may come from the rounding of files.
         size = _to_display_unit(info, float(excess[row]))
         if index in root or info.name in motion.missing or info.locked or size < 0.05:
             continue
-        beyond += 1
-        most = f"{_to_display_unit(info, low):.3g} to {_to_display_unit(info, high):.3g} {_get_display_unit(info)}"
+        violation_count += 1
+        range_text = f"{_to_display_unit(info, lower):.3g} to {_to_display_unit(info, upper):.3g} {_get_display_unit(info)}"
         time = float(motion.times[row])
         unit = _get_display_unit(info)
-        where = f"at {time:g} s, the range is {most}"
-        of = f"'{info.name}' beyond its range"
+        location = f"at {time:g} s, the range is {range_text}"
+        subject = f"'{info.name}' beyond its range"
         yield (
             file,
             Measurement(
                 "beyond-range",
                 "peak",
-                of,
+                subject,
                 size,
                 unit,
-                where=where,
+                where=location,
                 at=tool.folder.locate_time(file, time),
             ),
         )
-    if not beyond:
+    if not violation_count:
         yield (
             file,
             Measurement("beyond-range", "peak", "coordinates beyond their ranges", 0.0, "deg"),
@@ -322,18 +364,28 @@ def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | N
         )
         row = int(np.argmax(column))
         unit = "deg" if turning else "cm"
-        of = f"the error of '{name}'"
-        where = f"at {table.times[row]:g} s"
-        at = folder.locate_row(file, row)
+        subject = f"the error of '{name}'"
+        time_note = f"at {table.times[row]:g} s"
+        position = folder.locate_row(file, row)
         yield (
             file,
-            Measurement("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at),
+            Measurement(
+                "tracking-error",
+                "peak",
+                subject,
+                float(column[row]),
+                unit,
+                where=time_note,
+                at=position,
+            ),
         )
-        kind = "rms" if turning else "rms-translation"
+        statistic = "rms" if turning else "rms-translation"
         value = float(np.sqrt(np.mean(column**2)))
         yield (
             file,
-            Measurement("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0)),
+            Measurement(
+                "tracking-error", statistic, subject, value, unit, at=folder.locate_row(file, 0)
+            ),
         )
 
 
@@ -341,33 +393,37 @@ def measure_filter(tool: TrialTool) -> Numbers:
     """Yield the part of a motion that a filter removes, and the noise that it leaves."""
     file = tool.require_input(*MOTIONS)
     motion = tool.motion
-    first, last = (min(max(time, motion.times[0]), motion.times[-1]) for time in tool.span)
+    start, end = (min(max(time, motion.times[0]), motion.times[-1]) for time in tool.span)
     if tool.cutoff > 0.0:
         filtered = motion.lowpassed(tool.cutoff)
-        in_span = (motion.times >= first) & (motion.times <= last)
-        worst, size, unit = "", 0.0, "deg"
+        in_span = (motion.times >= start) & (motion.times <= end)
+        most_changed, size, unit = "", 0.0, "deg"
         for index, info in enumerate(motion.mechanism.coordinates):
             column = np.interp(motion.times[in_span], filtered.times, filtered.values[:, index])
-            lost = _to_display_unit(
+            removed = _to_display_unit(
                 info, float(np.sqrt(np.mean((column - motion.values[in_span, index]) ** 2)))
             )
-            if lost > size:
-                worst = info.name
-                size = lost
+            if removed > size:
+                most_changed = info.name
+                size = removed
                 unit = _get_display_unit(info)
-        of = f"change of '{worst}' (root mean square) by the filter of {tool.cutoff:g} Hz"
-        yield tool.job.file, Measurement("filter-content", "change", of, size, unit)
+        subject = (
+            f"change of '{most_changed}' (root mean square) by the filter of {tool.cutoff:g} Hz"
+        )
+        yield tool.job.file, Measurement("filter-content", "change", subject, size, unit)
         motion = filtered
-    if _is_from_markers(file) and (share := _measure_noise(motion, first, last)) is not None:
-        of = "noise: the power of the accelerations above 15 Hz, of all"
-        how = (
+    if _is_from_markers(file) and (noise_share := _measure_noise(motion, start, end)) is not None:
+        subject = "noise: the power of the accelerations above 15 Hz, of all"
+        filter_note = (
             f"the motion is filtered at {tool.cutoff:g} Hz"
             if tool.cutoff > 0.0
             else "the motion is not filtered"
         )
         yield (
             tool.job.file,
-            Measurement("filter-content", "noise", of, 100.0 * share, "%", side=how),
+            Measurement(
+                "filter-content", "noise", subject, 100.0 * noise_share, "%", side=filter_note
+            ),
         )
 
 
@@ -377,35 +433,37 @@ def _is_from_markers(file: Path) -> bool:
     return not file.name.endswith(("_Kinematics_q.sto", "_states.sto", "_q.mot"))
 
 
-def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float | None:
+def _measure_noise(motion: RecordedMotion, start: float, end: float) -> float | None:
     """Return the median share of the accelerations' power above 15 Hz; None if it is unknown.
 
     Args:
         motion: the motion.
-        first: first time, s.
-        last: last time, s.
+        start: first time, s.
+        end: last time, s.
     """
-    in_span = (motion.times >= first) & (motion.times <= last)
+    in_span = (motion.times >= start) & (motion.times <= end)
     times = motion.times[in_span]
     if len(times) < 8 or times[-1] - times[0] < MIN_PERIODS / MAX_MOVEMENT_HZ:
         return None
     step = (times[-1] - times[0]) / (len(times) - 1)
     values = motion.values[in_span]
-    even = np.linspace(times[0], times[-1], len(times))
+    even_times = np.linspace(times[0], times[-1], len(times))
     if step > 0.5 / (1.5 * MAX_MOVEMENT_HZ):
         return None
-    shares = []
+    noise_shares = []
     frequencies = np.fft.rfftfreq(len(times), step)
     for index, info in enumerate(motion.mechanism.coordinates):
         if np.ptp(values[:, index]) < MIN_CHANGE[info.motion_type != "rotational"]:
             continue
         # Resample evenly for the Fourier transform; a Hann window removes the ends.
-        acceleration = np.interp(even, times, motion.rates[1][in_span, index])
+        acceleration = np.interp(even_times, times, motion.rates[1][in_span, index])
         power = (
             np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2
         )
-        shares.append(float(power[frequencies > MAX_MOVEMENT_HZ].sum() / (power.sum() or 1.0)))
-    return float(np.median(shares)) if shares else None
+        noise_shares.append(
+            float(power[frequencies > MAX_MOVEMENT_HZ].sum() / (power.sum() or 1.0))
+        )
+    return float(np.median(noise_shares)) if noise_shares else None
 
 
 def _to_display_unit(info: CoordinateInfo, value: float) -> float:

@@ -82,9 +82,9 @@ class TrialFolder:
             for file in sorted((path if path.is_dir() else path.parent).rglob("*")):
                 if file.suffix.lower() in SUFFIXES and file.is_file():
                     # The given folders may overlap.
-                    known = self._named.setdefault(file.name, [])
-                    if file not in known:
-                        known.append(file)
+                    same_named = self._named.setdefault(file.name, [])
+                    if file not in same_named:
+                        same_named.append(file)
                     if (
                         path.is_dir()
                         and file.suffix.lower() == ".xml"
@@ -101,21 +101,21 @@ class TrialFolder:
         # The real path is the key, so that links and overlapping folders do not count a setup
         # twice.
         for file in setups.values():
-            top = get_object(str(file))
-            if top is not None and type(top).__name__ in SETUPS:
-                self.tools.append(TrialTool(self, Job(top, file)))
+            setup_object = get_object(str(file))
+            if setup_object is not None and type(setup_object).__name__ in SETUPS:
+                self.tools.append(TrialTool(self, Job(setup_object, file)))
         # The order in which a trial is processed.
         self.tools.sort(key=lambda tool: SETUPS.index(tool.tag))
 
-    def compute_once(self, key: Any, make: Callable[[], T]) -> T:
+    def compute_once(self, key: Any, compute: Callable[[], T]) -> T:
         """Return a value; compute it at the first request.
 
         Args:
             key: key of the value.
-            make: function that computes it.
+            compute: function that computes it.
         """
         if key not in self._kept:
-            self._kept[key] = make()
+            self._kept[key] = compute()
         return self._kept[key]
 
     def find_file(self, path: Path) -> Path | None:
@@ -165,8 +165,10 @@ class TrialFolder:
             table = self.read_table(file)
             # A repeated time has no slope: splines and filters need increasing times.
             is_later = np.diff(np.maximum.accumulate(table.times), prepend=-np.inf) > 0.0
-            kept = replace(table, times=table.times[is_later], rows=table.rows[is_later])
-            return RecordedMotion.from_table(self.build_mechanism(model), kept)
+            increasing_table = replace(
+                table, times=table.times[is_later], rows=table.rows[is_later]
+            )
+            return RecordedMotion.from_table(self.build_mechanism(model), increasing_table)
 
         return self.compute_once(("motion", file, model), read)
 
@@ -286,9 +288,9 @@ class TrialTool:
             Two times (s), which are infinite if the setup has none.
         """
         # Inverse kinematics and dynamics have a range, the other tools two single times.
-        given = getattr(self.setup, "time_range", None)
-        if given is not None and len(given) > 1:
-            return float(given[0]), float(given[1])
+        time_range = getattr(self.setup, "time_range", None)
+        if time_range is not None and len(time_range) > 1:
+            return float(time_range[0]), float(time_range[1])
         if hasattr(self.setup, "initial_time"):
             return float(self.setup.initial_time), float(self.setup.final_time)
         return float("-inf"), float("inf")

@@ -64,12 +64,14 @@ def read_loads(tool: TrialTool) -> tuple[Path, StoTable, list[TrialLoad]]:
     return file, table, list(_select_loads(select_members(document, "ExternalForce"), table))
 
 
-def _select_loads(items: Sequence[ExternalForce], table: StoTable) -> Iterator[TrialLoad]:
+def _select_loads(forces: Sequence[ExternalForce], table: StoTable) -> Iterator[TrialLoad]:
     """Yield the loads that are on and have data."""
-    for item in items:
-        force = _read_vectors(table, item.force_identifier)
-        if item.appliesForce and force is not None:
-            yield TrialLoad(item, force, _read_vectors(table, item.point_identifier))
+    for external_force in forces:
+        force = _read_vectors(table, external_force.force_identifier)
+        if external_force.appliesForce and force is not None:
+            yield TrialLoad(
+                external_force, force, _read_vectors(table, external_force.point_identifier)
+            )
 
 
 def _read_vectors(table: StoTable, identifier: str | None) -> Array | None:
@@ -117,44 +119,63 @@ def measure_feet(tool: TrialTool) -> Numbers:
     motion = tool.motion
     setup = load_subject(str(file), Config())
     bodies = [str(load.item.applied_to_body).rpartition("/")[2] for load in loads]
-    known = {body.name.rpartition("/")[2] for body in motion.mechanism.bodies}
+    body_names = {body.name.rpartition("/")[2] for body in motion.mechanism.bodies}
     for load, body_name in zip(loads, bodies, strict=True):
         # Candidates are the bodies of other loads and the same body on the other side.
-        others = {body for body in bodies if body != body_name} | {_mirror_name(body_name)}
-        others = {body for body in others if body in known}
-        if load.point is None or body_name not in known or not others:
+        other_bodies = {body for body in bodies if body != body_name} | {_mirror_name(body_name)}
+        other_bodies = {body for body in other_bodies if body in body_names}
+        if load.point is None or body_name not in body_names or not other_bodies:
             continue
-        away = _measure_distances(motion, table, load, [body_name, *sorted(others)])
+        distances = _measure_distances(motion, table, load, [body_name, *sorted(other_bodies)])
         # A load that is never large has no reliable point of application.
-        if away is None:
+        if distances is None:
             continue
-        wrong = away[:, 1:].min(axis=1) < away[:, 0]
-        other = sorted(others)[int(np.argmin(away[:, 1:].mean(axis=0)))]
-        of = f"share of the time that the force '{load.item.name}' acts nearer to {other} than to {body_name}"
-        side = f"it acts {away[:, 0].mean():.2g} m from {body_name} and {away[:, 1:].min(axis=1).mean():.2g} m from {other}"
-        at = None
+        is_nearer_to_other = distances[:, 1:].min(axis=1) < distances[:, 0]
+        other_body = sorted(other_bodies)[int(np.argmin(distances[:, 1:].mean(axis=0)))]
+        subject = f"share of the time that the force '{load.item.name}' acts nearer to {other_body} than to {body_name}"
+        distance_note = (
+            f"it acts {distances[:, 0].mean():.2g} m from {body_name} and "
+            f"{distances[:, 1:].min(axis=1).mean():.2g} m from {other_body}"
+        )
+        position = None
         if isinstance(setup, Setup):
-            item = next(
+            external_force = next(
                 (
-                    item
-                    for item in setup.find_by_class("ExternalForce")
-                    if item.name == load.item.name
+                    external_force
+                    for external_force in setup.find_by_class("ExternalForce")
+                    if external_force.name == load.item.name
                 ),
                 None,
             )
-            at = setup.position(item, tag="applied_to_body") if item is not None else None
-        share = 100.0 * float(wrong.mean())
+            position = (
+                setup.position(external_force, tag="applied_to_body")
+                if external_force is not None
+                else None
+            )
+        percentage = 100.0 * float(is_nearer_to_other.mean())
         yield (
             file,
-            Measurement("swapped-feet", "share", of, share, "%", at=at, side=side if share else ""),
+            Measurement(
+                "swapped-feet",
+                "share",
+                subject,
+                percentage,
+                "%",
+                at=position,
+                side=distance_note if percentage else "",
+            ),
         )
 
 
 def _mirror_name(name: str) -> str:
     """Return the name of the same part on the other side; "" without a side."""
     stem, side = split_side(name)
-    other = {"r": "l", "l": "r"}.get(side, "")
-    return (f"{stem}_{other}" if name.endswith(f"_{side}") else f"{other}_{stem}") if other else ""
+    other_side = {"r": "l", "l": "r"}.get(side, "")
+    return (
+        (f"{stem}_{other_side}" if name.endswith(f"_{side}") else f"{other_side}_{stem}")
+        if other_side
+        else ""
+    )
 
 
 def _measure_distances(
@@ -173,9 +194,9 @@ def _measure_distances(
     """
     assert load.point is not None
     sizes = np.linalg.norm(load.force, axis=1)
-    within = (table.times >= motion.times[0]) & (table.times <= motion.times[-1])
+    is_within = (table.times >= motion.times[0]) & (table.times <= motion.times[-1])
     rows = np.flatnonzero(
-        within & (sizes > max(STANCE_FORCE_N, LARGE_FRACTION * np.nanmax(sizes, initial=0.0)))
+        is_within & (sizes > max(STANCE_FORCE_N, LARGE_FRACTION * np.nanmax(sizes, initial=0.0)))
     )
     if not len(rows):
         return None
@@ -211,26 +232,29 @@ def measure_weight(tool: TrialTool) -> Numbers:
         raise MissingInput(f"the loads of {tool} are not expressed in ground")
     lift: Any = sum(load.force for load in loads) @ up
     times = table.times
-    first = max(times[0], motion.times[0], tool.span[0])
-    last = min(times[-1], motion.times[-1], tool.span[1])
-    inside = np.flatnonzero(
-        (times >= first) & (times <= last) & (lift > MIN_WEIGHT_FRACTION * mass * gravity)
+    start = max(times[0], motion.times[0], tool.span[0])
+    end = min(times[-1], motion.times[-1], tool.span[1])
+    loaded_rows = np.flatnonzero(
+        (times >= start) & (times <= end) & (lift > MIN_WEIGHT_FRACTION * mass * gravity)
     )
-    if len(inside) < 2 or times[inside[-1]] - times[inside[0]] < MIN_DURATION_S:
+    if len(loaded_rows) < 2 or times[loaded_rows[-1]] - times[loaded_rows[0]] < MIN_DURATION_S:
         raise MissingInput(f"no foot stands on a plate for {MIN_DURATION_S:g} s in {tool}")
-    in_span = slice(int(inside[0]), int(inside[-1]) + 1)
-    first = float(times[in_span][0])
-    last = float(times[in_span][-1])
-    mean = float(np.trapezoid(lift[in_span], times[in_span])) / (last - first)
+    in_span = slice(int(loaded_rows[0]), int(loaded_rows[-1]) + 1)
+    start = float(times[in_span][0])
+    end = float(times[in_span][-1])
+    mean = float(np.trapezoid(lift[in_span], times[in_span])) / (end - start)
     # Speeds of an unfiltered motion are mostly noise.
     smooth = motion.lowpassed(tool.cutoff) if tool.cutoff > 0.0 else motion
-    speeds = [_compute_rising_speed(smooth, time, up) for time in (first, last)]
+    speeds = [_compute_rising_speed(smooth, time, up) for time in (start, end)]
     # Newton's second law over the interval: mean lift = m (g + change of speed / duration).
-    carried = mean / (gravity + (speeds[1] - speeds[0]) / (last - first))
-    of = f"the difference of the mass of the model, {mass:.4g} kg, from {carried:.4g} kg on the plates"
-    where = f"mean from {first:.4g} to {last:.4g} s"
-    value = 100.0 * abs(mass / carried - 1.0) if carried > 0.0 else float("inf")
-    yield tool.model_file, Measurement("measured-weight", "difference", of, value, "%", where=where)
+    carried_mass = mean / (gravity + (speeds[1] - speeds[0]) / (end - start))
+    subject = f"the difference of the mass of the model, {mass:.4g} kg, from {carried_mass:.4g} kg on the plates"
+    interval_note = f"mean from {start:.4g} to {end:.4g} s"
+    value = 100.0 * abs(mass / carried_mass - 1.0) if carried_mass > 0.0 else float("inf")
+    yield (
+        tool.model_file,
+        Measurement("measured-weight", "difference", subject, value, "%", where=interval_note),
+    )
 
 
 def _compute_rising_speed(motion: RecordedMotion, time: float, up: Array) -> float:

@@ -38,20 +38,25 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
     strengths = {
         muscle.name: float(muscle.max_isometric_force) for muscle in tool.model.components(Muscle)
     }
-    told = 0
+    reported_count = 0
     for name in table.columns:
         # A muscle without equilibrium has NaN.
         column = np.where(np.isfinite(table[name]), table[name], 0.0)
         row = int(np.argmax(column))
-        share = 100.0 * float(column[row]) / strengths[name] if strengths.get(name) else 0.0
-        if share >= MIN_SHARE_PERCENT:
-            told += 1
+        percentage = 100.0 * float(column[row]) / strengths[name] if strengths.get(name) else 0.0
+        if percentage >= MIN_SHARE_PERCENT:
+            reported_count += 1
             time = float(table.times[row])
-            at = tool.folder.locate_time(file, time)
-            of = f"the passive force of '{name}', of its strength"
-            where = f"{column[row]:.4g} N at {time:g} s"
-            yield file, Measurement("passive-force", "peak", of, share, "%", where=where, at=at)
-    if not told:
+            position = tool.folder.locate_time(file, time)
+            subject = f"the passive force of '{name}', of its strength"
+            force_note = f"{column[row]:.4g} N at {time:g} s"
+            yield (
+                file,
+                Measurement(
+                    "passive-force", "peak", subject, percentage, "%", where=force_note, at=position
+                ),
+            )
+    if not reported_count:
         yield (
             file,
             Measurement(
@@ -73,9 +78,9 @@ def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> S
         is_states: whether the file has states.
     """
     times = tool.folder.read_table(file).times
-    first = max(float(times[0]), tool.span[0])
-    last = min(float(times[-1]), tool.span[1])
-    count = int(((times >= first) & (times <= last)).sum())
+    start = max(float(times[0]), tool.span[0])
+    end = min(float(times[-1]), tool.span[1])
+    count = int(((times >= start) & (times <= end)).sum())
     if not count or not any(True for _ in tool.model.components(Muscle)):
         raise MissingInput(f"{tool} has no muscles, or '{file}' has no row in its time range")
     analysis = MuscleAnalysis(name="muscles", moment_arm_coordinate_list=(), compute_moments=False)
@@ -84,8 +89,8 @@ def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> S
     setup = AnalyzeTool(
         name="trial",
         model_file=str(tool.model_file.absolute()),
-        initial_time=first,
-        final_time=last,
+        initial_time=start,
+        final_time=end,
     )
     setup.solve_for_equilibrium_for_auxiliary_states = not is_states
     setattr(setup, "states_file" if is_states else "coordinates_file", str(file.absolute()))
