@@ -21,7 +21,7 @@ MAX_NAMED_PARTS = 3
 
 
 def describe_fit(
-    motion: FittedMotion, advice: tuple[float, float] = MARKER_ERROR_LIMITS_M, of: str = ""
+    motion: FittedMotion, advice: tuple[float, float] = MARKER_ERROR_LIMITS_M, marker_note: str = ""
 ) -> Iterator[str]:
     """Yield messages about a fitted motion.
 
@@ -29,17 +29,17 @@ def describe_fit(
         motion: the motion.
         advice: limits of the root mean square and of the largest marker error that OpenSim's
             documentation advises, m.
-        of: text that says for which markers the limits hold.
+        marker_note: text that says for which markers the limits hold.
     """
     result = motion.summary
     if "rms_marker_error" in result:
         rms = result["rms_marker_error"]
         largest = result["largest_marker_error"]
-        most = " and ".join(f"{100.0 * limit:g}" for limit in advice)
+        limits_text = " and ".join(f"{100.0 * limit:g}" for limit in advice)
         advised = (
             ""
             if rms < advice[0] and largest < advice[1]
-            else f"; OpenSim advises less than {most} cm{of}"
+            else f"; OpenSim advises less than {limits_text} cm{marker_note}"
         )
         # Errors of metres are typical of millimetres that are read as metres.
         advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
@@ -52,7 +52,8 @@ def describe_fit(
         )
     if "rms_orientation_error" in result:
         rms, largest = (
-            math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest")
+            math.degrees(result[f"{statistic}_orientation_error"])
+            for statistic in ("rms", "largest")
         )
         yield (
             f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees "
@@ -61,8 +62,10 @@ def describe_fit(
             f"{result['worst_sensor_time']:g} s)"
         )
     if result["partly_unseen"]:
-        parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in result["partly_unseen"].items()]
-        yield f"unseen in some frames: {join_words(parts)}"
+        unseen_shares = [
+            f"{name} ({100.0 * share:.3g} %)" for name, share in result["partly_unseen"].items()
+        ]
+        yield f"unseen in some frames: {join_words(unseen_shares)}"
     if result["frames_unseen"]:
         frames = format_count(result["frames_unseen"], "frame")
         yield f"{frames} without any measurement that has a weight: the pose of the frame before is kept"
@@ -80,8 +83,13 @@ def describe_fit(
 def find_unknown(model: Model) -> list[str]:
     """Return the parts of a model whose classes are unknown, each as ``path (class)``."""
     tree = model.tree()
-    parts = [part for part in model.walk() if isinstance(part, Unknown)]
-    return [f"{tree.path_of(part) or part.name or 'a part'} ({part.class_name})" for part in parts]
+    unknown_objects = [
+        unknown_object for unknown_object in model.walk() if isinstance(unknown_object, Unknown)
+    ]
+    return [
+        f"{tree.path_of(unknown_object) or unknown_object.name or 'a part'} ({unknown_object.class_name})"
+        for unknown_object in unknown_objects
+    ]
 
 
 def describe_unknown(model: Model, consequence: str) -> str:
@@ -91,12 +99,12 @@ def describe_unknown(model: Model, consequence: str) -> str:
         model: the model.
         consequence: consequence for these parts, for example "not scaled".
     """
-    parts = find_unknown(model)
-    if not parts:
+    unknown_parts = find_unknown(model)
+    if not unknown_parts:
         return ""
     return (
-        f"{consequence}: {format_count(len(parts), 'part')} of classes that osimlite does not "
+        f"{consequence}: {format_count(len(unknown_parts), 'part')} of classes that osimlite does not "
         "know, "
-        f"{join_words(parts, max_count=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in "
+        f"{join_words(unknown_parts, max_count=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in "
         "of these classes is loaded"
     )

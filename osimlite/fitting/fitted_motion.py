@@ -91,31 +91,31 @@ class FittedMotion(Movement):
         """
         result: dict[str, Any] = {"frames": len(self.times), "markers": len(self.markers)}
         partly: dict[str, float] = {}
-        kinds = [("marker", self.markers, self.marker_errors)]
+        error_tables = [("marker", self.markers, self.marker_errors)]
         if self.sensors:
             result["sensors"] = len(self.sensors)
-            kinds.append(("orientation", self.sensors, self.orientation_errors))
-        for kind, names, errors in kinds:
-            seen = np.isfinite(errors)
-            if seen.any():
+            error_tables.append(("orientation", self.sensors, self.orientation_errors))
+        for quantity, names, errors in error_tables:
+            is_measured = np.isfinite(errors)
+            if is_measured.any():
                 # Errors are not negative, so that -1 is never the largest.
-                filled = np.where(seen, errors, -1.0)
-                frame, one = np.unravel_index(int(filled.argmax()), filled.shape)
+                known_errors = np.where(is_measured, errors, -1.0)
+                frame, column = np.unravel_index(int(known_errors.argmax()), known_errors.shape)
                 noun, time = (
                     ("marker", "worst_time")
-                    if kind == "marker"
+                    if quantity == "marker"
                     else ("sensor", "worst_sensor_time")
                 )
                 result |= {
-                    f"rms_{kind}_error": float(np.sqrt(np.mean(errors[seen] ** 2))),
-                    f"largest_{kind}_error": float(filled.max()),
-                    f"worst_{noun}": names[int(one)],
+                    f"rms_{quantity}_error": float(np.sqrt(np.mean(errors[is_measured] ** 2))),
+                    f"largest_{quantity}_error": float(known_errors.max()),
+                    f"worst_{noun}": names[int(column)],
                     time: float(self.times[int(frame)]),
                 }
-            missing = (1.0 - seen.mean(axis=0)).tolist()
+            missing = (1.0 - is_measured.mean(axis=0)).tolist()
             # Only markers that are unseen in some frame are named.
             partly |= {
-                name: round(part, 4) for name, part in zip(names, missing, strict=True) if part
+                name: round(share, 4) for name, share in zip(names, missing, strict=True) if share
             }
         result["partly_unseen"] = partly
         result["frames_unseen"], result["frames_unsettled"] = len(self.unseen), len(self.unsettled)

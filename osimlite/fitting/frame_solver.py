@@ -71,12 +71,12 @@ class FrameSolver:
         }
         # Orientation sensors do not measure positions.
         self._mechanism = mechanism if self.markers else lock_translations(mechanism)
-        weighed = dict.fromkeys((*self.markers, *self.sensors), 1.0) | dict(weights or {})
+        all_weights = dict.fromkeys((*self.markers, *self.sensors), 1.0) | dict(weights or {})
         self.coordinates = mechanism.coordinate_names
         self._fit = PoseFit(
             self._mechanism,
-            [MarkerTarget(stations[name], weighed[name]) for name in self.markers],
-            [SensorTarget(frame, weighed[name]) for name, frame in frames.items()],
+            [MarkerTarget(stations[name], all_weights[name]) for name in self.markers],
+            [SensorTarget(frame, all_weights[name]) for name, frame in frames.items()],
             constraints=constraints,
         )
         # At time 0, because the time of the first frame is not known yet.
@@ -108,7 +108,7 @@ class FrameSolver:
             SimulationError: no pose satisfies the constraints.
         """
         marker_positions = np.asarray(positions, dtype=float)
-        turned = np.asarray(orientations, dtype=float)
+        rotations = np.asarray(orientations, dtype=float)
         if marker_positions.shape != (len(self.markers), 3) and (
             self.markers or marker_positions.size
         ):
@@ -116,15 +116,17 @@ class FrameSolver:
                 f"expected {len(self.markers)} rows of 3 numbers, one for each marker; found "
                 f"{' × '.join(map(str, marker_positions.shape)) or 'one number'}"
             )
-        if self.sensors or turned.size:
-            turned = to_rotations(turned, "the frame")
-            if turned.shape != (len(self.sensors), 3, 3):
+        if self.sensors or rotations.size:
+            rotations = to_rotations(rotations, "the frame")
+            if rotations.shape != (len(self.sensors), 3, 3):
                 raise SettingError(
                     f"expected {len(self.sensors)} quaternions or matrices, one for each sensor; "
                     "found "
-                    f"{' × '.join(map(str, turned.shape[:-2])) or 'one'}"
+                    f"{' × '.join(map(str, rotations.shape[:-2])) or 'one'}"
                 )
-        return self._frame(np.concatenate((marker_positions.reshape(-1), turned.reshape(-1))), time)
+        return self._frame(
+            np.concatenate((marker_positions.reshape(-1), rotations.reshape(-1))), time
+        )
 
     @property
     def places(self) -> Array:

@@ -97,24 +97,24 @@ def _compute_target_values(
         return np.full(len(times), info.default_value)
     columns = () if coordinates is None else coordinates.columns
     if coordinates is None or task.name not in columns:
-        where = (
+        reason = (
             "there is no coordinate_file"
             if coordinates is None
             else f"'{coordinates.file}' has no such column"
         )
         raise SettingError(
             f"the value of '{task.name}' is read from a file, but "
-            f"{where}{suggest_name(task.name, columns)}"
+            f"{reason}{suggest_name(task.name, columns)}"
         )
     values = (
         np.deg2rad(coordinates[task.name])
         if info.motion_type == "rotational"
         else coordinates[task.name]
     )
-    half = min(3, (len(values) + 1) // 2)
+    order = min(3, (len(values) + 1) // 2)
     if len(values) < 2:
         return np.full(len(times), float(values[0]))
-    spline = smoothing_spline(coordinates.times, values, half, 0.0)
+    spline = smoothing_spline(coordinates.times, values, order, 0.0)
     return np.array([spline.derivatives(t)[0] for t in times.tolist()])
 
 
@@ -132,8 +132,8 @@ def run_inverse_kinematics(
     Raises:
         OsimliteError: as for :func:`collect_targets`.
     """
-    first, last = expect_time_range(tool.time_range)
-    frames = data.select_times(first, last)
+    start, end = expect_time_range(tool.time_range)
+    frames = data.select_times(start, end)
     mechanism = build_mechanism(model)
     tasks = collect_targets(model, mechanism, tool.ik_task_set.objects, frames, coordinates)
     return fit_motion(model, mechanism, frames, tasks.weights, tasks.goals, tasks.wanted)

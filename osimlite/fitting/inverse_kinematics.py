@@ -79,34 +79,40 @@ def inverse_kinematics(
     """
     if markers is None and orientations is None:
         raise SettingError("nothing to fit; pass markers, orientations, or both")
-    turned = (
+    orientation_data = (
         None
         if orientations is None
         else OrientationData.from_source(orientations, times).select_times(start, end)
     )
     if markers is not None:
         data = MarkerData.from_source(markers, times).select_times(start, end)
-    elif turned is not None:
+    elif orientation_data is not None:
         # Without markers the fit has the times of the orientations.
-        data = MarkerData.create_empty(turned.times)
+        data = MarkerData.create_empty(orientation_data.times)
     mechanism = build_mechanism(model)
     stations = find_marker_stations(model, mechanism)
-    frames = {} if turned is None else find_sensor_frames(model, mechanism, turned.names)
+    frames = (
+        {}
+        if orientation_data is None
+        else find_sensor_frames(model, mechanism, orientation_data.names)
+    )
     # By default every marker that the model and the data share counts equally.
-    weighed = {
+    marker_weights = {
         name: 1.0 for name in (data.find_shared_names([*stations]) if markers is not None else ())
     }
-    sensed = {name: 1.0 for name in frames}
+    sensor_weights = {name: 1.0 for name in frames}
     for name, weight in (weights or {}).items():
         if name not in stations and name not in frames:
-            known = [*stations, *frames]
-            what = "marker" if not frames else "sensor" if markers is None else "marker or sensor"
-            raise SettingError(f"'{model.name}' has no {what} '{name}'{suggest_name(name, known)}")
+            known_names = [*stations, *frames]
+            noun = "marker" if not frames else "sensor" if markers is None else "marker or sensor"
+            raise SettingError(
+                f"'{model.name}' has no {noun} '{name}'{suggest_name(name, known_names)}"
+            )
         check_weight(weight, f"'{name}'")
         # A marker and a sensor of one name share the weight.
-        for kind in (weighed, sensed):
-            if name in kind:
-                kind[name] = float(weight)
+        for group in (marker_weights, sensor_weights):
+            if name in group:
+                group[name] = float(weight)
     goals, targets = [], []
     for name, goal in (coordinates or {}).items():
         index = mechanism.coordinate_index(name)
@@ -117,7 +123,17 @@ def inverse_kinematics(
         targets.append(float(value))
     # Constant targets, in the form of a table over time.
     rows = np.tile(targets, (len(data.times), 1))
-    return fit_motion(model, mechanism, data, weighed, goals, rows, constraints, turned, sensed)
+    return fit_motion(
+        model,
+        mechanism,
+        data,
+        marker_weights,
+        goals,
+        rows,
+        constraints,
+        orientation_data,
+        sensor_weights,
+    )
 
 
 def fit_motion(
@@ -129,7 +145,7 @@ def fit_motion(
     targets: Array,
     constraints: bool = True,
     orientations: OrientationData | None = None,
-    sensed: Mapping[str, float] | None = None,
+    sensor_weights: Mapping[str, float] | None = None,
 ) -> FittedMotion:
     """Fit markers, sensors and coordinates of a model.
 
@@ -142,18 +158,20 @@ def fit_motion(
         targets: target values (t, k), rad or m.
         constraints: whether the constraints of the model hold.
         orientations: measured orientations of sensors, or None.
-        sensed: weights of the sensors to fit, by name.
+        sensor_weights: weights of the sensors to fit, by name.
 
     Raises:
         SettingError: markers and orientations have different times.
     """
-    turned = OrientationData.create_empty(data.times) if orientations is None else orientations
+    orientation_data = (
+        OrientationData.create_empty(data.times) if orientations is None else orientations
+    )
     if (
-        data.times.shape != turned.times.shape
-        or np.abs(data.times - turned.times).max() > TIME_TOLERANCE_S
+        data.times.shape != orientation_data.times.shape
+        or np.abs(data.times - orientation_data.times).max() > TIME_TOLERANCE_S
     ):
         raise SettingError(
-            f"the {len(data.times)} frames of the markers and the {len(turned.times)} frames of "
+            f"the {len(data.times)} frames of the markers and the {len(orientation_data.times)} frames of "
             "the orientations have "
             "different times; resample one of them"
         )
@@ -161,30 +179,38 @@ def fit_motion(
         # Orientations say nothing about positions.
         mechanism = lock_translations(mechanism)
     names = tuple(weights)
-    sensors = find_sensor_frames(model, mechanism, sensed) if sensed else {}
+    sensors = find_sensor_frames(model, mechanism, sensor_weights) if sensor_weights else {}
     stations = find_marker_stations(model, mechanism)
-    points = [MarkerTarget(stations[name], weights[name]) for name in names]
-    turning = [SensorTarget(frame, (sensed or {})[name]) for name, frame in sensors.items()]
-    fit = PoseFit(mechanism, points, turning, goals, constraints=constraints)
-    measured = data.select_values(names)
+    marker_targets = [MarkerTarget(stations[name], weights[name]) for name in names]
+    sensor_targets = [
+        SensorTarget(frame, (sensor_weights or {})[name]) for name, frame in sensors.items()
+    ]
+    pose_fit = PoseFit(mechanism, marker_targets, sensor_targets, goals, constraints=constraints)
+    marker_positions = data.select_values(names)
     count = len(data.times)
-    given = measured, turned.select_values([*sensors]), targets
-    poses: FittedPoses = fit.fit_frames(
-        np.hstack([item.reshape(count, -1) for item in given]),
+    measurements = marker_positions, orientation_data.select_values([*sensors]), targets
+    poses: FittedPoses = pose_fit.fit_frames(
+        np.hstack([array.reshape(count, -1) for array in measurements]),
         data.times,
         compute_first_pose(mechanism, float(data.times[0]), constraints),
     )
     # A marker with one missing component counts as unseen.
-    seen = np.asarray(np.isfinite(measured).all(axis=2))
+    is_seen = np.asarray(np.isfinite(marker_positions).all(axis=2))
     undetermined = find_undetermined(
-        mechanism, poses.values, seen, points, turning, goals, constraints=constraints
+        mechanism,
+        poses.values,
+        is_seen,
+        marker_targets,
+        sensor_targets,
+        goals,
+        constraints=constraints,
     )
     return FittedMotion(
         mechanism,
         data.times,
         poses.values,
         names,
-        measured,
+        marker_positions,
         poses.places,
         poses.costs,
         poses.steps,
@@ -197,12 +223,12 @@ def fit_motion(
     )
 
 
-def check_weight(weight: float, what: str) -> None:
+def check_weight(weight: float, owner: str) -> None:
     """Raise an error for an invalid weight.
 
     Args:
         weight: the weight.
-        what: what it belongs to, for the message.
+        owner: what it belongs to, for the message.
 
     Raises:
         SettingError: the weight is negative, infinite or NaN.
@@ -210,7 +236,7 @@ def check_weight(weight: float, what: str) -> None:
     # NaN fails this comparison, too.
     if not 0.0 <= weight < np.inf:
         raise SettingError(
-            f"the weight {weight:g} of {what} is invalid; set a number that is not negative"
+            f"the weight {weight:g} of {owner} is invalid; set a number that is not negative"
         )
 
 
@@ -220,13 +246,13 @@ def lock_translations(mechanism: Mechanism) -> Mechanism:
         replace(info, locked=True) if info.motion_type == "translational" else info
         for info in mechanism.coordinates
     )
-    others = tuple(
+    constraints = tuple(
         # Locks and prescribed motions are in the coordinates already.
-        item
-        for item in mechanism.constraints
-        if not isinstance(item, Lock | PrescribedCoordinate)
+        constraint
+        for constraint in mechanism.constraints
+        if not isinstance(constraint, Lock | PrescribedCoordinate)
     )
-    return replace(mechanism, coordinates=infos, constraints=others)
+    return replace(mechanism, coordinates=infos, constraints=constraints)
 
 
 def compute_first_pose(mechanism: Mechanism, time: float, constraints: bool) -> Array:
@@ -247,8 +273,8 @@ def find_marker_stations(model: Model, mechanism: Mechanism) -> dict[str, Statio
     tree = model.tree()
     result = dict[str, StationPlacement]()
     for marker in model.components(ModelMarker):
-        placed = mechanism.stations.get(tree.path_of(marker) or "")
-        if placed is not None:
+        placement = mechanism.stations.get(tree.path_of(marker) or "")
+        if placement is not None:
             # OpenSim finds the first marker of a name.
-            result.setdefault(marker.name, placed)
+            result.setdefault(marker.name, placement)
     return result

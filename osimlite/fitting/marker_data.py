@@ -50,21 +50,21 @@ class MarkerData(Measurements):
         """Positions (t, m, 3), m."""
         return self.values
 
-    def select_times(self, first: float, last: float) -> MarkerData:
+    def select_times(self, start_time: float, end_time: float) -> MarkerData:
         """Return the frames between those nearest to two times.
 
         Args:
-            first: first time, s; earlier than the data means from the start.
-            last: last time, s; later than the data means to the end.
+            start_time: first time, s; earlier than the data means from the start.
+            end_time: last time, s; later than the data means to the end.
 
         Raises:
             SettingError: there is no frame between these times.
         """
-        low = max(first, float(self.times[0]))
-        high = min(last, float(self.times[-1]))
-        if not low <= high:
-            raise self.create_range_error(first, last)
-        start, end = (int(np.argmin(np.abs(self.times - t))) for t in (low, high))
+        clipped_start = max(start_time, float(self.times[0]))
+        clipped_end = min(end_time, float(self.times[-1]))
+        if not clipped_start <= clipped_end:
+            raise self.create_range_error(start_time, end_time)
+        start, end = (int(np.argmin(np.abs(self.times - t))) for t in (clipped_start, clipped_end))
         return self.slice_frames(start, end + 1)
 
 
@@ -144,13 +144,13 @@ def read_sto_markers(path: str | Path) -> MarkerData:
         DocumentError: the file is damaged, or its columns are not markers.
     """
     table = read_sto(path)
-    ends = ("_x", "_y", "_z") if table.kind == "Vec3" else ("_tx", "_ty", "_tz")
-    firsts = table.columns[::3]
-    names = tuple(label.removesuffix(ends[0]) for label in firsts)
-    if [f"{name}{end}" for name in names for end in ends] != [*table.columns]:
+    suffixes = ("_x", "_y", "_z") if table.kind == "Vec3" else ("_tx", "_ty", "_tz")
+    first_columns = table.columns[::3]
+    names = tuple(label.removesuffix(suffixes[0]) for label in first_columns)
+    if [f"{name}{suffix}" for name in names for suffix in suffixes] != [*table.columns]:
         raise DocumentError(
             "the columns are not marker positions: each marker has three columns, which end in "
-            f"{', '.join(ends)}",
+            f"{', '.join(suffixes)}",
             file=str(path),
         )
     unit = METRES_PER_UNIT.get(table.header.get("Units", "m"), 1.0)

@@ -27,10 +27,10 @@ class Measurements:
     shape: ClassVar[tuple[int, ...]]  # shape of one value
 
     def __post_init__(self) -> None:
-        twice = sorted({name for name in self.names if self.names.count(name) > 1})
-        if twice:
+        repeated = sorted({name for name in self.names if self.names.count(name) > 1})
+        if repeated:
             raise DocumentError(
-                f"two {self.noun}s have the name {join_words(twice)}; rename one of each",
+                f"two {self.noun}s have the name {join_words(repeated)}; rename one of each",
                 file=self.file,
             )
         if len(self.times) == 0:
@@ -86,11 +86,11 @@ class Measurements:
         """Return the frames from one number up to, but not including, another."""
         return type(self)(self.names, self.times[start:end], self.values[start:end], self.file)
 
-    def create_range_error(self, first: float, last: float) -> SettingError:
+    def create_range_error(self, start: float, end: float) -> SettingError:
         """Return the error for a range of times without frames."""
-        where = f" of '{self.file}'" if self.file else ""
+        file_note = f" of '{self.file}'" if self.file else ""
         return SettingError(
-            f"no frame{where} lies between {first:g} and {last:g} s; the data are from "
+            f"no frame{file_note} lies between {start:g} and {end:g} s; the data are from "
             f"{self.times[0]:g} to "
             f"{self.times[-1]:g} s"
         )

@@ -63,7 +63,7 @@ class ScaleFactorFinder:
                     self.found.factors[name] = [float(factor) for factor in scale.scales]
 
     def apply_measurements(
-        self, measurements: Iterable[Measurement], data: MarkerData, first: float, last: float
+        self, measurements: Iterable[Measurement], data: MarkerData, start: float, end: float
     ) -> None:
         """Set scale factors by measurements: mean ratios of distances over the pairs of markers.
 
@@ -73,10 +73,10 @@ class ScaleFactorFinder:
         Args:
             measurements: measurements; later ones overwrite earlier ones.
             data: measured markers of the standing subject.
-            first: start of the range over which distances are averaged, s.
-            last: end of the range, s.
+            start: start of the range over which distances are averaged, s.
+            end: end of the range, s.
         """
-        frames = select_frames(data.times, first, last)
+        frames = select_frames(data.times, start, end)
         for number, measurement in enumerate(measurements, start=1):
             if not measurement.apply:
                 continue
@@ -116,59 +116,64 @@ class ScaleFactorFinder:
                         0.0,
                         f"the data have no marker '{marker}'{suggest_name(marker, data.names)}",
                     )
-            one, two = (self._state.point(*self._stations[marker]) for marker in names)
-            length = float(np.linalg.norm(one - two))
+            first, second = (self._state.point(*self._stations[marker]) for marker in names)
+            model_length = float(np.linalg.norm(first - second))
             positions = data.select_values(names)[frames]
-            measured = float(np.mean(np.linalg.norm(positions[:, 0] - positions[:, 1], axis=1)))
+            measured_length = float(
+                np.mean(np.linalg.norm(positions[:, 0] - positions[:, 1], axis=1))
+            )
             # One unseen marker makes the mean undefined, as in OpenSim.
-            if not np.isfinite(measured):
+            if not np.isfinite(measured_length):
                 return 0.0, f"{join_words(names)} were not seen in every frame of the time range"
-            if not length > 0.0:
+            if not model_length > 0.0:
                 return 0.0, f"{join_words(names)} have the same position in the model"
             # OpenSim averages ratios, not distances.
-            ratios.append(measured / length)
+            ratios.append(measured_length / model_length)
         return (float(np.mean(ratios)), "") if ratios else (0.0, "it has no pairs of markers")
 
-    def _is_known(self, name: str, what: str) -> bool:
+    def _is_known(self, name: str, user_description: str) -> bool:
         """Return whether the model has a frame of a name; add a note if not."""
         if name not in self.found.factors:
             self.found.notes.append(
-                f"{what}: the model has no body '{name}'{suggest_name(name, self.found.factors)}"
+                f"{user_description}: the model has no body '{name}'{suggest_name(name, self.found.factors)}"
             )
         return name in self.found.factors
 
 
-def create_scale_set(frames: Iterable[str], measured: ScaleFactors) -> ScaleSet:
+def create_scale_set(frames: Iterable[str], scale_factors: ScaleFactors) -> ScaleSet:
     """Return scale factors as the object that OpenSim writes.
 
     Args:
         frames: names of physical frames, in order.
-        measured: their factors.
+        scale_factors: their factors.
     """
     scales = [
-        Scale(scales=tuple(measured.factors[name]), segment=name, apply=True) for name in frames
+        Scale(scales=tuple(scale_factors.factors[name]), segment=name, apply=True)
+        for name in frames
     ]
     return ScaleSet(objects=scales)
 
 
-def select_frames(times: Array, first: float, last: float) -> slice:
+def select_frames(times: Array, start_time: float, end_time: float) -> slice:
     """Return the frames that OpenSim averages over a range of times.
 
     They reach from the last frame up to the first time to the first frame from the last time on.
 
     Args:
         times: times of the frames (t,), s.
-        first: start of the range, s.
-        last: end of the range, s.
+        start_time: start of the range, s.
+        end_time: end of the range, s.
 
     Raises:
         SettingError: the range ends before it begins.
     """
-    if first > last:
-        raise SettingError(f"the time range ends at {last:g} s, before it begins at {first:g} s")
-    start = max(int(np.searchsorted(times, first, side="right")) - 1, 0)
-    later = np.flatnonzero(times[start:] >= last - TIME_TOLERANCE_S)
-    return slice(start, start + int(later[0]) + 1 if len(later) else len(times))
+    if start_time > end_time:
+        raise SettingError(
+            f"the time range ends at {end_time:g} s, before it begins at {start_time:g} s"
+        )
+    start = max(int(np.searchsorted(times, start_time, side="right")) - 1, 0)
+    frames_from_end = np.flatnonzero(times[start:] >= end_time - TIME_TOLERANCE_S)
+    return slice(start, start + int(frames_from_end[0]) + 1 if len(frames_from_end) else len(times))
 
 
 def _compute_default_pose(mechanism: Mechanism) -> Array:

@@ -52,23 +52,24 @@ class OrientationData(Measurements):
             {name: to_rotations(value, f"sensor '{name}'") for name, value in source.items()}, times
         )
 
-    def select_times(self, first: float, last: float) -> OrientationData:
+    def select_times(self, start_time: float, end_time: float) -> OrientationData:
         """Return the frames between two times, both included.
 
         Args:
-            first: first time, s.
-            last: last time, s.
+            start_time: first time, s.
+            end_time: last time, s.
 
         Raises:
             SettingError: there is no frame between these times.
         """
         # Unlike markers, orientations are not taken from the nearest frames outside the range.
-        inside = np.flatnonzero(
-            (self.times >= first - TIME_TOLERANCE_S) & (self.times <= last + TIME_TOLERANCE_S)
+        frames_in_range = np.flatnonzero(
+            (self.times >= start_time - TIME_TOLERANCE_S)
+            & (self.times <= end_time + TIME_TOLERANCE_S)
         )
-        if not len(inside):
-            raise self.create_range_error(first, last)
-        return self.slice_frames(int(inside[0]), int(inside[-1]) + 1)
+        if not len(frames_in_range):
+            raise self.create_range_error(start_time, end_time)
+        return self.slice_frames(int(frames_in_range[0]), int(frames_in_range[-1]) + 1)
 
     def rotate_ground(self, angles: ArrayLike) -> OrientationData:
         """Return the orientations in a rotated ground.
@@ -79,26 +80,26 @@ class OrientationData(Measurements):
         return replace(self, values=rotation_about_space(angles) @ self.values)
 
 
-def to_rotations(values: ArrayLike, what: str) -> Array:
+def to_rotations(values: ArrayLike, owner: str) -> Array:
     """Return rotation matrices (..., 3, 3) from quaternions (..., 4) or from rotation matrices.
 
     Args:
         values: quaternions, scalar first, or rotation matrices.
-        what: what they belong to, for the message.
+        owner: what they belong to, for the message.
 
     Raises:
         SettingError: the array has neither shape.
     """
-    given = np.asarray(values, dtype=float)
-    if given.ndim >= 1 and given.shape[-1] == 4:
-        return rotation_of(given)
-    if given.ndim < 2 or given.shape[-2:] != (3, 3):
+    array = np.asarray(values, dtype=float)
+    if array.ndim >= 1 and array.shape[-1] == 4:
+        return rotation_of(array)
+    if array.ndim < 2 or array.shape[-2:] != (3, 3):
         raise SettingError(
-            f"expected quaternions of 4 numbers or matrices of 3 × 3 for orientations; {what} has "
+            f"expected quaternions of 4 numbers or matrices of 3 × 3 for orientations; {owner} has "
             "an array of "
-            f"{' × '.join(map(str, given.shape)) or 'one number'}"
+            f"{' × '.join(map(str, array.shape)) or 'one number'}"
         )
-    return given
+    return array
 
 
 def holds_orientations(path: str | Path) -> bool:

@@ -93,11 +93,11 @@ class Person:
     after: Array
     notes: tuple[str, ...] = ()
 
-    def errors(self, places: Array) -> dict[str, float]:
+    def errors(self, positions: Array) -> dict[str, float]:
         """Return root mean square distances by trial.
 
         Args:
-            places: positions as in `before` or `after` (t, m, 3), m.
+            positions: positions as in `before` or `after` (t, m, 3), m.
 
         Returns:
             Root mean square (m) by name of the trial.
@@ -106,7 +106,7 @@ class Person:
         for trial in dict.fromkeys(self.trials):
             selected = [name == trial for name in self.trials]
             result[trial] = sqrt(
-                float(np.nanmean(((places - self.measured)[selected] ** 2).sum(axis=-1)))
+                float(np.nanmean(((positions - self.measured)[selected] ** 2).sum(axis=-1)))
             )
         return result
 
@@ -159,14 +159,14 @@ def fit(
     }
     # Neighbouring frames are nearly the same; a selection gives almost all information.
     selected = SelectedFrames(_read_trials(trials, static), list(stations), frames, weights or {})
-    moving = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
+    movable_markers = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
     if held is not None:
         unknown = [name for name in held if name not in stations]
         if unknown:
             raise SettingError(
                 f"'{model.name}' has no marker '{unknown[0]}'{suggest_name(unknown[0], stations)}"
             )
-        moving = set(stations) - set(held)
+        movable_markers = set(stations) - set(held)
     names = [body.name for body in mechanism.bodies]
     carriers = {
         body.name: names[body.parent] if body.parent != GROUND else "" for body in mechanism.bodies
@@ -176,11 +176,11 @@ def fit(
     search = _PersonFit(
         ScalableMarkers(model, selected.markers, segments),
         selected,
-        [name in moving for name in selected.markers],
+        [name in movable_markers for name in selected.markers],
     )
     report_stage("fitting the poses of the model as it is")
     result = search.start_from_model(mechanism)
-    before = result.places
+    positions_before = result.places
     # Excluding the worst positions changes the fit, which may reveal others.
     for _ in range(OUTLIER_ROUNDS):
         result = search.run(result, OUTLIER_STEP)
@@ -192,9 +192,9 @@ def fit(
     factors = segments.expand_factors(result.sizes)
     scale_model(scaled, factors, mass)
     offsets = {
-        name: by
-        for name, by in zip(selected.markers, result.offsets, strict=True)
-        if name in moving
+        name: offset
+        for name, offset in zip(selected.markers, result.offsets, strict=True)
+        if name in movable_markers
     }
     placements = Placements(scaled.tree())
     for marker in scaled.components(ModelMarker):
@@ -214,7 +214,7 @@ def fit(
         selected.times,
         tuple(selected.markers),
         selected.measured,
-        before,
+        positions_before,
         result.places,
         (*selected.notes, *_report_extreme_factors(factors)),
     )
@@ -240,13 +240,13 @@ def _read_trials(
 
 def _report_extreme_factors(factors: Mapping[str, Sequence[float]]) -> Iterator[str]:
     """Yield a message about factors at the end of their range."""
-    ends = [
+    bodies_at_limit = [
         body
         for body, body_factors in factors.items()
         if min(body_factors) <= MIN_FACTOR or max(body_factors) >= MAX_FACTOR
     ]
-    if ends:
-        yield f"{join_words(ends)}: scale factors at a limit; check the names and units of the markers"
+    if bodies_at_limit:
+        yield f"{join_words(bodies_at_limit)}: scale factors at a limit; check the names and units of the markers"
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,11 +274,11 @@ class _PersonFit:
     """Maximum a posteriori estimate of sizes and offsets."""
 
     def __init__(
-        self, shape: ScalableMarkers, selected: SelectedFrames, free: Sequence[bool]
+        self, shape: ScalableMarkers, selected: SelectedFrames, is_movable: Sequence[bool]
     ) -> None:
         self._shape = shape
         self._chosen = selected
-        self._free = np.flatnonzero(free)
+        self._free = np.flatnonzero(is_movable)
         self._sizes = len(shape.segments.parts)
         self._moved = 3 * len(self._free)
         frames = len(selected.times)
@@ -295,45 +295,45 @@ class _PersonFit:
             np.ones(self._sizes), np.zeros((len(self._chosen.markers), 3)), starts
         )
 
-    def run(self, known: _Estimate, enough: float) -> _Estimate:
+    def run(self, start: _Estimate, tolerance: float) -> _Estimate:
         """Return the most likely estimate.
 
         Args:
-            known: estimate to start from.
-            enough: largest change of a size or offset (m) by the last step.
+            start: estimate to start from.
+            tolerance: largest change of a size or offset (m) by the last step.
         """
-        here = self._evaluate(known.sizes, known.offsets, known.values)
+        estimate = self._evaluate(start.sizes, start.offsets, start.values)
         damping = 1e-6
         first_change = 0.0
         for _ in range(MAX_STEPS):
-            matrix, slope = self._compute_normal_equations(here)
+            matrix, slope = self._compute_normal_equations(estimate)
             while True:
                 # Levenberg-Marquardt: raise the damping until the cost falls.
                 # Damping by the diagonal makes the step independent of the units of sizes and
                 # offsets.
                 step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
-                sizes = np.clip(here.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
-                offsets = here.offsets.copy()
+                sizes = np.clip(estimate.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
+                offsets = estimate.offsets.copy()
                 offsets[self._free] += step[self._sizes :].reshape(-1, 3)
-                there = self._evaluate(sizes, offsets, here.values)
-                if there.cost <= here.cost or np.abs(step).max() < enough:
+                trial_estimate = self._evaluate(sizes, offsets, estimate.values)
+                if trial_estimate.cost <= estimate.cost or np.abs(step).max() < tolerance:
                     break
                 damping = 10.0 * max(damping, 1e-9)
-            if there.cost <= here.cost:
-                here = there
+            if trial_estimate.cost <= estimate.cost:
+                estimate = trial_estimate
                 damping = 0.1 * damping
             change = float(np.abs(step).max())
-            if change < enough:
+            if change < tolerance:
                 break
             # Steps shrink by about the same factor each, so their orders of magnitude tell how far
             # the search is.
             first_change = max(first_change, change)
             report_progress(
                 "fitting sizes and markers",
-                min(0.99, max(0.01, log(first_change / change) / log(first_change / enough))),
+                min(0.99, max(0.01, log(first_change / change) / log(first_change / tolerance))),
                 1.0,
             )
-        return here
+        return estimate
 
     def compute_deviations(self, estimate: _Estimate) -> Array:
         """Return the standard deviations (k,) of the sizes."""
@@ -350,55 +350,62 @@ class _PersonFit:
             starts: initial poses (t, n).
         """
         posed = ScaledPoseFit(self._shape, sizes, offsets, self._chosen.weights)
-        values, places = posed.fit_poses(self._chosen.measured, starts)
-        errors = places - self._chosen.measured
+        values, positions = posed.fit_poses(self._chosen.measured, starts)
+        errors = positions - self._chosen.measured
         squares = self._unit * float(np.nansum(self._chosen.weights[:, None] * errors**2))
-        likely = self._prior @ sizes - self._wanted
+        prior_residuals = self._prior @ sizes - self._wanted
         # Negative logarithm of a Cauchy density, up to a constant.
-        far = float(np.log1p((offsets[self._free] ** 2).sum(axis=1) / MARKER_OFFSET_M**2).sum())
+        offset_penalty = float(
+            np.log1p((offsets[self._free] ** 2).sum(axis=1) / MARKER_OFFSET_M**2).sum()
+        )
         return _Estimate(
-            sizes, offsets, posed, values, places, 0.5 * (squares + float(likely @ likely) + far)
+            sizes,
+            offsets,
+            posed,
+            values,
+            positions,
+            0.5 * (squares + float(prior_residuals @ prior_residuals) + offset_penalty),
         )
 
-    def _compute_normal_equations(self, here: _Estimate) -> tuple[Array, Array]:
+    def _compute_normal_equations(self, estimate: _Estimate) -> tuple[Array, Array]:
         """Return matrix and right-hand side of the normal equations for sizes and offsets.
 
         The poses are eliminated: only the part of each residual's derivative that no change of the
         pose can produce counts.
         """
-        values = here.values
-        columns, turned = self._shape.compute_derivatives(values)
-        errors = here.places - self._chosen.measured
-        seen = np.asarray(np.isfinite(errors).all(axis=2))
+        values = estimate.values
+        columns, rotations = self._shape.compute_derivatives(values)
+        errors = estimate.places - self._chosen.measured
+        is_measured = np.asarray(np.isfinite(errors).all(axis=2))
         roots = np.sqrt(self._unit * self._chosen.weights)
         size = self._sizes + self._moved
         # Derivatives of the marker positions: by sizes first, then by offsets.
-        by = np.zeros((*errors.shape, size))
-        by[..., : self._sizes] = columns
+        derivatives = np.zeros((*errors.shape, size))
+        derivatives[..., : self._sizes] = columns
         for number, index in enumerate(self._free):
-            first = self._sizes + 3 * number
-            by[:, index, :, first : first + 3] = turned[:, index]
+            first_column = self._sizes + 3 * number
+            derivatives[:, index, :, first_column : first_column + 3] = rotations[:, index]
         matrix = np.zeros((size, size))
         slope = np.zeros(size)
         matrix[: self._sizes, : self._sizes] = self._prior.T @ self._prior
-        slope[: self._sizes] = self._prior.T @ (self._prior @ here.sizes - self._wanted)
-        far = here.offsets[self._free]
+        slope[: self._sizes] = self._prior.T @ (self._prior @ estimate.sizes - self._wanted)
+        movable_offsets = estimate.offsets[self._free]
         # Cauchy prior as iteratively reweighted least squares.
-        pull = np.repeat(1.0 / (MARKER_OFFSET_M**2 + (far**2).sum(axis=1)), 3)
-        np.fill_diagonal(matrix[self._sizes :, self._sizes :], pull)
-        slope[self._sizes :] = pull * far.ravel()
-        for frame, moves in enumerate(here.posed.compute_free_motions(values)):
-            is_seen = seen[frame]
+        prior_weights = np.repeat(1.0 / (MARKER_OFFSET_M**2 + (movable_offsets**2).sum(axis=1)), 3)
+        np.fill_diagonal(matrix[self._sizes :, self._sizes :], prior_weights)
+        slope[self._sizes :] = prior_weights * movable_offsets.ravel()
+        for frame, moves in enumerate(estimate.posed.compute_free_motions(values)):
+            is_seen = is_measured[frame]
             scaled = roots[is_seen, None, None]
-            rows = (scaled * by[frame, is_seen]).reshape(-1, size)
+            rows = (scaled * derivatives[frame, is_seen]).reshape(-1, size)
             # Errors that a change of the pose removes do not count: project them out.
-            moved = (scaled * moves[is_seen]).reshape(len(rows), moves.shape[-1])
+            pose_derivatives = (scaled * moves[is_seen]).reshape(len(rows), moves.shape[-1])
             # Orthonormal directions in which a change of the pose moves the markers.
-            squares, axes = np.linalg.eigh(moved.T @ moved)
+            squares, axes = np.linalg.eigh(pose_derivatives.T @ pose_derivatives)
             # Directions in which the markers do not move are rounding errors.
             certain = squares > 1e-12 * squares.max(initial=1e-300)
-            directions = moved @ (axes[:, certain] / np.sqrt(squares[certain]))
-            across = rows - directions @ (directions.T @ rows)
-            matrix += across.T @ across
+            directions = pose_derivatives @ (axes[:, certain] / np.sqrt(squares[certain]))
+            remaining_rows = rows - directions @ (directions.T @ rows)
+            matrix += remaining_rows.T @ remaining_rows
             slope += rows.T @ (roots[is_seen, None] * errors[frame][is_seen]).ravel()
         return matrix, slope

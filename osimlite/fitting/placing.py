@@ -42,8 +42,8 @@ def place_markers(
     model: Model,
     data: MarkerData,
     tasks: Iterable[IKTask],
-    first: float,
-    last: float,
+    start: float,
+    end: float,
     coordinates: StoTable | None = None,
 ) -> MarkerPlacement:
     """Fit the pose of a model to a standing subject, and move its markers.
@@ -56,39 +56,39 @@ def place_markers(
         model: the model, which is changed; markers without data are removed.
         data: measured markers of the standing subject.
         tasks: weights and targets of the pose.
-        first: start of the range over which markers are averaged, s.
-        last: end of the range, s.
+        start: start of the range over which markers are averaged, s.
+        end: end of the range, s.
         coordinates: values of coordinates for tasks that read them from a file.
 
     Raises:
         SettingError: the range has no frames, or a task has an unknown name.
     """
-    first = max(first, float(data.times[0]))
-    last = min(last, float(data.times[-1]))
-    within = (data.times >= first) & (data.times <= last)
+    start = max(start, float(data.times[0]))
+    end = min(end, float(data.times[-1]))
+    is_in_range = (data.times >= start) & (data.times <= end)
     if data.times[0] == data.times[-1]:
         raise SettingError(
             f"'{data.file or 'the static trial'}' has one frame, at {data.times[0]:g} s, but the "
             "markers are averaged "
             "over a range of times, as in OpenSim; repeat the row at a later time"
         )
-    if not within.any() or not first < last:
+    if not is_in_range.any() or not start < end:
         raise SettingError(
-            f"the time range of the markers, {first:g} to {last:g} s, has no frames to average; "
+            f"the time range of the markers, {start:g} to {end:g} s, has no frames to average; "
             "set one that begins "
             f"before it ends, within {data.times[0]:g} to {data.times[-1]:g} s"
         )
     # The pose is fitted to the mean of the frames, in which a marker that was missed once is NaN.
     mean = MarkerData(
-        data.names, np.array((first,)), data.positions[within].mean(axis=0)[None], data.file
+        data.names, np.array((start,)), data.positions[is_in_range].mean(axis=0)[None], data.file
     )
-    averaged = data.positions[select_frames(data.times, first, last)]
-    seen = np.asarray(np.isfinite(averaged).all(axis=2))
-    selected = np.where(seen[..., None], averaged, 0.0)
+    averaged = data.positions[select_frames(data.times, start, end)]
+    is_seen = np.asarray(np.isfinite(averaged).all(axis=2))
+    selected = np.where(is_seen[..., None], averaged, 0.0)
     # A marker that is never seen has NaN as its mean, and stays.
     with np.errstate(invalid="ignore"):
         target = dict(
-            zip(data.names, selected.sum(axis=0) / seen.sum(axis=0)[:, None], strict=True)
+            zip(data.names, selected.sum(axis=0) / is_seen.sum(axis=0)[:, None], strict=True)
         )
     markers = model.marker_set.objects
     removed = tuple(marker.name for marker in markers if marker.name not in target)
@@ -98,16 +98,18 @@ def place_markers(
     requested = collect_targets(model, mechanism, tasks, mean, coordinates)
     pose = fit_motion(model, mechanism, mean, requested.weights, requested.goals, requested.wanted)
     state = mechanism.at(pose.values[0])
-    moved = dict[str, float]()
+    move_distances = dict[str, float]()
     for marker in model.components(Marker):
         if marker.fixed or marker.name not in target or not np.isfinite(target[marker.name]).all():
             continue
         body, frame = mechanism.placement(_find_frame_path(model, marker))
         # From ground to the frame of the marker in the fitted pose.
-        there = np.linalg.inv(state.transform(body) @ frame) @ [*target[marker.name], 1.0]
-        moved[marker.name] = float(np.linalg.norm(there[:3] - np.array(marker.location)))
-        marker.location = tuple(there[:3].tolist())
-    return MarkerPlacement(pose, removed, moved)
+        location = np.linalg.inv(state.transform(body) @ frame) @ [*target[marker.name], 1.0]
+        move_distances[marker.name] = float(
+            np.linalg.norm(location[:3] - np.array(marker.location))
+        )
+        marker.location = tuple(location[:3].tolist())
+    return MarkerPlacement(pose, removed, move_distances)
 
 
 def _find_frame_path(model: Model, marker: Marker) -> str:
@@ -118,27 +120,29 @@ def _find_frame_path(model: Model, marker: Marker) -> str:
     )
 
 
-def format_pose(model: Model, placed: MarkerPlacement) -> str:
+def format_pose(model: Model, placement: MarkerPlacement) -> str:
     """Return the pose as OpenSim's placer writes it: all states of the model, in radians.
 
     Args:
         model: the model.
-        placed: its markers and pose.
+        placement: its markers and pose.
     """
-    mechanism = placed.pose.mechanism
-    motion = placed.pose
+    mechanism = placement.pose.mechanism
+    motion = placement.pose
     elements = force_elements(model, mechanism, skip_unsupported=True).elements
     # All states, also those of muscles, because OpenSim's file has them.
     layout = StateLayout(mechanism, range(len(mechanism.coordinates)), elements)
     values = motion.values[0].tolist()
     state = layout.pack(values, [0.0] * len(values))
     columns = dict(zip(layout.paths, layout.auxiliary(state), strict=True))
-    named = [item.path for item in layout.variables if item.is_named]
+    named_paths = [variable.path for variable in layout.variables if variable.is_named]
     for info, value in zip(mechanism.coordinates, values, strict=True):
         columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = value, 0.0
     coordinate_paths = [
-        f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")
+        f"{info.path}/{quantity}"
+        for info in mechanism.coordinates
+        for quantity in ("value", "speed")
     ]
-    paths = sort_by_component(model, [*coordinate_paths, *named])
+    paths = sort_by_component(model, [*coordinate_paths, *named_paths])
     row = np.array([[columns[path] for path in paths]])
     return "".join(format_old_table(StoTable("static pose", motion.times, tuple(paths), row)))

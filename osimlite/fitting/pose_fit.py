@@ -91,34 +91,48 @@ class PoseFit:
         self.measured = 3 * len(markers) + 9 * len(sensors)
         infos = list(mechanism.coordinates)
         self._held: dict[int, SmoothFunction | None] = {}
-        free = set(find_free_coordinates(mechanism))
+        free_coordinates = set(find_free_coordinates(mechanism))
         for index, info in enumerate(infos):
             # Their values change from frame to frame or from fit to fit; as inputs they need no new
             # kernel.
-            if index in free and (info.locked or info.prescribed is not None):
+            if index in free_coordinates and (info.locked or info.prescribed is not None):
                 self._held[index] = None if info.locked else info.prescribed
                 infos[index] = replace(info, locked=False, prescribed=None)
-        acting = [
-            item
-            for item in mechanism.constraints
-            if not isinstance(item, Lock | PrescribedCoordinate)
+        active_constraints = [
+            constraint
+            for constraint in mechanism.constraints
+            if not isinstance(constraint, Lock | PrescribedCoordinate)
         ] * constraints
-        fixed = {index for index in range(len(infos)) if index not in free or index in self._held}
-        self._couplers, others = separate_couplers(acting, fixed)
+        fixed_coordinates = {
+            index
+            for index in range(len(infos))
+            if index not in free_coordinates or index in self._held
+        }
+        self._couplers, other_constraints = separate_couplers(active_constraints, fixed_coordinates)
         # A target of a coordinate that cannot move has no effect.
-        self._goals = [number for number, goal in enumerate(goals) if goal.coordinate not in fixed]
-        unlocked = replace(mechanism, coordinates=tuple(infos), constraints=tuple(others))
+        self._goals = [
+            number for number, goal in enumerate(goals) if goal.coordinate not in fixed_coordinates
+        ]
+        unlocked = replace(
+            mechanism, coordinates=tuple(infos), constraints=tuple(other_constraints)
+        )
         self.system = _System(unlocked, Forces(()), code=code)
         self.order = list(self.system.order)
-        places = Places(
+        placements = Places(
             unlocked, {index: k for k, index in enumerate(self.order)}, self.system.placements
         )
-        kept = [goals[number] for number in self._goals]
+        active_goals = [goals[number] for number in self._goals]
         self.layout = FitLayout(
-            self.system, places, markers, sensors, kept, list(self._held), self._couplers
+            self.system,
+            placements,
+            markers,
+            sensors,
+            active_goals,
+            list(self._held),
+            self._couplers,
         )
         self._history = self.layout.work[self.layout.ints[FIT.HISTORY] :]
-        self.width = self.measured + len(kept) + len(self._held)
+        self.width = self.measured + len(active_goals) + len(self._held)
         self.sensors = len(sensors)
         self.found = len(self.order) + 3 * (len(markers) + len(sensors)) + 3
 
@@ -145,14 +159,14 @@ class PoseFit:
         if q is not None:
             self.set_pose(q)
         count = len(measured)
-        free = len(self.order)
-        given = measured.reshape(count, -1)
+        free_count = len(self.order)
+        measured_rows = measured.reshape(count, -1)
         frames = np.empty((count, self.width))
         result = np.empty((count, self.found))
-        frames[:, : self.measured] = given[:, : self.measured]
-        frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][
-            :, self._goals
-        ]
+        frames[:, : self.measured] = measured_rows[:, : self.measured]
+        frames[:, self.measured : self.measured + len(self._goals)] = measured_rows[
+            :, self.measured :
+        ][:, self._goals]
         self.fill_prescribed(
             frames, np.zeros(count) if times is None else np.asarray(times, dtype=float)
         )
@@ -163,15 +177,15 @@ class PoseFit:
         if (status == APART).any():
             raise self.create_constraint_error(int(np.argmax(status == APART)))
         values = np.tile(self.mechanism.values({}), (count, 1))
-        values[:, self.order] = result[:, :free]
-        vectors = result[:, free:-3].reshape(count, -1, 3)
+        values[:, self.order] = result[:, :free_count]
+        vectors = result[:, free_count:-3].reshape(count, -1, 3)
         unseen, unsettled = (
-            tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK)
+            tuple(np.flatnonzero(status == code).tolist()) for code in (UNSEEN, STUCK)
         )
         positions = vectors[:, : self.markers]
-        turns = vectors[:, self.markers :]
+        rotations = vectors[:, self.markers :]
         return FittedPoses(
-            values, positions, turns, result[:, -3], result[:, -2], unseen, unsettled
+            values, positions, rotations, result[:, -3], result[:, -2], unseen, unsettled
         )
 
     def bind_arrays(self, frames: Array, results: Array) -> Callable[[int], int]:
@@ -207,7 +221,9 @@ class PoseFit:
     def create_constraint_error(self, frame: int) -> SimulationError:
         """Return the error for a frame in which no pose satisfies the constraints."""
         names = ", ".join(
-            item.name for item in self.mechanism.constraints if not isinstance(item, Lock)
+            constraint.name
+            for constraint in self.mechanism.constraints
+            if not isinstance(constraint, Lock)
         )
         return SimulationError(
             f"no pose of '{self.mechanism.name}' near that of frame {frame + 1} satisfies its "
@@ -227,9 +243,9 @@ class _System(System):
 
     def bind_arrays(self, *arrays: Floats | Ints) -> Callable[[int], int]:
         """Return a function that fits a number of frames; the caller keeps the arrays alive."""
-        flat = [array.reshape(-1) for array in arrays]
+        flat_arrays = [array.reshape(-1) for array in arrays]
         arguments = self.program.ints, self.numbers, self._w, self._y, self._f
-        return self.program.code.bind_entry("fit_frames", *arguments, *flat)
+        return self.program.code.bind_entry("fit_frames", *arguments, *flat_arrays)
 
 
 class SingleFrameFit:
@@ -241,11 +257,11 @@ class SingleFrameFit:
         self._row = np.empty(fit.width)
         self._found = np.empty(fit.found)
         self._run = fit.bind_arrays(self._row, self._found)
-        free = len(fit.order)
+        free_count = len(fit.order)
         end = len(fit.order) + 3 * fit.markers
         self._given = self._row[: fit.measured]
-        self._q = self._found[:free]
-        self.places: Array = self._found[free:end].reshape(-1, 3)
+        self._q = self._found[:free_count]
+        self.places: Array = self._found[free_count:end].reshape(-1, 3)
         self.turns: Array = self._found[end:-3].reshape(-1, 3)
 
     def __call__(self, measured: Array, time: float) -> Array:

@@ -59,28 +59,35 @@ def separate_couplers(
         Couplers, each after those that determine its arguments; and the other constraints.
     """
     couplers: list[Coupler] = []
-    others: list[ConstraintEquations] = []
+    other_constraints: list[ConstraintEquations] = []
     pending: list[Coupler] = []
-    depend: set[int] = set()
-    for item in constraints:
+    dependent_coordinates: set[int] = set()
+    for constraint in constraints:
         # A coordinate can be determined only once; further couplers remain constraints.
-        if isinstance(item, Coupler) and item.dependent not in fixed | depend:
-            pending.append(item)
-            depend.add(item.dependent)
+        if (
+            isinstance(constraint, Coupler)
+            and constraint.dependent not in fixed | dependent_coordinates
+        ):
+            pending.append(constraint)
+            dependent_coordinates.add(constraint.dependent)
         else:
-            others.append(item)
+            other_constraints.append(constraint)
     while pending:
-        known = [item for item in pending if not depend & set(item.independent)]
-        if not known:
+        determined = [
+            constraint
+            for constraint in pending
+            if not dependent_coordinates & set(constraint.independent)
+        ]
+        if not determined:
             # The couplers depend on each other in a circle; move one of them to the constraints.
-            first = pending.pop(0)
-            others.append(first)
-            depend.discard(first.dependent)
+            moved_coupler = pending.pop(0)
+            other_constraints.append(moved_coupler)
+            dependent_coordinates.discard(moved_coupler.dependent)
             continue
-        couplers += known
-        depend -= {item.dependent for item in known}
-        pending = [item for item in pending if item not in known]
-    return couplers, others
+        couplers += determined
+        dependent_coordinates -= {constraint.dependent for constraint in determined}
+        pending = [constraint for constraint in pending if constraint not in determined]
+    return couplers, other_constraints
 
 
 class FitLayout:
@@ -99,32 +106,32 @@ class FitLayout:
     def __init__(
         self,
         system: System,
-        places: Places,
+        placements: Places,
         markers: Sequence[MarkerTarget],
         sensors: Sequence[SensorTarget],
         goals: Sequence[CoordinateTarget],
-        held: Sequence[int],
+        held_coordinates: Sequence[int],
         couplers: Sequence[Coupler],
     ) -> None:
-        s = system.structure
+        structure = system.structure
         size = len(system.order)
-        links = int(s[MODEL.LINKS])
+        links = int(structure[MODEL.LINKS])
         equations = 0
-        if s[MODEL.CONSTRAINED]:
-            equations = int(s[s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
+        if structure[MODEL.CONSTRAINED]:
+            equations = int(structure[structure[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
         ints = [0] * FIT.HEAD
         numbers = list[float]()
         self._append_list(
             ints,
             FIT.MARKERS,
             FIT.MARKER_AT,
-            list(self._list_marker_links(places, markers, numbers)),
+            list(self._list_marker_links(placements, markers, numbers)),
         )
         self._append_list(
             ints,
             FIT.SENSORS,
             FIT.SENSOR_AT,
-            list(self._list_sensor_links(places, sensors, numbers)),
+            list(self._list_sensor_links(placements, sensors, numbers)),
         )
         # The kernel reads the numbers in this order: markers, sensors, goals, ranges, couplers.
         numbers += [goal.weight for goal in goals]
@@ -132,32 +139,44 @@ class FitLayout:
             ints,
             FIT.GOALS,
             FIT.GOAL_AT,
-            [places.freedom(goal.coordinate) for goal in goals],
+            [placements.freedom(goal.coordinate) for goal in goals],
         )
-        self._append_list(ints, FIT.HELD, FIT.HELD_AT, [places.freedom(index) for index in held])
+        self._append_list(
+            ints, FIT.HELD, FIT.HELD_AT, [placements.freedom(index) for index in held_coordinates]
+        )
         ints[FIT.RANGES_AT] = len(numbers)
-        for low, high in compute_ranges(system.mechanism, system.order, couplers):
-            numbers += low, high
+        for lower, upper in compute_ranges(system.mechanism, system.order, couplers):
+            numbers += lower, upper
         records = []
         for coupler in couplers:
             records.append(len(ints))
-            arguments = [places.freedom(index) for index in coupler.independent]
-            ints += [places.freedom(coupler.dependent), len(numbers), len(arguments), *arguments]
+            arguments = [placements.freedom(index) for index in coupler.independent]
+            ints += [
+                placements.freedom(coupler.dependent),
+                len(numbers),
+                len(arguments),
+                *arguments,
+            ]
             # Arguments that are locked have no degree of freedom, but a value.
-            numbers += [places.locked_value(index) for index in coupler.independent]
+            numbers += [placements.locked_value(index) for index in coupler.independent]
             numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
         self._append_list(ints, FIT.COUPLERS, FIT.COUPLER_AT, records)
-        self._append_axes(ints, s, system.numbers, links)
+        self._append_axes(ints, structure, system.numbers, links)
         ints[FIT.RESOLVED_AT] = len(ints)
-        known = dict.fromkeys(map(places.freedom, held), FREEDOM.GIVEN)
-        known |= {places.freedom(item.dependent): FREEDOM.DEPENDENT for item in couplers}
-        ints += [known.get(k, FREEDOM.VARIABLE) for k in range(size)]
+        known_freedoms = dict.fromkeys(map(placements.freedom, held_coordinates), FREEDOM.GIVEN)
+        known_freedoms |= {
+            placements.freedom(coupler_with_record.dependent): FREEDOM.DEPENDENT
+            for coupler_with_record in couplers
+        }
+        ints += [known_freedoms.get(k, FREEDOM.VARIABLE) for k in range(size)]
         ints[FIT.FREE_AT] = len(ints)
         ints += [0] * size
         # The sum of all scratch vectors that the kernel uses at one time.
-        room = 2 * size + factor_size(equations, size) + 2 * equations + 3 * size * size + 4 * size
+        scratch_size = (
+            2 * size + factor_size(equations, size) + 2 * equations + 3 * size * size + 4 * size
+        )
         lengths = {
-            FIT.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held),
+            FIT.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held_coordinates),
             FIT.WEIGHTS: len(markers) + len(sensors) + len(goals),
             FIT.SLOPE: size,
             FIT.STIFFNESS: size * size,
@@ -166,7 +185,12 @@ class FitLayout:
             FIT.ROWS: equations * size,
             FIT.ERRORS: equations,
             FIT.ROOM: max(
-                room, 2 * size + max([len(item.independent) for item in couplers], default=0)
+                scratch_size,
+                2 * size
+                + max(
+                    [len(coupler_with_record.independent) for coupler_with_record in couplers],
+                    default=0,
+                ),
             ),
             FIT.HISTORY: 2 + (POSES + 2) * size,
             FIT.TRIAL: 2 * size,
@@ -183,55 +207,60 @@ class FitLayout:
         self.work = np.zeros(work)
 
     @staticmethod
-    def _append_list(ints: list[int], count: int, offset: int, items: Sequence[int]) -> None:
+    def _append_list(ints: list[int], count: int, offset: int, values: Sequence[int]) -> None:
         """Append items to the integers, and set their count and offset."""
-        ints[count], ints[offset] = len(items), len(ints)
-        ints += items
+        ints[count], ints[offset] = len(values), len(ints)
+        ints += values
 
     @staticmethod
     def _list_marker_links(
-        places: Places, markers: Sequence[MarkerTarget], numbers: list[float]
+        placements: Places, markers: Sequence[MarkerTarget], numbers: list[float]
     ) -> Iterator[int]:
         """Yield the link of each marker; append its point and weight to the numbers."""
         for marker in markers:
-            link, point = places.station(marker.station.body, marker.station.location.tolist())
+            link, point = placements.station(marker.station.body, marker.station.location.tolist())
             numbers += [*point, marker.weight]
             yield link
 
     @staticmethod
     def _list_sensor_links(
-        places: Places, sensors: Sequence[SensorTarget], numbers: list[float]
+        placements: Places, sensors: Sequence[SensorTarget], numbers: list[float]
     ) -> Iterator[int]:
         """Yield the link of each sensor; append its rotation and weight to the numbers."""
         for sensor in sensors:
-            link, in_link = places.placement(sensor.frame.body)
+            link, in_link = placements.placement(sensor.frame.body)
             numbers += [*(in_link @ sensor.frame.transform)[:3, :3].ravel().tolist(), sensor.weight]
             yield link
 
     @staticmethod
     def _append_axes(ints: list[int], model: Ints, numbers: Floats, links: int) -> None:
         """Append the axes of each link, from the inner to the outer ones."""
-        first = [0]
+        axis_offsets = [0]
         axes = list[tuple[int, int]]()
         balls = list[int]()
         for link in range(links):
             record = model[model[MODEL.LINK_AT] + LINK.SIZE * link :]
             for operation in range(record[LINK.FIRST_OPERATION], record[LINK.END_OPERATION]):
-                j = model[model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation :]
+                record_of_operation = model[
+                    model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation :
+                ]
                 # An axis of its own has no part (-1). A ball has the rotations 0 to 2, and before
                 # them, if its surface is an ellipsoid, the translations 3 to 5.
-                parts = [-1]
-                if j[OPERATION.MOTION] in (MOTION.BALL, MOTION.BALL_BACK):
-                    balls.append(int(j[OPERATION.ARGUMENTS]))
-                    parts = [0, 1, 2]
-                    if numbers[j[OPERATION.EXTRA] : j[OPERATION.EXTRA] + 3].any():
-                        parts = [3, 4, 5, *parts]
-                    if j[OPERATION.MOTION] == MOTION.BALL_BACK:
-                        parts.reverse()
-                axes += [(operation, part) for part in parts]
-            first.append(len(axes))
+                components = [-1]
+                if record_of_operation[OPERATION.MOTION] in (MOTION.BALL, MOTION.BALL_BACK):
+                    balls.append(int(record_of_operation[OPERATION.ARGUMENTS]))
+                    components = [0, 1, 2]
+                    if numbers[
+                        record_of_operation[OPERATION.EXTRA] : record_of_operation[OPERATION.EXTRA]
+                        + 3
+                    ].any():
+                        components = [3, 4, 5, *components]
+                    if record_of_operation[OPERATION.MOTION] == MOTION.BALL_BACK:
+                        components.reverse()
+                axes += [(operation, component) for component in components]
+            axis_offsets.append(len(axes))
         ints[FIT.AXES_AT] = len(ints)
-        ints += [*first, *(number for axis in axes for number in axis)]
+        ints += [*axis_offsets, *(number for axis in axes for number in axis)]
         FitLayout._append_list(ints, FIT.BALLS, FIT.BALL_AT, balls)
 
 
@@ -247,59 +276,67 @@ def compute_ranges(
         order: indices of the coordinates to find.
         couplers: couplers that determine a coordinate.
     """
-    ends = {
+    bounds = {
         index: info.range if info.clamped else (-np.inf, np.inf)
         for index, info in enumerate(mechanism.coordinates)
     }
     # From the last dependent coordinate back, so that ranges pass along chains of couplers.
     for coupler in reversed(couplers):
-        low, high = ends[coupler.dependent]
-        if len(coupler.independent) == 1 and (low > -np.inf or high < np.inf):
-            (other,) = coupler.independent
-            ends[other] = _find_allowed_interval(
-                coupler, mechanism.coordinates[other].default_value, ends[other], low, high
+        lower, upper = bounds[coupler.dependent]
+        if len(coupler.independent) == 1 and (lower > -np.inf or upper < np.inf):
+            (argument,) = coupler.independent
+            bounds[argument] = _find_allowed_interval(
+                coupler,
+                mechanism.coordinates[argument].default_value,
+                bounds[argument],
+                lower,
+                upper,
             )
-    yield from (ends[index] for index in order)
+    yield from (bounds[index] for index in order)
 
 
 def _find_allowed_interval(
-    coupler: Coupler, start: float, ends: tuple[float, float], low: float, high: float
+    coupler: Coupler, start: float, bounds: tuple[float, float], lower: float, upper: float
 ) -> tuple[float, float]:
     """Return the interval around a value in which a coupled coordinate is in its range.
 
     Args:
         coupler: the coupler, of one argument.
         start: value of the argument around which to search.
-        ends: bounds of the argument.
-        low: lower bound of the coupled coordinate.
-        high: upper bound of the coupled coordinate.
+        bounds: bounds of the argument.
+        lower: lower bound of the coupled coordinate.
+        upper: upper bound of the coupled coordinate.
     """
 
     def is_inside(argument: float) -> bool:
         value = coupler.function.evaluate(np.array((argument,)))[0]
         # Rounding must not put the end of the range outside it.
-        return low - 1e-12 <= value <= high + 1e-12
+        return lower - 1e-12 <= value <= upper + 1e-12
 
-    start = min(max(start, ends[0]), ends[1])
+    start = min(max(start, bounds[0]), bounds[1])
     # The default value violates the range: no interval can be found around it.
     if not is_inside(start):
-        return ends
+        return bounds
     result = []
-    for end, side in zip(ends, (-1.0, 1.0), strict=True):
+    for end, direction in zip(bounds, (-1.0, 1.0), strict=True):
         # Without a bound, look one turn (or 6.3 m) around the start.
-        furthest = end if np.isfinite(end) else start + side * 2.0 * np.pi
+        furthest = end if np.isfinite(end) else start + direction * 2.0 * np.pi
         scan = np.linspace(start, furthest, SCAN_POINTS)
-        outside = next((k for k, value in enumerate(scan.tolist()) if not is_inside(value)), None)
-        if outside is None:
+        first_outside = next(
+            (k for k, value in enumerate(scan.tolist()) if not is_inside(value)), None
+        )
+        if first_outside is None:
             result.append(end)
             continue
-        inner = float(scan[outside - 1])
-        outer = float(scan[outside])
+        inside_value = float(scan[first_outside - 1])
+        outside_value = float(scan[first_outside])
         # Bisect between the last value inside and the first outside.
-        while abs(outer - inner) > 1e-15 * (1.0 + abs(inner)):
-            middle = 0.5 * (inner + outer)
-            if middle in (inner, outer):
+        while abs(outside_value - inside_value) > 1e-15 * (1.0 + abs(inside_value)):
+            middle = 0.5 * (inside_value + outside_value)
+            if middle in (inside_value, outside_value):
                 break
-            inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
-        result.append(inner)
+            inside_value, outside_value = (
+                (middle, outside_value) if is_inside(middle) else (inside_value, middle)
+            )
+        result.append(inside_value)
     return result[0], result[1]

@@ -113,26 +113,32 @@ def scale(
 
     if isinstance(measurements, Mapping):
         measurements = _create_measurements(measurements)
-        for body in (body for item in measurements for body in item.body_scale_set.objects):
+        for body in (
+            body for measurement in measurements for body in measurement.body_scale_set.objects
+        ):
             expect_body(body.name)
     # Factors by hand need no measured markers.
     data = None if static is None else MarkerData.from_source(static)
-    wanted = list(measurements)
-    if (wanted or place) and data is None:
+    measurement_list = list(measurements)
+    if (measurement_list or place) and data is None:
         raise SettingError(
             "measurements and placement need markers of the standing subject; name a static trial"
         )
-    if data is not None and wanted:
-        measuring.apply_measurements(wanted, data, start, end)
+    if data is not None and measurement_list:
+        measuring.apply_measurements(measurement_list, data, start, end)
     by_hand = []
-    for name, given in (factors or {}).items():
+    for name, body_factors in (factors or {}).items():
         expect_body(name)
         # One number scales all axes alike.
-        three = (given, given, given) if isinstance(given, int | float) else tuple(given)
-        if not all(0.0 < number < math.inf for number in three):
-            numbers = ", ".join(f"{number:g}" for number in three)
+        axis_factors = (
+            (body_factors, body_factors, body_factors)
+            if isinstance(body_factors, int | float)
+            else tuple(body_factors)
+        )
+        if not all(0.0 < number < math.inf for number in axis_factors):
+            numbers = ", ".join(f"{number:g}" for number in axis_factors)
             raise SettingError(f"expected positive factors of '{name}', found {numbers}")
-        by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
+        by_hand.append(Scale(segment=name, scales=tuple(map(float, axis_factors))))
     measuring.apply_factors(by_hand)
     results = measuring.found
     mechanism = measuring.mechanism
@@ -151,13 +157,13 @@ def scale(
 
 def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
     """Return OpenSim's objects for measurements."""
-    for name, (_, on) in pairs.items():
-        if not isinstance(on, Mapping):
+    for name, (_, scaled_bodies) in pairs.items():
+        if not isinstance(scaled_bodies, Mapping):
             raise SettingError(
                 f"measurement '{name}' must have pairs of markers, and by body the axes that they "
                 "scale"
             )
-        for body, axes in on.items():
+        for body, axes in scaled_bodies.items():
             if not axes or not {*axes.lower()} <= {*"xyz"}:
                 raise SettingError(f"'{axes}' of '{body}' are not axes; write letters of XYZ")
     return [
@@ -167,10 +173,12 @@ def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
                 objects=[MarkerPair(markers=tuple(pair)) for pair in markers]
             ),
             body_scale_set=BodyScaleSet(
-                objects=[BodyScale(name=body, axes=tuple(axes)) for body, axes in on.items()]
+                objects=[
+                    BodyScale(name=body, axes=tuple(axes)) for body, axes in scaled_bodies.items()
+                ]
             ),
         )
-        for name, (markers, on) in pairs.items()
+        for name, (markers, scaled_bodies) in pairs.items()
     ]
 
 
@@ -185,17 +193,17 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
         SettingError: the setup has an unknown name or lacks a file.
         DocumentError: a file cannot be read.
     """
-    maker = tool.generic_model_maker
+    model_maker = tool.generic_model_maker
     scaler = tool.model_scaler
     placer = tool.marker_placer
-    if maker.model_file in NO_FILE:
+    if model_maker.model_file in NO_FILE:
         raise SettingError("the setup names no model; set model_file of GenericModelMaker")
-    result = ScaledModel(read_copy(folder / maker.model_file, Model))
+    result = ScaledModel(read_copy(folder / model_maker.model_file, Model))
     model = result.model
     if scaler.apply:
         result.unknown = describe_unknown(model, UNSCALED)
-    if maker.marker_set_file not in NO_FILE:
-        add_markers(model, folder / maker.marker_set_file)
+    if model_maker.marker_set_file not in NO_FILE:
+        add_markers(model, folder / model_maker.marker_set_file)
     # OpenSim names the scaled model after the setup, before markers are placed.
     model.name = tool.name
     if scaler.apply:
@@ -206,9 +214,9 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
     if placer.apply and placer.marker_file not in NO_FILE:
         data = MarkerData.from_source(folder / placer.marker_file)
         coordinates = read_coordinate_table(placer.coordinate_file, folder)
-        first, last = expect_time_range(placer.time_range)
+        start, end = expect_time_range(placer.time_range)
         result.placed = place_markers(
-            model, data, placer.ik_task_set.objects, first, last, coordinates
+            model, data, placer.ik_task_set.objects, start, end, coordinates
         )
         _add_text(result, placer.output_model_file, model)
         _add_text(result, placer.output_marker_file, model.marker_set)
@@ -222,8 +230,10 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
     scaler = tool.model_scaler
     measuring = ScaleFactorFinder(model)
     # Later words overwrite earlier ones, so that their order matters.
-    for word in scaler.scaling_order:
-        if word == MEASUREMENTS and any(item.apply for item in scaler.measurement_set.objects):
+    for step in scaler.scaling_order:
+        if step == MEASUREMENTS and any(
+            measurement.apply for measurement in scaler.measurement_set.objects
+        ):
             if scaler.marker_file in NO_FILE:
                 raise SettingError(
                     "scaling by measurements needs a marker_file of ModelScaler; set it"
@@ -232,18 +242,22 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
             measuring.apply_measurements(
                 scaler.measurement_set.objects, data, *expect_time_range(scaler.time_range)
             )
-        elif word == MANUAL_SCALE:
+        elif step == MANUAL_SCALE:
             measuring.apply_factors(scaler.scale_set.objects)
-        elif word != MEASUREMENTS:
-            near = suggest_name(word, (MEASUREMENTS, MANUAL_SCALE))
+        elif step != MEASUREMENTS:
+            suggestion = suggest_name(step, (MEASUREMENTS, MANUAL_SCALE))
             raise SettingError(
-                f"scaling_order has '{word}'; expected {MEASUREMENTS} or {MANUAL_SCALE}{near}"
+                f"scaling_order has '{step}'; expected {MEASUREMENTS} or {MANUAL_SCALE}{suggestion}"
             )
-    keeps = scaler.preserve_mass_distribution
+    keeps_distribution = scaler.preserve_mass_distribution
     result = measuring.found
     mechanism = measuring.mechanism
     scale_model(
-        model, result.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism
+        model,
+        result.factors,
+        tool.mass,
+        preserve_mass_distribution=keeps_distribution,
+        mechanism=mechanism,
     )
     return result
 
@@ -265,8 +279,10 @@ def add_markers(model: Model, path: Path) -> None:
         )
     for marker in result.objects:
         # A copy of the list, because markers are removed from it.
-        for same in [item for item in model.marker_set.objects if item.name == marker.name]:
-            model.marker_set.objects.remove(same)
+        for replaced in [
+            existing for existing in model.marker_set.objects if existing.name == marker.name
+        ]:
+            model.marker_set.objects.remove(replaced)
         model.marker_set.objects.append(marker.copy_deep())
 
 

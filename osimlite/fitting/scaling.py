@@ -69,7 +69,7 @@ def scale_model(
     """
     mechanism = build_mechanism(model) if mechanism is None else mechanism
     # Lengths before scaling: fibers and tendons scale with the ratio.
-    before = compute_path_lengths(model, mechanism)
+    lengths_before = compute_path_lengths(model, mechanism)
     scaler = _Scaler(model, factors, mechanism)
     for component in scaler.tree.components:
         # Internal components belong to their owner, whose rule covers them.
@@ -85,14 +85,18 @@ def scale_model(
         if total > 0.0:
             for body in model.components(Body):
                 body.mass *= mass / total
-                body.inertia = tuple(mass / total * item for item in body.inertia)  # type: ignore[assignment]
-    after = compute_path_lengths(model) if before else {}
-    for path, length in before.items():
+                body.inertia = tuple(mass / total * moment for moment in body.inertia)  # type: ignore[assignment]
+    lengths_after = compute_path_lengths(model) if lengths_before else {}
+    for path, length in lengths_before.items():
         if length > 0.0:
-            owner = model[path]
-            for name, rule in get_scale_rules(type(owner)).items():
+            path_component = model[path]
+            for name, rule in get_scale_rules(type(path_component)).items():
                 if rule == PATH:
-                    setattr(owner, name, getattr(owner, name) * (after[path] / length))
+                    setattr(
+                        path_component,
+                        name,
+                        getattr(path_component, name) * (lengths_after[path] / length),
+                    )
 
 
 def compute_path_lengths(model: Model, mechanism: Mechanism | None = None) -> dict[str, float]:
@@ -105,14 +109,22 @@ def compute_path_lengths(model: Model, mechanism: Mechanism | None = None) -> di
     Returns:
         Length (m) by path of the component.
     """
-    owners = [item for item in model.components() if PATH in get_scale_rules(type(item)).values()]
-    if not owners:
+    components = [
+        component
+        for component in model.components()
+        if PATH in get_scale_rules(type(component)).values()
+    ]
+    if not components:
         return {}
     from osimlite.simulation.paths import paths
 
     result = paths(model, mechanism=mechanism)
     lengths = result.lengths(result.mechanism.assemble({}))
-    return {path: lengths[path] for path in (item.path for item in owners) if path in lengths}
+    return {
+        path: lengths[path]
+        for path in (component.path for component in components)
+        if path in lengths
+    }
 
 
 @cache
@@ -152,33 +164,33 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     products = np.array((xy, xz, yz))
     if scales_mass:
         body.mass *= volume
-    denser = volume if scales_mass else 1.0
+    mass_ratio = volume if scales_mass else 1.0
     x, y, z = factors.tolist()
     if body.mass <= MASSLESS_KG:
         moments, products = np.zeros(3), np.zeros(3)
     elif _is_equal_factor(x, y) and _is_equal_factor(y, z):
-        moments = moments * denser * (x * x)
-        products = products * denser * (x * x)
+        moments = moments * mass_ratio * (x * x)
+        products = products * mass_ratio * (x * x)
     else:
         # A cylinder of the same mass and moments: I_axis = m r²/2, I_side = m (l²/12 + r²/4).
         axis = int(np.argmin(moments))
-        side = 1 if axis == 0 else 0
+        side_axis = 1 if axis == 0 else 0
         radius = sqrt(max(2.0 * moments[axis] / mass, 0.0))
         length = (
-            sqrt(max(12.0 * (moments[side] - 0.25 * mass * radius * radius) / mass, 0.0))
+            sqrt(max(12.0 * (moments[side_axis] - 0.25 * mass * radius * radius) / mass, 0.0))
             * factors[axis]
         )
-        one, two = np.delete(factors, axis).tolist()
-        square = radius * one * radius * two
+        first_side_factor, second_side_factor = np.delete(factors, axis).tolist()
+        square = radius * first_side_factor * radius * second_side_factor
         moments = np.full(3, body.mass * (length * length / 12.0 + 0.25 * square))
         moments[axis] = 0.5 * body.mass * square
-        products = products * np.array((x * y, x * z, y * z)) * denser
+        products = products * np.array((x * y, x * z, y * z)) * mass_ratio
     body.inertia = (*moments.tolist(), *products.tolist())
 
 
-def _is_equal_factor(one: float, two: float) -> bool:
+def _is_equal_factor(first: float, second: float) -> bool:
     """Return whether OpenSim treats two factors as equal."""
-    return abs(one - two) <= FACTOR_TOLERANCE * max(abs(one), abs(two), 1.0)
+    return abs(first - second) <= FACTOR_TOLERANCE * max(abs(first), abs(second), 1.0)
 
 
 class _Scaler:
@@ -187,7 +199,9 @@ class _Scaler:
     def __init__(self, model: Model, factors: Factors, mechanism: Mechanism) -> None:
         self.tree = model.tree()
         self.placements = Placements(self.tree)
-        self.factors = {name: np.array(given, dtype=float) for name, given in factors.items()}
+        self.factors = {
+            name: np.array(axis_factors, dtype=float) for name, axis_factors in factors.items()
+        }
         # Resolve all frames before scaling changes their offsets.
         for frame in model.components(PhysicalFrame):
             self.placements.resolve_frame(frame)
@@ -201,35 +215,37 @@ class _Scaler:
     def scale_component(self, component: Component) -> None:
         """Scale the properties of a component that have a rule."""
         for name, rule in get_scale_rules(type(component)).items():
-            whose, _, which = rule.partition(" ")
-            if whose == PATH:
+            frame_source, _, factor_choice = rule.partition(" ")
+            if frame_source == PATH:
                 continue
             if isinstance(component, CoordinateCouplerConstraint):
-                factors = self._get_coupler_factors(component, whose)
-            elif whose == OWN:
+                factors = self._get_coupler_factors(component, frame_source)
+            elif frame_source == OWN:
                 assert isinstance(component, PhysicalFrame)
                 factors = self.get_base_factors(component)
-            elif whose == HOLDER:
+            elif frame_source == HOLDER:
                 factors = self.get_base_factors(self._find_holder(component))
             else:
-                factors = self.get_base_factors(self.placements.follow_socket(component, whose))
+                factors = self.get_base_factors(
+                    self.placements.follow_socket(component, frame_source)
+                )
             if factors is not None:
                 setattr(
                     component,
                     name,
                     _multiply_value(
-                        getattr(component, name), _select_factors(component, factors, which)
+                        getattr(component, name), _select_factors(component, factors, factor_choice)
                     ),
                 )
 
     def _find_holder(self, component: Component) -> PhysicalFrame:
         """Return the frame that contains a component."""
         # A frame holds itself.
-        holder: Component | None = component
-        while holder is not None and not isinstance(holder, PhysicalFrame):
-            holder = self.tree.parent_of(holder)
-        assert holder is not None
-        return holder
+        ancestor: Component | None = component
+        while ancestor is not None and not isinstance(ancestor, PhysicalFrame):
+            ancestor = self.tree.parent_of(ancestor)
+        assert ancestor is not None
+        return ancestor
 
     def _get_coupler_factors(self, coupler: CoordinateCouplerConstraint, name: str) -> Array | None:
         """Return the factors for a coupler that determines a translation; None for a rotation.
@@ -259,22 +275,22 @@ class _Scaler:
         return factors
 
 
-def _select_factors(component: Component, factors: Array, which: str) -> Array:
+def _select_factors(component: Component, factors: Array, factor_choice: str) -> Array:
     """Return the factors that a rule names, or all three."""
-    if which in ("x", "y", "z"):
-        return factors["xyz".index(which)][None]
-    if which == MEAN:
+    if factor_choice in ("x", "y", "z"):
+        return factors["xyz".index(factor_choice)][None]
+    if factor_choice == MEAN:
         return np.array((factors.sum() / 3.0,))
-    if which not in (ALONG, ACROSS, AXES):
+    if factor_choice not in (ALONG, ACROSS, AXES):
         return factors
     assert isinstance(component, WrapObject)
     axes = rotation_xyz(np.array(component.xyz_body_rotation, dtype=float))
     # Factors along the rotated axes of the wrap object.
     lengths = np.linalg.norm(axes * factors[:, None], axis=0)
-    if which == AXES:
+    if factor_choice == AXES:
         return np.asarray(lengths)
     # Wrap cylinders lie along their z axes.
-    return np.array((lengths[2] if which == ALONG else 0.5 * (lengths[0] + lengths[1]),))
+    return np.array((lengths[2] if factor_choice == ALONG else 0.5 * (lengths[0] + lengths[1]),))
 
 
 def _multiply_value(value: Any, factors: Array) -> Any:

@@ -51,37 +51,47 @@ class Segments(NamedTuple):
         """
         if symmetric:
             marked = {*marked, *(get_opposite_name(body, carriers) for body in marked)}
-        first = {body: body for body in carriers}
+        group_names = {body: body for body in carriers}
         # From the outermost bodies inwards: a body without markers joins the one that it carries.
         for body, carrier in reversed(list(carriers.items())):
-            if carrier in first and carrier not in marked and first[carrier] == carrier:
-                first[carrier] = first[body] if first[body] in marked else carrier
+            if carrier in group_names and carrier not in marked and group_names[carrier] == carrier:
+                group_names[carrier] = group_names[body] if group_names[body] in marked else carrier
         # From the root outwards: the remaining bodies join their parents.
         for body, carrier in carriers.items():
-            if first[body] not in marked and carrier in first:
-                first[body] = first[carrier]
+            if group_names[body] not in marked and carrier in group_names:
+                group_names[body] = group_names[carrier]
         if symmetric:
-            first = {
+            group_names = {
                 body: min(first_body, get_opposite_name(first_body, carriers))
-                for body, first_body in first.items()
+                for body, first_body in group_names.items()
             }
         groups = {
-            name: tuple(body for body in carriers if first[body] == name) for name in first.values()
+            name: tuple(body for body in carriers if group_names[body] == name)
+            for name in group_names.values()
         }
-        parts: list[Segment] = []
-        numbers: dict[str, tuple[int, ...]] = {}
+        segments: list[Segment] = []
+        indices_by_group: dict[str, tuple[int, ...]] = {}
         for name, bodies in groups.items():
             axes = ((0,), (1,), (2,)) if by_axis else ((0, 1, 2),)
-            numbers[name] = tuple(range(len(parts), len(parts) + len(axes)))
-            parts += [Segment(bodies, selected) for selected in axes]
-        pairs = {
-            (first[body], first[carrier]) for body, carrier in carriers.items() if carrier in first
+            indices_by_group[name] = tuple(range(len(segments), len(segments) + len(axes)))
+            segments += [Segment(bodies, selected) for selected in axes]
+        neighbours = {
+            (group_names[body], group_names[carrier])
+            for body, carrier in carriers.items()
+            if carrier in group_names
         }
-        alike = tuple((numbers[one], numbers[two]) for one, two in sorted(pairs) if one != two)
-        sides = tuple(
-            (k, segment) for segment in numbers.values() for k in segment if len(segment) > 1
+        neighbour_indices = tuple(
+            (indices_by_group[inner], indices_by_group[outer])
+            for inner, outer in sorted(neighbours)
+            if inner != outer
         )
-        return cls(tuple(parts), alike, sides)
+        axis_pairs = tuple(
+            (k, segment)
+            for segment in indices_by_group.values()
+            for k in segment
+            if len(segment) > 1
+        )
+        return cls(tuple(segments), neighbour_indices, axis_pairs)
 
     def expand_factors(self, sizes: Sequence[float] | Array) -> dict[str, list[float]]:
         """Return the factors of each body along its axes for parameters (k,).
@@ -92,40 +102,48 @@ class Segments(NamedTuple):
         Returns:
             Factors by name of the body.
         """
-        result = {body: [1.0, 1.0, 1.0] for part in self.parts for body in part.bodies}
-        for part, size in zip(self.parts, sizes, strict=True):
-            for body in part.bodies:
-                for axis in part.axes:
+        result = {body: [1.0, 1.0, 1.0] for segment in self.parts for body in segment.bodies}
+        for segment, size in zip(self.parts, sizes, strict=True):
+            for body in segment.bodies:
+                for axis in segment.axes:
                     result[body][axis] = float(size)
         return result
 
-    def compute_prior(self, first: float, apart: float, across: float) -> tuple[Array, Array]:
+    def compute_prior(
+        self, size_deviation: float, neighbour_deviation: float, axis_deviation: float
+    ) -> tuple[Array, Array]:
         """Return the prior of the parameters as linear equations with standard deviation 1.
 
         Args:
-            first: standard deviation of the first segment's size from 1.
-            apart: standard deviation of the difference between neighbouring segments.
-            across: standard deviation of the factors of one segment from their mean.
+            size_deviation: standard deviation of the first segment's size from 1.
+            neighbour_deviation: standard deviation of the difference between neighbouring segments.
+            axis_deviation: standard deviation of the factors of one segment from their mean.
 
         Returns:
             Matrix (r, k), and expected values of its product with the parameters (r,).
         """
-        segment = [k for k, part in enumerate(self.parts) if part.bodies == self.parts[0].bodies]
+        segment = [
+            k for k, member in enumerate(self.parts) if member.bodies == self.parts[0].bodies
+        ]
         rows = [
-            self._create_mean_row(segment, first),
+            self._create_mean_row(segment, size_deviation),
             *(
-                (self._create_mean_row(one, apart) - self._create_mean_row(two, apart))
-                for one, two in self.alike
+                (
+                    self._create_mean_row(inner, neighbour_deviation)
+                    - self._create_mean_row(outer, neighbour_deviation)
+                )
+                for inner, outer in self.alike
             ),
         ]
         rows += [
-            self._create_mean_row((k,), across) - self._create_mean_row(segment, across)
+            self._create_mean_row((k,), axis_deviation)
+            - self._create_mean_row(segment, axis_deviation)
             for k, segment in self.sides
         ]
-        wanted = np.zeros(len(rows))
+        expected = np.zeros(len(rows))
         # The expected size of the first segment is 1; expected differences are 0.
-        wanted[0] = 1.0 / first
-        return np.array(rows), wanted
+        expected[0] = 1.0 / size_deviation
+        return np.array(rows), expected
 
     def _create_mean_row(self, numbers: Sequence[int], deviation: float) -> Array:
         """Return a row that gives the mean of some parameters divided by a standard deviation."""
@@ -155,5 +173,5 @@ def get_opposite_name(name: str, names: Mapping[str, object]) -> str:
             else word
         )
 
-    other = _SIDE_PATTERN.sub(swap_word, name)
-    return other if other in names else name
+    opposite = _SIDE_PATTERN.sub(swap_word, name)
+    return opposite if opposite in names else name

@@ -46,18 +46,24 @@ class SelectedFrames:
     def __init__(
         self,
         trials: Mapping[str, MarkerData],
-        known: Sequence[str],
+        known_names: Sequence[str],
         count: int,
         weights: Mapping[str, float],
     ) -> None:
         for name, weight in weights.items():
-            if name not in known:
-                raise SettingError(f"the model has no marker '{name}'{suggest_name(name, known)}")
+            if name not in known_names:
+                raise SettingError(
+                    f"the model has no marker '{name}'{suggest_name(name, known_names)}"
+                )
             check_weight(weight, f"'{name}'")
         if count < 1:
             raise SettingError(f"expected at least 1 frame, found {count}")
-        shared = {name for trial in trials.values() for name in trial.find_shared_names(known)}
-        self.markers = [name for name in known if name in shared and weights.get(name, 1.0) > 0.0]
+        shared_names = {
+            name for trial in trials.values() for name in trial.find_shared_names(known_names)
+        }
+        self.markers = [
+            name for name in known_names if name in shared_names and weights.get(name, 1.0) > 0.0
+        ]
         if not self.markers:
             raise SettingError("no marker has a positive weight; set one")
         self.weights = np.array([weights.get(name, 1.0) for name in self.markers])
@@ -65,12 +71,14 @@ class SelectedFrames:
         self.notes = list[str]()
         times = list[float]()
         measured = list[Array]()
-        moving = sum(len(trial.times) for name, trial in trials.items() if name != STATIC_TRIAL)
+        moving_frame_count = sum(
+            len(trial.times) for name, trial in trials.items() if name != STATIC_TRIAL
+        )
         for name, trial in trials.items():
-            share = (
+            frame_share = (
                 STATIC_SHARE
-                if name == STATIC_TRIAL and moving
-                else len(trial.times) / max(moving, 1)
+                if name == STATIC_TRIAL and moving_frame_count
+                else len(trial.times) / max(moving_frame_count, 1)
             )
             # All trials have the same columns; markers that a trial lacks are NaN.
             rows = np.full((len(trial.times), len(self.markers), 3), np.nan)
@@ -78,18 +86,22 @@ class SelectedFrames:
                 if marker in trial.names:
                     rows[:, index] = trial.positions[:, trial.names.index(marker)]
             # Fewer markers than three do not determine the pose of any segment.
-            seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= MIN_MARKERS)
+            usable_frames = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= MIN_MARKERS)
             # Each trial contributes at least one frame.
-            taken = max(1, round(count * min(share, 1.0)))
+            selected_count = max(1, round(count * min(frame_share, 1.0)))
             for frame in (
-                seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))]
-                if len(seen)
+                usable_frames[
+                    np.unique(
+                        np.linspace(0, len(usable_frames) - 1, selected_count).round().astype(int)
+                    )
+                ]
+                if len(usable_frames)
                 else ()
             ):
                 self.trials.append(name)
                 times.append(float(trial.times[frame]))
                 measured.append(rows[frame])
-            if not len(seen):
+            if not len(usable_frames):
                 self.notes.append(f"'{name}' is left out: no frame has three markers of the model")
         if not measured:
             raise SettingError("no frame of any trial has three markers of the model")
@@ -109,7 +121,7 @@ class SelectedFrames:
         distances = np.linalg.norm(positions - self.measured, axis=2)
         with np.errstate(all="ignore"):
             # The median is robust against the outliers themselves.
-            usual = np.array(
+            median_distances = np.array(
                 [
                     np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0
                     for column in distances.T
@@ -117,19 +129,21 @@ class SelectedFrames:
             )
         # A swapped marker pulls its neighbours along; only the worst ones of a frame are outliers.
         with np.errstate(invalid="ignore"):
-            worst = np.nanmax(
+            largest_in_frame = np.nanmax(
                 np.where(np.isfinite(distances), distances, 0.0), axis=1, keepdims=True
             )
-            far = (distances > np.maximum(OUTLIER_RATIO * usual, OUTLIER_DISTANCE_M)) & (
-                distances > 0.5 * worst
+            is_outlier = (
+                distances > np.maximum(OUTLIER_RATIO * median_distances, OUTLIER_DISTANCE_M)
+            ) & (distances > 0.5 * largest_in_frame)
+        for index in np.flatnonzero(is_outlier.any(axis=0)):
+            trial_names = sorted(
+                {self.trials[frame] for frame in np.flatnonzero(is_outlier[:, index])}
             )
-        for index in np.flatnonzero(far.any(axis=0)):
-            where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, index])})
-            number = format_count(int(far[:, index].sum()), "frame")
+            number = format_count(int(is_outlier[:, index].sum()), "frame")
             self.notes.append(
-                f"{self.markers[index]} is left out in {number} of {join_words(where)}: up to "
+                f"{self.markers[index]} is left out in {number} of {join_words(trial_names)}: up to "
                 f"{100.0 * np.nanmax(distances[:, index]):.0f} cm away; it may have been taken for "
                 "another"
             )
-        self.measured[far] = np.nan
-        return bool(far.any())
+        self.measured[is_outlier] = np.nan
+        return bool(is_outlier.any())

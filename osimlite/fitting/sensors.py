@@ -68,9 +68,9 @@ def find_sensor_frames(
                 )
             result[name] = mechanism.frames[path]
     if not result:
-        near = suggest_name(requested[0], [name for name, _ in frames]) if requested else ""
+        suggestion = suggest_name(requested[0], [name for name, _ in frames]) if requested else ""
         raise SettingError(
-            f"'{model.name}' has no frame with the name of a sensor ({join_words(requested)}){near}"
+            f"'{model.name}' has no frame with the name of a sensor ({join_words(requested)}){suggestion}"
         )
     return result
 
@@ -101,37 +101,37 @@ def place_sensors(
     mechanism = build_mechanism(model)
     q, _ = mechanism.default_state()
     state = mechanism.at(q)
-    measured = dict(zip(data.names, data.values[0], strict=True))
+    rotations = dict(zip(data.names, data.values[0], strict=True))
     heading = None
     if base and axis:
-        if base not in measured:
+        if base not in rotations:
             raise SettingError(
                 f"unknown sensor '{base}' in {data.source}{suggest_name(base, data.names)}"
             )
-        faced = _get_axis_direction(measured[base], axis)
+        faced_direction = _get_axis_direction(rotations[base], axis)
         heading = _compute_heading(
-            _find_forward_direction(model, mechanism, state.rotations), faced
+            _find_forward_direction(model, mechanism, state.rotations), faced_direction
         )
         # The vertical is y in OpenSim.
-        turn = rotation_about_space((0.0, heading, 0.0))
-        measured = {name: turn @ rotation for name, rotation in measured.items()}
+        heading_rotation = rotation_about_space((0.0, heading, 0.0))
+        rotations = {name: heading_rotation @ rotation for name, rotation in rotations.items()}
     frames = list(model.components(PhysicalFrame))
-    placed = []
-    for name, rotation in measured.items():
-        owner, ending, _ = name.rpartition(SENSOR_SUFFIX)
+    placements = []
+    for name, rotation in rotations.items():
+        frame_name, ending, _ = name.rpartition(SENSOR_SUFFIX)
         # A sensor without the suffix is not worn on a body.
-        worn = _find_single_frame(frames, owner, model) if ending else None
-        if worn is None:
+        carrier_frame = _find_single_frame(frames, frame_name, model) if ending else None
+        if carrier_frame is None:
             continue
         if not np.isfinite(rotation).all():
             raise SettingError(
                 f"the first frame of {data.source} has no orientation of the sensor '{name}'"
             )
-        body, matrix = mechanism.frames[model.tree().path_of(worn) or ""]
+        body, matrix = mechanism.frames[model.tree().path_of(carrier_frame) or ""]
         # Orientation of the sensor in the frame on which it is worn.
-        inside = (state.transform(body) @ matrix)[:3, :3].T @ rotation
-        placed.append((name, worn, tuple(angles_xyz(inside).tolist())))
-    if not placed:
+        local_rotation = (state.transform(body) @ matrix)[:3, :3].T @ rotation
+        placements.append((name, carrier_frame, tuple(angles_xyz(local_rotation).tolist())))
+    if not placements:
         example = f"; an example is '{frames[-1].name}{SENSOR_SUFFIX}'" if frames else ""
         raise SettingError(
             f"no sensor of {data.source} ({join_words(data.names)}) has the name of a frame of "
@@ -139,21 +139,21 @@ def place_sensors(
             f"and the suffix '{SENSOR_SUFFIX}'{example}"
         )
     # All sensors are checked before the model is changed.
-    for name, worn, angles in placed:
-        there = _find_single_frame(
+    for name, carrier_frame, angles in placements:
+        sensor_frame = _find_single_frame(
             [frame for frame in frames if isinstance(frame, PhysicalOffsetFrame)], name, model
         )
-        if isinstance(there, PhysicalOffsetFrame):
-            there.orientation = angles
+        if isinstance(sensor_frame, PhysicalOffsetFrame):
+            sensor_frame.orientation = angles
             continue
         # OpenSim places the sensor of a body in its mass centre.
-        centre = worn.mass_center if isinstance(worn, Body) else (0.0, 0.0, 0.0)
+        centre = carrier_frame.mass_center if isinstance(carrier_frame, Body) else (0.0, 0.0, 0.0)
         frame = PhysicalOffsetFrame(
             name=name, socket_parent="..", translation=centre, orientation=angles
         )
-        worn.components.append(frame)
+        carrier_frame.components.append(frame)
         model.add(IMU(name=name, socket_frame=frame))
-    names = tuple(name for name, _, _ in placed)
+    names = tuple(name for name, _, _ in placements)
     return PlacedSensors(names, tuple(name for name in data.names if name not in names), heading)
 
 
@@ -175,26 +175,26 @@ def _find_single_frame(
 
 def _get_axis_direction(rotation: Array, axis: str) -> Array:
     """Return the direction of an axis of a sensor (3,)."""
-    word = axis.lower()
-    if word[-1] not in AXES:
+    axis_name = axis.lower()
+    if axis_name[-1] not in AXES:
         raise SettingError(f"unknown axis '{axis}'; expected x, y, z, -x, -y or -z")
-    column: Array = rotation[:, AXES.index(word[-1])]
-    return -column if word[0] == "-" else column
+    column: Array = rotation[:, AXES.index(axis_name[-1])]
+    return -column if axis_name[0] == "-" else column
 
 
 def _find_forward_direction(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
     """Return the direction in which a model faces (3,): x of the first joint's body on ground."""
     tree = model.tree()
     for joint in model.joint_set.objects:
-        ends = [
+        end_bodies = [
             mechanism.frames[
                 tree.path_of(tree.target(joint, socket, getattr(joint, socket))) or ""
             ].body
             for socket in ("socket_parent_frame", "socket_child_frame")
         ]
         # OpenSim takes the first joint whose parent is ground.
-        if ends[0] == GROUND:
-            return rotations[ends[1]][:, 0]
+        if end_bodies[0] == GROUND:
+            return rotations[end_bodies[1]][:, 0]
     raise SettingError(f"no joint of '{model.name}' has ground as parent; leave out base_imu_label")
 
 

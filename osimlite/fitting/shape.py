@@ -40,8 +40,12 @@ class ScalableMarkers:
     def __init__(self, model: Model, names: Sequence[str], segments: Segments) -> None:
         self._bare = model.copy_deep()
         # Forces do not move markers, and copying and scaling them takes most of the time.
-        for held in (self._bare.force_set, self._bare.controller_set, self._bare.probe_set):
-            held.objects.clear()
+        for component_set in (
+            self._bare.force_set,
+            self._bare.controller_set,
+            self._bare.probe_set,
+        ):
+            component_set.objects.clear()
         self._names = list(names)
         self.segments = segments
         ones = np.ones(len(segments.parts))
@@ -101,14 +105,14 @@ class ScaledPoseFit:
         self, shape: ScalableMarkers, sizes: Array, offsets: Array, weights: Array
     ) -> None:
         self.mechanism, stations = shape.scale_mechanism(sizes)
-        moved = [
-            station._replace(location=station.location + by)
-            for station, by in zip(stations, offsets, strict=True)
+        moved_stations = [
+            station._replace(location=station.location + offset)
+            for station, offset in zip(stations, offsets, strict=True)
         ]
-        self._points = _MarkerPoints(self.mechanism, moved)
+        self._points = _MarkerPoints(self.mechanism, moved_stations)
         markers = [
             MarkerTarget(station, weight)
-            for station, weight in zip(moved, weights.tolist(), strict=True)
+            for station, weight in zip(moved_stations, weights.tolist(), strict=True)
         ]
         self._fit = PoseFit(self.mechanism, markers)
 
@@ -144,8 +148,8 @@ class _MarkerPoints:
 
     def __init__(self, mechanism: Mechanism, stations: Sequence[StationPlacement]) -> None:
         self._mechanism = mechanism
-        free = mechanism.without_constraints()
-        self._system = System(free, Forces(()), apart=True)
+        unconstrained = mechanism.without_constraints()
+        self._system = System(unconstrained, Forces(()), apart=True)
         links = [self._system.placements[station.body][0] for station in stations]
         # Several markers are on one link, whose motion is computed once.
         self._carrying, self._links = np.unique(links, return_inverse=True)
@@ -155,13 +159,13 @@ class _MarkerPoints:
             [frame[:3, :3] @ station.location + frame[:3, 3] for frame, station in located]
         )
         self._turned = np.array([frame[:3, :3] for frame in frames])
-        holds = [
-            item
-            for item in mechanism.constraints
-            if not isinstance(item, Lock | PrescribedCoordinate)
+        constraints = [
+            constraint
+            for constraint in mechanism.constraints
+            if not isinstance(constraint, Lock | PrescribedCoordinate)
         ]
-        self._couplers, _ = separate_couplers(holds, set())
-        self._holds = holds
+        self._couplers, _ = separate_couplers(constraints, set())
+        self._holds = constraints
         self._still = [
             k
             for k, info in enumerate(mechanism.coordinates)
@@ -178,30 +182,32 @@ class _MarkerPoints:
             Positions (t, m, 3), m, and rotations (t, m, 3, 3) of their bodies.
         """
         # The mechanism of the points has no constraints, so that couplers are applied here.
-        followed = values.copy()
+        coupled_values = values.copy()
         for coupler in self._couplers:
-            others = list(coupler.independent)
-            followed[:, coupler.dependent] = [
-                coupler.function.evaluate(row[others])[0] for row in followed
+            arguments = list(coupler.independent)
+            coupled_values[:, coupler.dependent] = [
+                coupler.function.evaluate(row[arguments])[0] for row in coupled_values
             ]
-        links = self._compute_link_motion(followed, np.zeros_like(followed))
-        turned = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._turned
-        return locate_points(links, self._own)[..., :3], turned
+        links = self._compute_link_motion(coupled_values, np.zeros_like(coupled_values))
+        rotations = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._turned
+        return locate_points(links, self._own)[..., :3], rotations
 
     def compute_free_motions(self, values: Array) -> list[Array]:
         """Return the free motions; see :meth:`ScaledPoseFit.compute_free_motions`."""
         count, size = values.shape
-        each = [
+        link_motions = [
             self._compute_link_motion(values, np.tile(unit, (count, 1))) for unit in np.eye(size)
         ]
-        moves = np.stack([locate_points(links, self._own)[..., 3:] for links in each], axis=-1)
+        moves = np.stack(
+            [locate_points(links, self._own)[..., 3:] for links in link_motions], axis=-1
+        )
         return [
             rates @ self._compute_free_speeds(q) for rates, q in zip(moves, values, strict=True)
         ]
 
     def _compute_free_speeds(self, q: Array) -> Array:
         """Return the speeds (n, f) that joints, constraints and ends of ranges allow in a pose."""
-        held = [
+        fixed_coordinates = [
             k
             for k, (info, value) in enumerate(
                 zip(self._mechanism.coordinates, q.tolist(), strict=True)
@@ -212,18 +218,18 @@ class _MarkerPoints:
             and not info.range[0] + RANGE_TOLERANCE < value < info.range[1] - RANGE_TOLERANCE
         ]
         # Rows of the constraint matrix; free motions are its null space.
-        rows = [np.eye(len(q))[[*self._still, *held]]]
+        rows = [np.eye(len(q))[[*self._still, *fixed_coordinates]]]
         if self._holds:
             state = self._mechanism.at(q)
-            rows += [item.velocity_equations(state)[0] for item in self._holds]
+            rows += [constraint.velocity_equations(state)[0] for constraint in self._holds]
         _, lengths, directions = np.linalg.svd(np.vstack(rows))
         return np.asarray(directions[int((lengths > RANGE_TOLERANCE).sum()) :].T)
 
     def _compute_link_motion(self, values: Array, speeds: Array) -> Array:
         """Return the records of the markers' links (t, m, ...)."""
         order = list(self._system.order)
-        still = np.zeros((len(values), 1))
+        zero_times = np.zeros((len(values), 1))
         result = self._system.evaluate_links(
-            np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist()
+            np.hstack((zero_times, values[:, order], speeds[:, order])), self._carrying.tolist()
         )
         return result[:, self._links]

@@ -26,7 +26,7 @@ MIN_COMPONENT = 1e-3
 def find_undetermined(
     mechanism: Mechanism,
     values: Array,
-    seen: NDArray[np.bool_],
+    visibility: NDArray[np.bool_],
     markers: Sequence[MarkerTarget],
     sensors: Sequence[SensorTarget],
     goals: Sequence[CoordinateTarget],
@@ -41,7 +41,7 @@ def find_undetermined(
     Args:
         mechanism: the mechanism.
         values: values of all coordinates in the fitted poses (t, n).
-        seen: whether each marker was seen in each frame (t, m).
+        visibility: whether each marker was seen in each frame (t, m).
         markers: m markers with their weights.
         sensors: frames with measured orientations.
         goals: coordinates with target values.
@@ -51,20 +51,20 @@ def find_undetermined(
         Names in the order of the mechanism.
     """
     count = len(mechanism.coordinates)
-    held = [
+    held_coordinates = [
         k
         for k, info in enumerate(mechanism.coordinates)
         if info.locked or info.prescribed is not None
     ]
     # A target determines its coordinate, however small its weight.
-    held += [goal.coordinate for goal in goals if goal.weight > 0.0]
+    held_coordinates += [goal.coordinate for goal in goals if goal.weight > 0.0]
     open_everywhere = np.ones(count, dtype=bool)
     frames = np.linspace(0, len(values) - 1, min(len(values), MAX_FRAMES)).astype(int)
     # `np.unique` would import `numpy.ma`, which takes ten milliseconds.
     for frame in sorted(set(frames.tolist())):
         state = mechanism.at(values[frame])
-        rows = [np.eye(count)[held]]
-        for marker, is_seen in zip(markers, seen[frame].tolist(), strict=True):
+        rows = [np.eye(count)[held_coordinates]]
+        for marker, is_seen in zip(markers, visibility[frame].tolist(), strict=True):
             body, point = marker.station
             if is_seen and marker.weight > 0.0 and body != GROUND:
                 # The first three rows are the angular velocity of the body, which a point does not
@@ -76,7 +76,9 @@ def find_undetermined(
                 # A sensor shows only the angular velocity, which comes first.
                 rows.append(state.jacobians[body][:3])
         if constraints:
-            rows += [item.acceleration_equations(state)[0] for item in mechanism.constraints]
+            rows += [
+                constraint.acceleration_equations(state)[0] for constraint in mechanism.constraints
+            ]
         _, sizes, directions = np.linalg.svd(np.vstack(rows))
         # The remaining right singular vectors span the motions that nothing measures.
         rank = int(np.sum(sizes > MIN_SINGULAR_VALUE))

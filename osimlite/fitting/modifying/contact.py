@@ -23,58 +23,68 @@ def smooth_contacts(model: Model) -> None:
     """
     geometries = {item.name: item for item in model.contact_geometry_set.objects}
     for force in [item for item in model.force_set.objects if isinstance(item, HuntCrossleyForce)]:
-        known: dict[str, Any] = {}
+        parameters_by_name: dict[str, Any] = {}
         for parameters in force.contact_parameters.objects:
-            known |= dict.fromkeys(
+            parameters_by_name |= dict.fromkeys(
                 (_get_geometry_name(item) for item in parameters.geometry), parameters
             )
-        spheres = [name for name in known if isinstance(geometries.get(name), ContactSphere)]
-        planes = [name for name in known if isinstance(geometries.get(name), ContactHalfSpace)]
-        if len(spheres) + len(planes) < len(known) or not planes or not spheres:
+        spheres = [
+            name for name in parameters_by_name if isinstance(geometries.get(name), ContactSphere)
+        ]
+        planes = [
+            name
+            for name in parameters_by_name
+            if isinstance(geometries.get(name), ContactHalfSpace)
+        ]
+        if len(spheres) + len(planes) < len(parameters_by_name) or not planes or not spheres:
             raise UnsupportedError(
                 f"'{force.name}' is not between spheres and half spaces; only these have a smooth "
                 "force"
             )
-        made = [
-            _create_smooth_force(force, sphere, plane, known, len(spheres) * len(planes) > 1)
+        smooth_forces = [
+            _create_smooth_force(
+                force, sphere, plane, parameters_by_name, len(spheres) * len(planes) > 1
+            )
             for plane in planes
             for sphere in spheres
         ]
         index = model.force_set.objects.index(force)
-        model.force_set.objects[index : index + 1] = made
+        model.force_set.objects[index : index + 1] = smooth_forces
 
 
-def _get_geometry_name(item: Any) -> str:
+def _get_geometry_name(geometry: Any) -> str:
     """Return the name of a geometry, or the last part of its path."""
-    return str(getattr(item, "name", item)).rpartition("/")[2]
+    return str(getattr(geometry, "name", geometry)).rpartition("/")[2]
 
 
 def _create_smooth_force(
-    force: Any, sphere: str, plane: str, known: dict[str, Any], several: bool
+    force: Any, sphere: str, plane: str, parameters_by_name: dict[str, Any], has_several_pairs: bool
 ) -> SmoothSphereHalfSpaceForce:
     """Return the smooth force between one sphere and one half space."""
-    one, other = known[sphere], known[plane]
+    sphere_parameters, plane_parameters = parameters_by_name[sphere], parameters_by_name[plane]
     # Hertz contact: the deformation is proportional to stiffness^(-2/3) for a given force.
     softness = [
-        item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)
+        parameters.stiffness ** (-2.0 / 3.0) if parameters.stiffness else float("inf")
+        for parameters in (sphere_parameters, plane_parameters)
     ]
     # The softer surface yields more, so its dissipation counts more.
-    share = softness[0] / sum(softness)
+    sphere_share = softness[0] / sum(softness)
 
     def mean(name: str) -> float:
-        a, b = getattr(one, name), getattr(other, name)
+        a, b = getattr(sphere_parameters, name), getattr(plane_parameters, name)
         # Simbody's harmonic mean of two friction coefficients.
         return 2.0 * a * b / (a + b) if a + b else 0.0
 
     return SmoothSphereHalfSpaceForce(
-        name=f"{force.name}_{sphere}" if several else force.name,
+        name=f"{force.name}_{sphere}" if has_several_pairs else force.name,
         appliesForce=force.appliesForce,
         socket_sphere=f"/contactgeometryset/{sphere}",
         socket_half_space=f"/contactgeometryset/{plane}",
         # Springs in series: deformations add up; the factor 2 makes equal surfaces keep their
         # number.
         stiffness=(2.0 / sum(softness)) ** 1.5,
-        dissipation=one.dissipation * share + other.dissipation * (1.0 - share),
+        dissipation=sphere_parameters.dissipation * sphere_share
+        + plane_parameters.dissipation * (1.0 - sphere_share),
         static_friction=mean("static_friction"),
         dynamic_friction=mean("dynamic_friction"),
         viscous_friction=mean("viscous_friction"),

@@ -106,9 +106,9 @@ Each has the class of the muscles, the property, and a function of the operator 
 
 def _set_muscle_property(model: Model, operator: Any, folder: Path) -> None:
     """Set a property of muscles; see `SETTINGS`."""
-    kind, name, value = SETTINGS[type(operator)]
-    for muscle in model.components(kind):
-        setattr(muscle, name, value(operator, getattr(muscle, name)))
+    muscle_class, name, compute_value = SETTINGS[type(operator)]
+    for muscle in model.components(muscle_class):
+        setattr(muscle, name, compute_value(operator, getattr(muscle, name)))
 
 
 OPERATIONS.update(dict.fromkeys(SETTINGS, _set_muscle_property))
@@ -125,13 +125,13 @@ def _remove_muscles(model: Model, operator: Any, folder: Path) -> None:
 def _replace_with_path_actuators(model: Model, operator: Any, folder: Path) -> None:
     """Replace all muscles by path actuators."""
     for muscle in find_muscles(model):
-        other = PathActuator(name=muscle.name, optimal_force=muscle.max_isometric_force)
+        actuator = PathActuator(name=muscle.name, optimal_force=muscle.max_isometric_force)
         # Other properties of a muscle mean nothing for a path actuator.
         for name in ("appliesForce", "min_control", "max_control"):
-            setattr(other, name, getattr(muscle, name))
-        _replace_muscle(model, muscle, other)
-        if hasattr(other.geometry_path, "appearance"):
-            other.geometry_path.appearance.color = GREY
+            setattr(actuator, name, getattr(muscle, name))
+        _replace_muscle(model, muscle, actuator)
+        if hasattr(actuator.geometry_path, "appearance"):
+            actuator.geometry_path.appearance.color = GREY
 
 
 @register_operation(p.ModOpReplaceMusclesWithDeGrooteFregly2016)
@@ -142,15 +142,15 @@ def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
         UnsupportedError: a muscle is of another class.
     """
     for muscle in find_muscles(model):
-        given: dict[str, Any] = {name: getattr(muscle, name) for name in COMMON_PROPERTIES}
+        properties: dict[str, Any] = {name: getattr(muscle, name) for name in COMMON_PROPERTIES}
         if isinstance(muscle, Millard2012EquilibriumMuscle):
-            given |= {
+            properties |= {
                 "fiber_damping": muscle.fiber_damping,
                 "passive_fiber_strain_at_one_norm_force": muscle.FiberForceLengthCurve.strain_at_one_norm_force,
                 "tendon_strain_at_one_norm_force": muscle.TendonForceLengthCurve.strain_at_one_norm_force,
             }
         elif isinstance(muscle, Thelen2003Muscle):
-            given |= {
+            properties |= {
                 # Thelen's muscle has no damping.
                 "fiber_damping": 0.0,
                 "passive_fiber_strain_at_one_norm_force": muscle.FmaxMuscleStrain,
@@ -167,15 +167,15 @@ def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
             "activation_time_constant",
             "deactivation_time_constant",
         ):
-            given[name] = getattr(muscle, name)
-        _replace_muscle(model, muscle, DeGrooteFregly2016Muscle(name=muscle.name, **given))
+            properties[name] = getattr(muscle, name)
+        _replace_muscle(model, muscle, DeGrooteFregly2016Muscle(name=muscle.name, **properties))
 
 
-def _replace_muscle(model: Model, muscle: Muscle, other: Any) -> None:
+def _replace_muscle(model: Model, muscle: Muscle, replacement: Any) -> None:
     """Replace a muscle by another force along its path, as the last force, as OpenSim does."""
-    other.geometry_path = muscle.geometry_path.copy_deep()
+    replacement.geometry_path = muscle.geometry_path.copy_deep()
     _remove_muscle(model, muscle)
-    model.force_set.objects.append(other)
+    model.force_set.objects.append(replacement)
 
 
 def _remove_muscle(model: Model, muscle: Muscle) -> None:
@@ -207,9 +207,11 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
         )
     tree = model.tree()
     mechanism = build_mechanism(model)
-    driven = {tree.path_of(item) for item in _find_driven_coordinates(model)}
-    dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
-    fixed = {
+    driven_paths = {tree.path_of(component) for component in _find_driven_coordinates(model)}
+    dependent = {
+        component.dependent for component in mechanism.constraints if isinstance(component, Coupler)
+    }
+    fixed_paths = {
         info.path
         for index, info in enumerate(mechanism.coordinates)
         if info.locked or info.prescribed is not None or index in dependent
@@ -217,11 +219,13 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
     for coordinate in list(model.components(Coordinate)):
         path = tree.path_of(coordinate) or ""
         # A reserve on a coordinate that cannot move by itself would do nothing.
-        if path in fixed or (operator.skip_coordinates_with_actuators and path in driven):
+        if path in fixed_paths or (
+            operator.skip_coordinates_with_actuators and path in driven_paths
+        ):
             continue
         if operator.skip_residual_coordinates and _is_on_ground(model, path):
             continue
-        bound: dict[str, Any] = (
+        control_bounds: dict[str, Any] = (
             {}
             if operator.bound is None
             else {"min_control": -operator.bound, "max_control": operator.bound}
@@ -231,7 +235,7 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
             name="reserve" + path.replace("/", "_"),
             coordinate=coordinate.name,
             optimal_force=operator.optimal_force,
-            **bound,
+            **control_bounds,
         )
         model.force_set.objects.append(reserve)
 
@@ -239,7 +243,7 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
 def _find_driven_coordinates(model: Model) -> list[Any]:
     """Return the coordinates that an actuator drives."""
     names = {actuator.coordinate for actuator in model.components(CoordinateActuator)}
-    return [item for item in model.components(Coordinate) if item.name in names]
+    return [coordinate for coordinate in model.components(Coordinate) if coordinate.name in names]
 
 
 def _is_on_ground(model: Model, path: str) -> bool:
@@ -248,10 +252,10 @@ def _is_on_ground(model: Model, path: str) -> bool:
     return isinstance(_find_base(model, joint, "socket_parent_frame"), Ground)
 
 
-def _find_base(model: Model, owner: Any, socket: str) -> Any:
+def _find_base(model: Model, component: Any, socket: str) -> Any:
     """Return the body, or ground, to which the frame of a socket is fixed."""
     tree = model.tree()
-    frame: Any = tree.target(owner, socket, getattr(owner, socket))
+    frame: Any = tree.target(component, socket, getattr(component, socket))
     # An offset frame may be fixed to another one.
     while isinstance(frame, PhysicalOffsetFrame):
         frame = tree.target(frame, "socket_parent", frame.socket_parent)
@@ -265,8 +269,8 @@ def _replace_joints_with_welds(
     """Replace joints by weld joints."""
     for path in map(str, operator.joint_paths):
         tree = model.tree()
-        joints = {tree.path_of(item) or "": item for item in model.components(Joint)}
-        names = {item.name: item for item in joints.values()}
+        joints = {tree.path_of(existing) or "": existing for existing in model.components(Joint)}
+        names = {existing.name: existing for existing in joints.values()}
         joint = joints.get(path) or names.get(path) or names.get(path.rpartition("/")[2])
         if joint is None:
             raise ModelError(
@@ -284,9 +288,12 @@ def _replace_joints_with_welds(
                 offset.translation = frame.translation
                 offset.orientation = frame.orientation
             frames.append(offset)
-        one, other = (frame.name for frame in frames)
+        parent_name, child_name = (frame.name for frame in frames)
         weld = WeldJoint(
-            name=joint.name, socket_parent_frame=one, socket_child_frame=other, frames=frames
+            name=joint.name,
+            socket_parent_frame=parent_name,
+            socket_child_frame=child_name,
+            frames=frames,
         )
         model.joint_set.objects.remove(joint)
         # OpenSim puts the weld at the end of the set.
@@ -298,11 +305,10 @@ def _replace_with_function_paths(
     model: Model, operator: p.ModOpReplacePathsWithFunctionBasedPaths, folder: Path
 ) -> None:
     """Replace paths by the function-based paths of a file."""
-    given = read_document(
-        Source.from_file(folder / operator.paths_file.strip()),
-        expected_class=p.FunctionBasedPathSet,
+    path_set = read_document(
+        Source.from_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
     ).top
-    replace_paths(model, given.objects)
+    replace_paths(model, path_set.objects)
 
 
 def replace_paths(model: Model, paths: Any) -> None:
@@ -380,6 +386,6 @@ def apply_operators(
         operation = OPERATIONS.get(type(operator))
         if operation is None:
             name = getattr(operator, "class_name", "") or type(operator).__name__
-            known = ", ".join(cls.__name__ for cls in OPERATIONS)
-            raise UnsupportedError(f"osimlite cannot apply a {name}; it has {known}")
+            known_names = ", ".join(cls.__name__ for cls in OPERATIONS)
+            raise UnsupportedError(f"osimlite cannot apply a {name}; it has {known_names}")
         operation(model, operator, Path(folder))

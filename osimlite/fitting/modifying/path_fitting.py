@@ -64,19 +64,30 @@ def fit_paths(
         tolerance: root mean square error at which the order stops rising, m.
         poses: number of poses, spread over the ranges of the coordinates.
     """
-    known = paths(model)
-    mechanism = known.mechanism
-    q, free = _sample_poses(mechanism, poses)
-    still = np.zeros(len(mechanism.coordinates))
-    lengths = np.array([known.system.measure_paths(row, still, PATH_WORK.LENGTH) for row in q])
-    arms = known.compute_moment_arms(q)
+    model_paths = paths(model)
+    mechanism = model_paths.mechanism
+    q, free_coordinates = _sample_poses(mechanism, poses)
+    zero_speeds = np.zeros(len(mechanism.coordinates))
+    lengths = np.array(
+        [model_paths.system.measure_paths(row, zero_speeds, PATH_WORK.LENGTH) for row in q]
+    )
+    arms = model_paths.compute_moment_arms(q)
     tree = model.tree()
     result = []
-    for index, name in enumerate(known.names):
+    for index, name in enumerate(model_paths.names):
         if isinstance(getattr(tree.find(name), "geometry_path", None), FunctionBasedPath):
             continue
         result.append(
-            _fit_path(known, mechanism, name, q, free, lengths[:, index], arms[:, index], tolerance)
+            _fit_path(
+                model_paths,
+                mechanism,
+                name,
+                q,
+                free_coordinates,
+                lengths[:, index],
+                arms[:, index],
+                tolerance,
+            )
         )
     return result
 
@@ -88,86 +99,104 @@ def _sample_poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
         Poses (k, n), and the indices of the sampled coordinates.
     """
     infos = mechanism.coordinates
-    dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
-    free = [
+    dependent = {
+        constraint.dependent
+        for constraint in mechanism.constraints
+        if isinstance(constraint, Coupler)
+    }
+    free_coordinates = [
         k
         for k, info in enumerate(infos)
         if k not in dependent and not info.locked and info.prescribed is None
     ]
-    bounds = np.array([_limit_range(infos[k].range) for k in free]).reshape(-1, 2)
+    bounds = np.array([_limit_range(infos[k].range) for k in free_coordinates]).reshape(-1, 2)
     rng = np.random.default_rng(0)
     # Latin hypercube: one sample in each of `count` equal parts of every range.
-    parts = np.array([rng.permutation(count) for _ in free]).T.reshape(
-        count, len(free)
-    ) + rng.random((count, len(free)))
+    samples = np.array([rng.permutation(count) for _ in free_coordinates]).T.reshape(
+        count, len(free_coordinates)
+    ) + rng.random((count, len(free_coordinates)))
     q = np.tile([info.default_value for info in infos], (count, 1))
-    q[:, free] = bounds[:, 0] + parts / count * (bounds[:, 1] - bounds[:, 0])
-    if any(not hasattr(item, "locked") for item in mechanism.constraints) and mechanism.constraints:
+    q[:, free_coordinates] = bounds[:, 0] + samples / count * (bounds[:, 1] - bounds[:, 0])
+    if (
+        any(not hasattr(constraint, "locked") for constraint in mechanism.constraints)
+        and mechanism.constraints
+    ):
         q = np.array([mechanism.assemble(row) for row in q])
-    return q, free
+    return q, free_coordinates
 
 
-def _limit_range(given: tuple[float, float]) -> tuple[float, float]:
+def _limit_range(value_range: tuple[float, float]) -> tuple[float, float]:
     """Return a range, or the default range if it is empty or too wide."""
-    low, high = given
+    lower, upper = value_range
     return (
-        (low, high)
-        if low < high and high - low <= 2.0 * UNBOUNDED_RANGE
+        (lower, upper)
+        if lower < upper and upper - lower <= 2.0 * UNBOUNDED_RANGE
         else (-UNBOUNDED_RANGE, UNBOUNDED_RANGE)
     )
 
 
 def _fit_path(
-    known: Paths,
+    model_paths: Paths,
     mechanism: Mechanism,
     name: str,
     q: Array,
-    free: list[int],
+    free_coordinates: list[int],
     lengths: Array,
     arms: Array,
     tolerance: float,
 ) -> PathFit:
     """Fit the polynomial of one path."""
-    varied = [k for k in free if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M] or free[:1]
-    good = np.isfinite(lengths) & np.isfinite(arms[:, varied]).all(axis=1)
-    x = q[good][:, varied]
-    targets = lengths[good]
-    pulls = arms[good][:, varied]
-    best: PathFit | None = None
+    varied_coordinates = [
+        k for k in free_coordinates if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M
+    ] or free_coordinates[:1]
+    is_finite = np.isfinite(lengths) & np.isfinite(arms[:, varied_coordinates]).all(axis=1)
+    x = q[is_finite][:, varied_coordinates]
+    targets = lengths[is_finite]
+    target_arms = arms[is_finite][:, varied_coordinates]
+    result: PathFit | None = None
     for order in ORDERS:
         powers = np.array(
-            [item for item in product(range(order + 1), repeat=len(varied)) if sum(item) <= order]
+            [
+                exponents
+                for exponents in product(range(order + 1), repeat=len(varied_coordinates))
+                if sum(exponents) <= order
+            ]
         )
         # Twice as many equations as coefficients avoid overfitting.
-        if len(powers) > 0.5 * len(targets) * (1 + len(varied)):
+        if len(powers) > 0.5 * len(targets) * (1 + len(varied_coordinates)):
             break
         values, slopes = _compute_monomials(x, powers)
         # Moment arms are the negative derivatives of the length.
         matrix = np.vstack([values, *(-slope for slope in slopes)])
-        right = np.concatenate([targets, *pulls.T])
+        right_side = np.concatenate([targets, *target_arms.T])
         # Scaled columns make the least-squares problem well conditioned.
         sizes = np.linalg.norm(matrix, axis=0)
-        coefficients = np.linalg.lstsq(matrix / sizes, right, 1e-12)[0] / sizes
-        off = matrix @ coefficients - right
-        length = off[: len(targets)]
-        arm = off[len(targets) :]
+        coefficients = np.linalg.lstsq(matrix / sizes, right_side, 1e-12)[0] / sizes
+        residuals = matrix @ coefficients - right_side
+        length_residuals = residuals[: len(targets)]
+        arm_residuals = residuals[len(targets) :]
         polynomial = MultivariatePolynomialFunction(
-            dimension=len(varied), order=order, coefficients=tuple(coefficients.tolist())
+            dimension=len(varied_coordinates),
+            order=order,
+            coefficients=tuple(coefficients.tolist()),
         )
-        coordinate_paths = tuple(mechanism.coordinates[k].path for k in varied)
+        coordinate_paths = tuple(mechanism.coordinates[k].path for k in varied_coordinates)
         path = FunctionBasedPath(
             name=name, coordinate_paths=coordinate_paths, length_function=polynomial
         )
-        best = PathFit(
+        result = PathFit(
             path,
             order,
-            *(float(np.sqrt(np.mean(each**2))) for each in (length, arm)),
-            *(float(np.abs(each).max()) for each in (length, arm)),
+            *(
+                float(np.sqrt(np.mean(residual**2)))
+                for residual in (length_residuals, arm_residuals)
+            ),
+            *(float(np.abs(residual).max()) for residual in (length_residuals, arm_residuals)),
         )
-        if best.length <= tolerance and best.arm <= tolerance:
+        if result.length <= tolerance and result.arm <= tolerance:
             break
-    assert best is not None
-    return best
+    assert result is not None
+    return result
 
 
 def _compute_monomials(x: Array, powers: Array) -> tuple[Array, list[Array]]:
@@ -177,8 +206,8 @@ def _compute_monomials(x: Array, powers: Array) -> tuple[Array, list[Array]]:
     columns = range(x.shape[1])
     values = np.prod([table[powers[:, c], :, c] for c in columns], axis=0).T
     slopes = []
-    for by in columns:
-        lower = np.maximum(powers[:, by] - 1, 0)
-        parts = [table[lower if c == by else powers[:, c], :, c] for c in columns]
-        slopes.append((np.prod(parts, axis=0) * powers[:, by, None]).T)
+    for argument in columns:
+        lowered_powers = np.maximum(powers[:, argument] - 1, 0)
+        factors = [table[lowered_powers if c == argument else powers[:, c], :, c] for c in columns]
+        slopes.append((np.prod(factors, axis=0) * powers[:, argument, None]).T)
     return values, slopes

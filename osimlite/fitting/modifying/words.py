@@ -29,9 +29,9 @@ def _create_change(operator: Any) -> Change:
 
 def _replace_paths_with_polynomials(model: Model, folder: Path) -> list[PathFit]:
     """Replace all paths by polynomials."""
-    fitted = fit_paths(model)
-    replace_paths(model, [item.path for item in fitted])
-    return fitted
+    fits = fit_paths(model)
+    replace_paths(model, [fit.path for fit in fits])
+    return fits
 
 
 def _replace_contacts(model: Model, folder: Path) -> None:
@@ -60,8 +60,8 @@ CHANGES_BY_WORD: dict[str, dict[str, Callable[[], Change]]] = {
 
 def _parse_welds(value: str) -> Any:
     """Return the operator for ``weld:NAME,NAME``."""
-    kind, _, names = value.partition(":")
-    if kind != "weld" or not names:
+    replacement, _, names = value.partition(":")
+    if replacement != "weld" or not names:
         raise SettingError(
             f"unknown replacement joints={value}; write joints=weld:NAME, with commas between names"
         )
@@ -70,9 +70,11 @@ def _parse_welds(value: str) -> Any:
 
 def _parse_reserves(value: str) -> Any:
     """Return the operator for ``FORCE:BOUND``."""
-    force, _, bound = value.partition(":")
-    given: dict[str, Any] = {"bound": _parse_number("reserves", bound)} if bound else {}
-    return p.ModOpAddReserves(optimal_force=_parse_number("reserves", force), **given)
+    force, _, bound_text = value.partition(":")
+    optional_properties: dict[str, Any] = (
+        {"bound": _parse_number("reserves", bound_text)} if bound_text else {}
+    )
+    return p.ModOpAddReserves(optimal_force=_parse_number("reserves", force), **optional_properties)
 
 
 OPERATORS_BY_NAME: dict[str, Callable[[str], Any]] = {
@@ -108,8 +110,8 @@ def find_change(name: str, value: str) -> Change:
     Raises:
         SettingError: there is no such replacement.
     """
-    if (made := CHANGES_BY_WORD.get(name, {}).get(value)) is not None:
-        return made()
+    if (create_change := CHANGES_BY_WORD.get(name, {}).get(value)) is not None:
+        return create_change()
     # A word and a file may replace the same part: a file has a suffix.
     if name in OPERATORS_BY_NAME and (name not in CHANGES_BY_WORD or Path(value).suffix):
         return _create_change(OPERATORS_BY_NAME[name](value))
