@@ -42,23 +42,27 @@ class Bounds:
     last: Range
 
     @classmethod
-    def from_ranges(cls, within: Range, first: Range = FREE, last: Range = FREE) -> Bounds:
+    def from_ranges(
+        cls, motion_range: Range, start_range: Range = FREE, end_range: Range = FREE
+    ) -> Bounds:
         """Return bounds in which the ends of the motion are never wider than the motion, as in Moco.
 
         Args:
-            within: bounds over the motion.
-            first: bounds at the start.
-            last: bounds at the end.
+            motion_range: bounds over the motion.
+            start_range: bounds at the start.
+            end_range: bounds at the end.
 
         Returns:
             Bounds; those at the ends lie within those over the motion.
         """
-        return cls(within, _intersect(first, within), _intersect(last, within))
+        return cls(
+            motion_range, _intersect(start_range, motion_range), _intersect(end_range, motion_range)
+        )
 
 
-def _intersect(inner: Range, outer: Range) -> Range:
+def _intersect(range_to_limit: Range, limits: Range) -> Range:
     """Return the part of one range within another; its ends are reversed if both have nothing in common."""
-    return max(inner[0], outer[0]), min(inner[1], outer[1])
+    return max(range_to_limit[0], limits[0]), min(range_to_limit[1], limits[1])
 
 
 def read_range(bounds: Any) -> Range | None:
@@ -167,63 +171,65 @@ def find_state_bounds(
     speeds = read_range(phase.default_speed_bounds) or FREE
     result = {}
     for name in names:
-        path, _, what = name.rpartition("/")
-        owner: Any = components.get(path)
+        path, _, quantity = name.rpartition("/")
+        component: Any = components.get(path)
         default = FREE
-        if what == "value":
-            default = tuple(owner.range)
-        elif what == "speed":
+        if quantity == "value":
+            default = tuple(component.range)
+        elif quantity == "speed":
             default = speeds
-        elif what == "normalized_tendon_force" and isinstance(owner, DeGrooteFregly2016Muscle):
+        elif quantity == "normalized_tendon_force" and isinstance(
+            component, DeGrooteFregly2016Muscle
+        ):
             default = MIN_TENDON_FORCE, MAX_TENDON_FORCE
         # Moco bounds activations by excitations, those of muscles only if the phase says so.
-        elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
-            default = owner.min_control, owner.max_control
+        elif quantity == "activation" and isinstance(component, ActivationCoordinateActuator):
+            default = component.min_control, component.max_control
         elif (
-            what == "activation"
-            and isinstance(owner, Muscle)
+            quantity == "activation"
+            and isinstance(component, Muscle)
             and phase.bound_activation_from_excitation
         ):
             default = (
                 controls[path].within
                 if path in controls
-                else (owner.min_control, owner.max_control)
+                else (component.min_control, component.max_control)
             )
         result[name] = infos.bounds(name, default)
     return result
 
 
-def compute_scaling(low: float, high: float) -> tuple[float, float]:
+def compute_scaling(lower: float, upper: float) -> tuple[float, float]:
     """Compute the factor and the offset of a variable ``w = factor x + offset``, as Moco does.
 
     Args:
-        low: lower bound of w.
-        high: upper bound of w.
+        lower: lower bound of w.
+        upper: upper bound of w.
 
     Returns:
         Width of the bounds, and the negative of their middle; (1, 0) without finite bounds, and
         (1, bound) if both bounds are equal.
     """
-    width = high - low
+    width = upper - lower
     if not math.isfinite(width):
         return 1.0, 0.0
     # The offset has Moco's sign. It does not center x on zero, but costs on squares of x must agree
     # with Moco.
-    return (width, -0.5 * (high + low)) if width else (1.0, high)
+    return (width, -0.5 * (upper + lower)) if width else (1.0, upper)
 
 
-def compute_midpoint(low: Array, high: Array) -> Array:
+def compute_midpoint(lower: Array, upper: Array) -> Array:
     """Return the point where a search starts without a guess.
 
     Args:
-        low: lower bounds (n,).
-        high: upper bounds (n,).
+        lower: lower bounds (n,).
+        upper: upper bounds (n,).
 
     Returns:
         Middle between the bounds (n,); the finite bound if there is only one, and zero without any.
     """
     # Infinite bounds become 0 before the sum, as inf - inf would be NaN.
-    has_low = np.isfinite(low)
-    has_high = np.isfinite(high)
-    ends = np.where(has_low, low, 0.0), np.where(has_high, high, 0.0)
-    return (ends[0] + ends[1]) * np.where(has_low & has_high, 0.5, 1.0)
+    has_lower = np.isfinite(lower)
+    has_upper = np.isfinite(upper)
+    finite_bounds = np.where(has_lower, lower, 0.0), np.where(has_upper, upper, 0.0)
+    return (finite_bounds[0] + finite_bounds[1]) * np.where(has_lower & has_upper, 0.5, 1.0)

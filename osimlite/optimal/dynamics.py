@@ -43,7 +43,7 @@ class Dynamics:
 
     def list_forces(self) -> Iterable[tuple[str, Any]]:
         """Return the forces of the model with their paths."""
-        return [(item.path, item) for item in self.functions.forces.elements]
+        return [(element.path, element) for element in self.functions.forces.elements]
 
     def compute_path_lengths(self, point: PointSymbols) -> tuple[Formula, Formula]:
         """Compute the lengths and speeds of the paths of ``functions.path_names``.
@@ -70,17 +70,17 @@ class Dynamics:
             Formula of the derivative.
         """
         size = self.size
-        f = self.functions
+        functions = self.functions
         speeds = point.x[size : 2 * size]
         if self.is_implicit:
             accelerations = point.derivatives[:size]
         else:
             # The accelerations remain symbols: M udot = f is solved with the factors of M (see PointFormula).
             accelerations = casadi.SX.sym("udot", size)
-            none = casadi.SX.zeros(size)
-            others = casadi.SX.zeros(len(f.states) - 2 * size)
-            udot = casadi.vertcat(none, accelerations, others)
-            rows = f.residual(point.t, point.x, udot, point.u, point.p, point.multipliers)[
+            zero_speeds = casadi.SX.zeros(size)
+            zero_rates = casadi.SX.zeros(len(functions.states) - 2 * size)
+            udot = casadi.vertcat(zero_speeds, accelerations, zero_rates)
+            rows = functions.residual(point.t, point.x, udot, point.u, point.p, point.multipliers)[
                 size : 2 * size
             ]
             point.linear_systems.append((accelerations, rows))
@@ -96,8 +96,8 @@ class Dynamics:
             rates: rates of the complete state (n, 1), which this changes.
         """
         for number, path in enumerate(self.tendons.paths):
-            place = self.functions.states.index(f"{path}/normalized_tendon_force")
-            rates[place] = point.derivatives[self._first_rate + number]
+            index = self.functions.states.index(f"{path}/normalized_tendon_force")
+            rates[index] = point.derivatives[self._first_rate + number]
         return rates
 
     def _compute_auxiliary_rates(self, point: PointSymbols) -> Formula:
@@ -106,13 +106,13 @@ class Dynamics:
         Returns:
             Formula of the rates (m, 1).
         """
-        none = casadi.SX.zeros(len(self.functions.states))
-        f = self.functions
+        zero_rates = casadi.SX.zeros(len(self.functions.states))
+        functions = self.functions
         # The residual of an auxiliary state is its rate less the law's rate: at zero rates it is
         # the negative of the law's rate.
-        return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[
-            2 * self.size :
-        ]
+        return -functions.residual(
+            point.t, point.x, zero_rates, point.u, point.p, point.multipliers
+        )[2 * self.size :]
 
     def correct_rates(self, point: PointSymbols) -> Formula:
         """Return the rates with the velocity correction that keeps states on the constraints (Posa et al.).
@@ -128,8 +128,8 @@ class Dynamics:
         # compute_projection_errors.
         if self.problem.uses_projection or not point.slacks.numel():
             return rates
-        g = self.functions.constraints(point.t, point.x, rates, point.p)[3]
-        return casadi.vertcat(rates[: self.size] + g.T @ point.slacks, rates[self.size :])
+        jacobian = self.functions.constraints(point.t, point.x, rates, point.p)[3]
+        return casadi.vertcat(rates[: self.size] + jacobian.T @ point.slacks, rates[self.size :])
 
     def compute_residuals(self, point: PointSymbols) -> tuple[list[str], Formula]:
         """Compute the residuals that are zero at all points: of implicit dynamics, then of implicit tendons.
@@ -143,15 +143,15 @@ class Dynamics:
         names, errors = self.tendons.compute_residuals(point, point.derivatives[self._first_rate :])
         if not self.is_implicit:
             return names, errors
-        f = self.functions
+        functions = self.functions
         size = self.size
         # The interval ends at the state before projection, so that its equations of motion hold
         # there.
         point = point.before_projection
-        rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[
-            size : 2 * size
-        ]
-        return [*(f"{path} residual" for path in f.coordinates), *names], casadi.vertcat(
+        rows = functions.residual(
+            point.t, point.x, point.rates, point.u, point.p, point.multipliers
+        )[size : 2 * size]
+        return [*(f"{path} residual" for path in functions.coordinates), *names], casadi.vertcat(
             rows, errors
         )
 
@@ -201,8 +201,8 @@ class Dynamics:
             force, moment = load(point.t, point.x, point.rates, point.u, point.p, point.multipliers)
             # The kernels give loads in ground; the transposed rotation expresses them along the
             # axes of the frame.
-            turn = point.frame(frame).rotation.T
-            return casadi.vertcat(turn @ moment, turn @ force)
+            ground_to_frame = point.frame(frame).rotation.T
+            return casadi.vertcat(ground_to_frame @ moment, ground_to_frame @ force)
 
         return formula
 
@@ -245,6 +245,11 @@ class Dynamics:
             Names of the errors, and the errors (k, 1).
         """
         names = self.problem.projected_names
-        g = self._evaluate_constraints(point)[3]
-        moved = casadi.vertcat(*(g.T @ part for part in casadi.vertsplit(point.slacks, g.size1())))
-        return names, point.x[: len(names)] - point.projections - moved
+        jacobian = self._evaluate_constraints(point)[3]
+        displacements = casadi.vertcat(
+            *(
+                jacobian.T @ slack_half
+                for slack_half in casadi.vertsplit(point.slacks, jacobian.size1())
+            )
+        )
+        return names, point.x[: len(names)] - point.projections - displacements

@@ -39,25 +39,31 @@ class Hessian:
                 program.problem.solver,
                 "a goal is not linear in its integral; set optim_hessian_approximation to limited-memory",
             )
-        inner, outer = np.nonzero(np.triu(pattern[:direct, :direct]))
-        inner, outer = np.sort([program.end_columns[inner], program.end_columns[outer]], axis=0)
+        end_rows, end_columns = np.nonzero(np.triu(pattern[:direct, :direct]))
+        end_rows, end_columns = np.sort(
+            [program.end_columns[end_rows], program.end_columns[end_columns]], axis=0
+        )
         self._ends = np.nonzero(np.triu(pattern[:direct, :direct]))
         # A term that depends on both an end and an integral couples that end with all points.
-        self._mixed = [tuple(pair) for pair in np.argwhere(pattern[:direct, direct:])]
-        far = [
+        self._mixed = [tuple(entry_pair) for entry_pair in np.argwhere(pattern[:direct, direct:])]
+        integral_columns = [
             np.unique(program._jacobian_columns[program._jacobian_rows == program._row_count + k])
             for _, k in self._mixed
         ]
-        self._far = far
+        self._far = integral_columns
         # Each pair is sorted, as an entry of the upper triangle has its row before its column.
-        near = [
-            np.sort([np.full(len(each), program.end_columns[i]), each], axis=0)
-            for (i, _), each in zip(self._mixed, far, strict=True)
+        mixed_entries = [
+            np.sort([np.full(len(column_indices), program.end_columns[i]), column_indices], axis=0)
+            for (i, _), column_indices in zip(self._mixed, integral_columns, strict=True)
         ]
-        parts = [(rows, columns), (inner, outer), *((pair[0], pair[1]) for pair in near)]
+        entry_groups = [
+            (rows, columns),
+            (end_rows, end_columns),
+            *((entry_pair[0], entry_pair[1]) for entry_pair in mixed_entries),
+        ]
         # One integer per place, column by column as in CasADi's patterns: equal places of several
         # parts are added.
-        keys = np.concatenate([c.astype(np.int64) * width + r for r, c in parts])
+        keys = np.concatenate([c.astype(np.int64) * width + r for r, c in entry_groups])
         unique, inverse = np.unique(keys, return_inverse=True)
         self._map = SparseMatrix.from_entries(
             inverse, np.arange(len(keys)), np.ones(len(keys)), (len(unique), len(keys))
@@ -83,28 +89,37 @@ class Hessian:
         end_arguments = program._end_arguments(w, totals)
         multipliers_of_points = multipliers[: program._row_count]
         at_ends = multipliers[program._row_count :]
-        cost, end_slopes = (part.T for part in program._end_slope(*end_arguments))
+        cost, end_slopes = (array.T for array in program._end_slope(*end_arguments))
         # E is linear in the integrals: its derivative by an integral acts like the multiplier of
         # its row.
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ end_slopes[:, direct:]
         row_multipliers = program._b.multiply_transpose(
             np.concatenate([multipliers_of_points, of_integrals])
         )
-        parts = []
-        for group, first in zip(program.groups, program._offsets, strict=False):
+        entry_groups = []
+        for group, first_row in zip(program.groups, program._offsets, strict=False):
             count = group.rows * len(group.numbers)
-            parts.append(
+            entry_groups.append(
                 group.curvature(
-                    *program._point_arguments(group, w), row_multipliers[first : first + count]
+                    *program._point_arguments(group, w),
+                    row_multipliers[first_row : first_row + count],
                 )[0].ravel()
             )
         # The Hessian is symmetric, so that its upper triangle is enough.
-        (ends,) = program._end_curvature(*end_arguments, np.array(factor), at_ends)
-        parts.append(ends[self._ends])
+        (end_hessian,) = program._end_curvature(*end_arguments, np.array(factor), at_ends)
+        entry_groups.append(end_hessian[self._ends])
         if self._mixed:
             integrals = program._compute_slopes(w)[3]
-            for (i, k), far in zip(self._mixed, self._far, strict=True):
+            for (end_index, integral_index), integral_columns in zip(
+                self._mixed, self._far, strict=True
+            ):
                 # The product rule gives both (i, j) and (j, i); on the diagonal both are one entry.
-                twice = np.where(far == program.end_columns[i], 2.0, 1.0)
-                parts.append(ends[i, direct + k] * integrals[k, far] * twice)
-        return self._map @ np.concatenate(parts)
+                factor_of_diagonal = np.where(
+                    integral_columns == program.end_columns[end_index], 2.0, 1.0
+                )
+                entry_groups.append(
+                    end_hessian[end_index, direct + integral_index]
+                    * integrals[integral_index, integral_columns]
+                    * factor_of_diagonal
+                )
+        return self._map @ np.concatenate(entry_groups)

@@ -94,13 +94,16 @@ def build_inverse_problem(
         more(study)
     problem = Problem(study, file, folder, motion=motion, scaled=scaled)
     if not tool.kinematics_allow_extra_columns:
-        known = (*problem.functions.tabulate_states(table.times[:1]), *problem.functions.states)
+        known_columns = (
+            *problem.functions.tabulate_states(table.times[:1]),
+            *problem.functions.states,
+        )
         for label in table.columns:
-            if label not in known:
-                near = suggest_name(label, known)
+            if label not in known_columns:
+                suggestion = suggest_name(label, known_columns)
                 raise context.invalid_error(
                     tool,
-                    f"'{label}' is not a state{near}; set kinematics_allow_extra_columns to ignore it",
+                    f"'{label}' is not a state{suggestion}; set kinematics_allow_extra_columns to ignore it",
                 )
     return problem
 

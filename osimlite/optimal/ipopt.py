@@ -52,8 +52,8 @@ class Violation:
     size: float
 
     def __str__(self) -> str:
-        where = "" if self.time is None else f" at {self.time:.4g} s"
-        return f"{self.name}{where} ({self.size:.2g})"
+        time_note = "" if self.time is None else f" at {self.time:.4g} s"
+        return f"{self.name}{time_note} ({self.size:.2g})"
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class Progress:
     worst: Violation | None
 
     def __str__(self) -> str:
-        worst = "" if self.worst is None else f"  largest violation {self.worst}"
-        return f"{self.iteration:5d}  objective {self.objective:.8g}{worst}"
+        violation_note = "" if self.worst is None else f"  largest violation {self.worst}"
+        return f"{self.iteration:5d}  objective {self.objective:.8g}{violation_note}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ def run_ipopt(
     guess: Array,
     report: Callable[[Progress], None] | None = None,
     *,
-    near: bool = False,
+    is_warm_start: bool = False,
 ) -> SolverResult:
     """Minimize the objective of a nonlinear program from a guess.
 
@@ -136,7 +136,7 @@ def run_ipopt(
         program: nonlinear program.
         guess: initial variables (n,); those outside their bounds are moved onto them.
         report: function that is called with the progress after each iteration.
-        near: whether the guess is nearly a solution, so that Ipopt must not move it off its bounds.
+        is_warm_start: whether the guess is nearly a solution, so that Ipopt must not move it off its bounds.
 
     Returns:
         Variables with Ipopt's status; of a search without success, the best iterate.
@@ -149,7 +149,7 @@ def run_ipopt(
     # folder, which may name a file to write to and a library to load.
     options = {
         "ipopt": _make_options(program)
-        | (WARM_START_OPTIONS if near else {})
+        | (WARM_START_OPTIONS if is_warm_start else {})
         | {"print_level": 0, "sb": "yes", "option_file_name": ""},
         # Values of bad trial points are normal in a line search; progress comes from the callback.
         "print_time": False,
@@ -164,7 +164,7 @@ def run_ipopt(
     }
     if _uses_exact_hessian(program):
         options["hess_lag"] = _make_hessian_callback(program, search)
-    before = time.perf_counter()
+    start_time = time.perf_counter()
     _load_ipopt()
     solver = casadi.nlpsol("moco", "ipopt", search.objective, options)
     lower = program.layout.lower
@@ -177,7 +177,7 @@ def run_ipopt(
             lbg=program.lower,
             ubg=program.upper,
         )
-    took = time.perf_counter() - before
+    duration = time.perf_counter() - start_time
     stats = solver.stats()
     status = stats["return_status"]
     if not np.isfinite(np.array(solution["f"])).all() or status == "Invalid_Number_Detected":
@@ -186,7 +186,7 @@ def run_ipopt(
     # The last iterate of an unfinished search is often worse than an earlier one.
     if not stats["success"] and search.best is not None:
         w = search.best
-    return SolverResult(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
+    return SolverResult(w, status, bool(stats["success"]), int(stats["iter_count"]), duration)
 
 
 @cache
@@ -195,10 +195,10 @@ def _load_ipopt() -> None:
 
     The matrices are small, and sums of one part per core would differ between machines.
     """
-    before = os.environ.get(THREADS_VARIABLE)
-    os.environ[THREADS_VARIABLE] = before or "1"
+    previous_value = os.environ.get(THREADS_VARIABLE)
+    os.environ[THREADS_VARIABLE] = previous_value or "1"
     casadi.load_nlpsol("ipopt")
-    if before is None:
+    if previous_value is None:
         del os.environ[THREADS_VARIABLE]
 
 
@@ -226,7 +226,7 @@ def _make_options(program: Program) -> dict[str, Any]:
     if settings.optim_max_iterations != -1:
         options["max_iter"] = settings.optim_max_iterations
     if (tolerance := settings.optim_convergence_tolerance) != -1.0:
-        both = ("", "dual_inf_", "compl_inf_")
+        prefixes = ("", "dual_inf_", "compl_inf_")
         # Newton's method converges so fast at the end that it would stop where the barrier still costs
         # up to 1e-2 of the objective.
         strict = (
@@ -234,8 +234,8 @@ def _make_options(program: Program) -> dict[str, Any]:
             if is_exact
             else tolerance
         )
-        options |= {f"{each}tol": strict for each in both} | {
-            f"acceptable_{each}tol": tolerance for each in both
+        options |= {f"{tolerance_prefix}tol": strict for tolerance_prefix in prefixes} | {
+            f"acceptable_{tolerance_prefix}tol": tolerance for tolerance_prefix in prefixes
         }
     if (tolerance := settings.optim_constraint_tolerance) != -1.0:
         options |= {f"{prefix}constr_viol_tol": tolerance for prefix in ("", "acceptable_")}
@@ -245,14 +245,16 @@ def _make_options(program: Program) -> dict[str, Any]:
 def _describe_invalid_number(program: Program, guess: Array) -> str:
     """Return the message for an objective or a constraint that is not a number."""
     costs, rows = program.compute_values(guess)
-    bad = [program.labels[row] for row in np.flatnonzero(~np.isfinite(rows))[:1]]
-    bad += [name for name, cost in zip(program.costs, costs, strict=True) if not np.isfinite(cost)]
-    what = (
-        f"'{bad[0]}' is not a number at the guess"
-        if bad
+    invalid_names = [program.labels[row] for row in np.flatnonzero(~np.isfinite(rows))[:1]]
+    invalid_names += [
+        name for name, cost in zip(program.costs, costs, strict=True) if not np.isfinite(cost)
+    ]
+    description = (
+        f"'{invalid_names[0]}' is not a number at the guess"
+        if invalid_names
         else "a value is not a number during the search"
     )
-    return f"{what}; provide a feasible guess_file, or tighten the bounds"
+    return f"{description}; provide a feasible guess_file, or tighten the bounds"
 
 
 class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
@@ -295,10 +297,11 @@ class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
     def has_eval_buffer(self) -> bool:
         return True
 
-    def eval_buffer(self, given: Any, results: Any) -> int:
+    def eval_buffer(self, argument_buffers: Any, results: Any) -> int:
         # CasADi passes None for absent arguments and for results that it does not need.
         arrays = [
-            np.zeros(0) if item is None else np.frombuffer(item, dtype=float) for item in given
+            np.zeros(0) if argument is None else np.frombuffer(argument, dtype=float)
+            for argument in argument_buffers
         ]
         for buffer, result in zip(results, self._law(*arrays), strict=True):
             if buffer is not None:
@@ -350,7 +353,7 @@ class _SearchCallbacks:
         inputs = {"x": _make_dense_column(width), "p": casadi.Sparsity(0, 0)}
         sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows}
         scalar = casadi.Sparsity.scalar()
-        across = casadi.Sparsity.dense(width, 1)
+        gradient_sparsity = casadi.Sparsity.dense(width, 1)
         # Ipopt evaluates objective and constraints at one x by separate calls.
         self._values_at = cache_last(lambda x: program.compute_values(self.unscale(x)))
         self._slopes_at = cache_last(lambda x: program.compute_slopes(self.unscale(x)))
@@ -358,7 +361,7 @@ class _SearchCallbacks:
             "nlp", inputs, {"f": scalar, "g": _make_dense_column(rows)}, self._values
         )
         self.gradient = _ArrayCallback(
-            "nlp_grad_f", inputs, {"f": scalar, "grad_f_x": across}, self._gradient
+            "nlp_grad_f", inputs, {"f": scalar, "grad_f_x": gradient_sparsity}, self._gradient
         )
         self.jacobian = _ArrayCallback(
             "nlp_jac_g",
@@ -407,15 +410,19 @@ class _SearchCallbacks:
         """
         # The callback gets the values at the accepted iterate, which need no further evaluation.
         objective = float(f[0])
-        worst = find_violations(self.program, self.unscale(x), rows, most=1)
-        size = worst[0].size if worst else 0.0
+        largest_violations = find_violations(self.program, self.unscale(x), rows, most=1)
+        size = largest_violations[0].size if largest_violations else 0.0
         # Among feasible iterates the objective decides, among others the violation.
         rank = (size, np.inf) if size > FEASIBILITY_TOLERANCE else (0.0, objective)
         if rank < self._best:
             self.best = self.unscale(x)
             self._best = rank
         if self.report is not None:
-            self.report(Progress(self.count, objective, worst[0] if worst else None))
+            self.report(
+                Progress(
+                    self.count, objective, largest_violations[0] if largest_violations else None
+                )
+            )
         self.count += 1
         return (1.0 if self.stops else 0.0,)
 
@@ -428,23 +435,23 @@ class _SearchCallbacks:
             return
         # Python only delivers signals between its own instructions, and Ipopt calls Python in each
         # iteration.
-        before = signal.getsignal(signal.SIGINT)
+        previous_handler = signal.getsignal(signal.SIGINT)
 
         def stop(*_: Any) -> None:
             self.stops = True
-            signal.signal(signal.SIGINT, before)
+            signal.signal(signal.SIGINT, previous_handler)
 
         signal.signal(signal.SIGINT, stop)
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, before)
+            signal.signal(signal.SIGINT, previous_handler)
 
 
 def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
     """Return the CasADi function of the Hessian of the Lagrangian by the scaled variables, upper triangle."""
     hessian = Hessian(program)
-    first, second = (
+    row_factors, column_factors = (
         search.factors[np.array(indices, dtype=int)] for indices in hessian.sparsity.get_triplet()
     )
     # Names and order of these arguments are CasADi's signature of the function hess_lag.
@@ -455,11 +462,13 @@ def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
         "lam_g": _make_dense_column(len(program.labels)),
     }
 
-    def law(x: Array, *rest: Array) -> tuple[Any, ...]:
+    def law(x: Array, *multiplier_arguments: Array) -> tuple[Any, ...]:
         return (
-            hessian.compute_entries(search.unscale(x), float(rest[-2][0]), rest[-1])
-            * first
-            * second,
+            hessian.compute_entries(
+                search.unscale(x), float(multiplier_arguments[-2][0]), multiplier_arguments[-1]
+            )
+            * row_factors
+            * column_factors,
         )
 
     return _ArrayCallback("nlp_hess_l", inputs, {"hess_gamma_x_x": hessian.sparsity}, law)

@@ -87,7 +87,7 @@ class VariableLayout:
         }
         self.shared: int = 2 + len(problem.parameters)
         ranges = [*problem.times, *problem.parameters.values()]
-        lower, upper = ([each[k] for each in ranges] for k in range(2))
+        lower, upper = ([variable_range[k] for variable_range in ranges] for k in range(2))
         self.point_indices: list[Any] = []
         self.indices = {
             kind: np.full((len(grid.fractions), len(self.names[kind])), -1)
@@ -98,20 +98,20 @@ class VariableLayout:
         size = self.shared
         end = len(grid.fractions) - 1
         limits = {
-            kind: np.array([[b.within, b.first, b.last] for b in items])
-            for kind, items in self.bounds.items()
+            kind: np.array([[b.within, b.first, b.last] for b in group_bounds])
+            for kind, group_bounds in self.bounds.items()
         }
         for point in range(len(grid.fractions)):
-            first = size
+            first_index = size
             # Bounds at the start and at the end replace those over the motion.
             column = 1 if point == 0 else 2 if point == end else 0
-            for kind, items in limits.items():
-                if len(items) and self.has_kind(kind, point):
-                    lows.append(items[:, column, 0])
-                    highs.append(items[:, column, 1])
-                    self.indices[kind][point] = np.arange(size, size + len(items))
-                    size += len(items)
-            self.point_indices.append(np.arange(first, size))
+            for kind, group_bounds in limits.items():
+                if len(group_bounds) and self.has_kind(kind, point):
+                    lows.append(group_bounds[:, column, 0])
+                    highs.append(group_bounds[:, column, 1])
+                    self.indices[kind][point] = np.arange(size, size + len(group_bounds))
+                    size += len(group_bounds)
+            self.point_indices.append(np.arange(first_index, size))
         self.lower = np.concatenate(lows)
         self.upper = np.concatenate(highs)
         self._check_bounds()
@@ -124,8 +124,10 @@ class VariableLayout:
         """
         # The negation also catches NaN.
         for index in np.flatnonzero(~(self.lower <= self.upper))[:1]:
-            span = f"from {self.lower[index]:g} to {self.upper[index]:g}"
-            message = f"all bounds of '{self.describe_variable(index)}' exclude each other ({span})"
+            range_text = f"from {self.lower[index]:g} to {self.upper[index]:g}"
+            message = (
+                f"all bounds of '{self.describe_variable(index)}' exclude each other ({range_text})"
+            )
             raise self.problem.invalid_error(self.problem.phase, message)
 
     def has_kind(self, kind: str, point: int) -> bool:
@@ -158,12 +160,14 @@ class VariableLayout:
         shift = np.zeros(len(self.lower))
         if not self.problem.solver.scale_variables_using_bounds:
             return scale, shift
-        pairs: list[Any] = [*enumerate([*self.problem.times, *self.problem.parameters.values()])]
+        indexed_ranges: list[Any] = [
+            *enumerate([*self.problem.times, *self.problem.parameters.values()])
+        ]
         for kind in VARIABLE_KINDS:
-            for column, item in zip(self.indices[kind].T, self.bounds[kind], strict=True):
-                pairs.append((column[column >= 0], item.within))
-        for indices, (low, high) in pairs:
-            scale[indices], shift[indices] = compute_scaling(low, high)
+            for column, bounds in zip(self.indices[kind].T, self.bounds[kind], strict=True):
+                indexed_ranges.append((column[column >= 0], bounds.within))
+        for indices, (lower, upper) in indexed_ranges:
+            scale[indices], shift[indices] = compute_scaling(lower, upper)
         return scale, shift
 
     def make_guess(self) -> Array:
@@ -182,14 +186,16 @@ class VariableLayout:
         result = self.make_guess()
         times = trajectory.times
         result[:2] = times[0], times[-1]
-        at = times[0] + self.problem.grid.fractions * (times[-1] - times[0])
+        grid_times = times[0] + self.problem.grid.fractions * (times[-1] - times[0])
         for kind in VARIABLE_KINDS:
             for number, name in enumerate(self.names[kind]):
                 # Files hold no states before projection; the projected ones are near them.
                 column = trajectory.columns.get(name.removesuffix(PROJECTION_SUFFIX))
                 if column is not None:
                     indices = self.indices[kind][:, number]
-                    result[indices[indices >= 0]] = _resample(times, column, at)[indices >= 0]
+                    result[indices[indices >= 0]] = _resample(times, column, grid_times)[
+                        indices >= 0
+                    ]
         for number, name in enumerate(self.problem.parameters):
             if name in trajectory.parameters:
                 result[2 + number] = trajectory.parameters[name]
@@ -206,21 +212,23 @@ class VariableLayout:
         return ""
 
 
-def _resample(times: Array, column: Array, at: Array) -> Array:
+def _resample(times: Array, column: Array, new_times: Array) -> Array:
     """Interpolate a column: by a natural spline of fifth degree as Moco, linearly with few times.
 
     Args:
         times: times (n,), s.
         column: values (n,); those that are not finite are skipped.
-        at: times of the result (m,), s.
+        new_times: times of the result (m,), s.
 
     Returns:
         Values at these times (m,).
     """
     # On the same grid the values are kept, so that a solution evaluates to what was written.
-    if len(times) == len(at) and np.allclose(times, at, rtol=0.0, atol=1e-12):
+    if len(times) == len(new_times) and np.allclose(times, new_times, rtol=0.0, atol=1e-12):
         return column
-    known = np.isfinite(column)
-    if known.sum() < MIN_SPLINE_TIMES:
-        return np.interp(at, times[known], column[known])
-    return SampledCurves(times[known], column[known][:, None]).derivatives(at, (0,))[0][:, 0]
+    is_known = np.isfinite(column)
+    if is_known.sum() < MIN_SPLINE_TIMES:
+        return np.interp(new_times, times[is_known], column[is_known])
+    return SampledCurves(times[is_known], column[is_known][:, None]).derivatives(new_times, (0,))[
+        0
+    ][:, 0]

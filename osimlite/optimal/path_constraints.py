@@ -87,29 +87,31 @@ def build_frame_distance_rows(
     Raises:
         DocumentError: a frame does not exist, or the distances of a pair exclude each other.
     """
-    pairs = []
+    paths_of_pairs = []
     limits = []
-    for pair in constraint.frame_pairs:
-        ends = str(pair.frame1_path), str(pair.frame2_path)
-        for path in ends:
+    for frame_pair in constraint.frame_pairs:
+        frame_paths = str(frame_pair.frame1_path), str(frame_pair.frame2_path)
+        for path in frame_paths:
             problem.check_name(constraint, path, problem.functions.mechanism.frames, "frame")
-        near = pair.minimum_distance
-        far = pair.maximum_distance
-        if not 0.0 <= near <= far:
+        minimum = frame_pair.minimum_distance
+        maximum = frame_pair.maximum_distance
+        if not 0.0 <= minimum <= maximum:
             raise problem.invalid_error(
                 constraint,
-                f"minimum_distance {near:g} m and maximum_distance {far:g} m exclude each other",
+                f"minimum_distance {minimum:g} m and maximum_distance {maximum:g} m exclude each other",
             )
-        pairs.append(ends)
+        paths_of_pairs.append(frame_paths)
         # A squared distance has a slope everywhere, unlike the distance at zero.
-        limits.append((near * near, far * far))
+        limits.append((minimum * minimum, maximum * maximum))
     project = make_projection(constraint, problem)
 
     def formula(point: PointSymbols) -> Formula:
-        offsets = (point.frame(end).position - point.frame(start).position for start, end in pairs)
+        offsets = (
+            point.frame(end).position - point.frame(start).position for start, end in paths_of_pairs
+        )
         return casadi.vertcat(*(casadi.sumsqr(project(offset)) for offset in offsets))
 
-    labels = [f"{constraint.name} of {start} and {end}" for start, end in pairs]
+    labels = [f"{constraint.name} of {start} and {end}" for start, end in paths_of_pairs]
     return ConstraintRows(labels, formula, limits)
 
 
@@ -133,9 +135,13 @@ def build_bound_rows(
     Raises:
         DocumentError: the constraint has no function, or a wrong set of them.
     """
-    ends = [("lower_bound", (0.0, math.inf)), ("upper_bound", (-math.inf, 0.0))]
-    functions = [(getattr(constraint, name), limits) for name, limits in ends]
-    functions = [pair for pair in functions if pair[0] is not None]
+    bound_limits = [("lower_bound", (0.0, math.inf)), ("upper_bound", (-math.inf, 0.0))]
+    functions = [(getattr(constraint, name), limits) for name, limits in bound_limits]
+    functions = [
+        function_and_limits
+        for function_and_limits in functions
+        if function_and_limits[0] is not None
+    ]
     if not functions:
         raise problem.invalid_error(constraint, "lower_bound or upper_bound is required")
     if constraint.equality_with_lower:
@@ -157,7 +163,11 @@ def build_bound_rows(
 
     def formula(point: PointSymbols) -> Formula:
         return casadi.vertcat(
-            *(variable(point, path) - point.evaluate(each) for path in paths for each in series)
+            *(
+                variable(point, path) - point.evaluate(bound_series)
+                for path in paths
+                for bound_series in series
+            )
         )
 
     labels = [f"{constraint.name} of {path}" for path in paths for _ in functions]

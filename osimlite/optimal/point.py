@@ -35,18 +35,20 @@ class TimeFunction:
     values: Callable[[Array], Array]
     factor: int | None = None
 
-    def expand(self, t: Formula, known: Formula) -> Formula:
+    def expand(self, t: Formula, time_data: Formula) -> Formula:
         """Return the value by a Taylor expansion about the time ``known[0]``.
 
         The expansion is renewed for each time, so that value and both derivatives are exact there.
 
         Args:
             t: time, s.
-            known: data of the functions of time, see :class:`PointSymbols`.
+            time_data: data of the functions of time, see :class:`PointSymbols`.
         """
-        first = 1 + 3 * self.number
-        since = t - known[0]
-        return known[first] + since * (known[first + 1] + 0.5 * since * known[first + 2])
+        first_datum = 1 + 3 * self.number
+        time_difference = t - time_data[0]
+        return time_data[first_datum] + time_difference * (
+            time_data[first_datum + 1] + 0.5 * time_difference * time_data[first_datum + 2]
+        )
 
 
 class FrameSymbols(NamedTuple):
@@ -151,13 +153,13 @@ class PointSymbols:
             values = values if isinstance(values, tuple) else (values,)
             self._outputs.update(zip(functions.outputs.name_out(), values, strict=True))
         labels = functions.output_names[name]
-        return {label: self._outputs[name][place] for place, label in enumerate(labels)}
+        return {label: self._outputs[name][index] for index, label in enumerate(labels)}
 
     def frame(self, path: str) -> FrameSymbols:
         """Return the pose and velocity of a frame of the model by its path."""
-        found = self.problem.functions.frames([path])(self.t, self.x, self.p)
+        outputs = self.problem.functions.frames([path])(self.t, self.x, self.p)
         # Each frame is a column of nine numbers, the rotation matrix column by column.
-        return FrameSymbols(found[0], casadi.reshape(found[1], 3, 3), *found[2:])
+        return FrameSymbols(outputs[0], casadi.reshape(outputs[1], 3, 3), *outputs[2:])
 
     def acceleration(self, frame: FrameSymbols) -> Formula:
         """Return the acceleration of the origin of a frame in ground (3, 1), m/s²."""
@@ -248,12 +250,12 @@ def make_integral_terms(
 
 
 def make_projection(
-    part: MocoContactTrackingGoal | MocoFrameDistanceConstraint, problem: Problem
+    owner: MocoContactTrackingGoal | MocoFrameDistanceConstraint, problem: Problem
 ) -> Callable[[Formula], Formula]:
     """Return the function that projects vectors in ground (3, 1) by the property ``projection``.
 
     Args:
-        part: goal or constraint with the property.
+        owner: goal or constraint with the property.
         problem: problem of the study, for messages.
 
     Returns:
@@ -263,14 +265,16 @@ def make_projection(
     Raises:
         DocumentError: the projection has no direction.
     """
-    if part.projection == "none":
+    if owner.projection == "none":
         return lambda vector: vector
-    if part.projection_vector is None or not any(part.projection_vector):
-        raise problem.invalid_error(part, "projection requires a nonzero projection_vector")
-    direction = casadi.DM(np.array(part.projection_vector) / np.linalg.norm(part.projection_vector))
+    if owner.projection_vector is None or not any(owner.projection_vector):
+        raise problem.invalid_error(owner, "projection requires a nonzero projection_vector")
+    direction = casadi.DM(
+        np.array(owner.projection_vector) / np.linalg.norm(owner.projection_vector)
+    )
 
     def project(vector: Formula) -> Formula:
         on_line = casadi.dot(vector, direction) * direction
-        return on_line if part.projection == "vector" else vector - on_line
+        return on_line if owner.projection == "vector" else vector - on_line
 
     return project

@@ -102,8 +102,8 @@ class PointFormula:
         s = SX.sym("s", layout.shared)
         z = SX.sym("z", size)
         fraction = SX.sym("fraction")
-        known = SX.sym("known", program.known_size)
-        point = program.point(s, z, fraction, known, number)
+        time_data = SX.sym("known", program.known_size)
+        point = program.point(s, z, fraction, time_data, number)
         # Rates are per fraction of the motion, as the duration may vary.
         duration = s[1] - s[0]
         names, residuals = problem.dynamics.compute_residuals(point)
@@ -135,18 +135,19 @@ class PointFormula:
         # Eliminate common subexpressions before differentiating: afterwards it takes ten times as
         # long and finds fewer.
         implicit, equations = (
-            casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.linear_systems)) for k in range(2)
+            casadi.vertcat(SX(0, 1), *(system_pair[k] for system_pair in point.linear_systems))
+            for k in range(2)
         )
         self.labels = labels
         self.limits = limits
         self.rows = column.numel()
-        parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
-        self._inputs = [s, z, fraction, known]
+        simplified = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
+        self._inputs = [s, z, fraction, time_data]
         self._variables = casadi.vertcat(s, z)
         self._implicit = implicit
-        self._column = parts[: self.rows]
-        self._equations = parts[self.rows :]
-        slopes = casadi.jacobian(parts, casadi.vertcat(self._variables, implicit))
+        self._column = simplified[: self.rows]
+        self._equations = simplified[self.rows :]
+        slopes = casadi.jacobian(simplified, casadi.vertcat(self._variables, implicit))
         width = self._variables.numel()
         jacobian = slopes[: self.rows, :width]
         self._slope_by_implicit = slopes[: self.rows, width:]
@@ -248,7 +249,8 @@ class PointGroup:
         self.rows = formula.rows
         self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
         self.value, self.slope = (
-            BufferedFunction(each.map(len(numbers))) for each in (formula.value, formula.slope)
+            BufferedFunction(function.map(len(numbers)))
+            for function in (formula.value, formula.slope)
         )
 
     def evaluate(self, program: Program, w: Array, fractions: Array, z: Array) -> Array:

@@ -49,25 +49,27 @@ RELATIVE_ZERO = 1e-13
 """Fraction of the largest number below which a number counts as zero."""
 
 
-def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
+def read_position_motion(position_motion: PositionMotion, model: Model) -> Motion | str:
     """Return the motion of all coordinates of a PositionMotion.
 
     Args:
-        part: PositionMotion of the model.
+        position_motion: PositionMotion of the model.
         model: model.
 
     Returns:
         The motion; instead the path of the first coordinate without a function if one has none.
     """
-    functions: dict[str, Any] = {item.name: item for item in part.functions.objects}
+    functions: dict[str, Any] = {item.name: item for item in position_motion.functions.objects}
     paths = [info.path for info in build_mechanism(model).coordinates]
     missing = next((path for path in paths if path not in functions), None)
     if missing is not None:
         return missing
-    own = [convert_function(functions[path], 1, f"the function of '{path}'") for path in paths]
+    coordinate_functions = [
+        convert_function(functions[path], 1, f"the function of '{path}'") for path in paths
+    ]
 
     def motion(times: Array) -> Array:
-        return np.stack([sample_function(item, times) for item in own], axis=2)
+        return np.stack([sample_function(item, times) for item in coordinate_functions], axis=2)
 
     return motion
 
@@ -108,35 +110,37 @@ class PrescribedMotion:
         )
         self._path_geometry = StaticOptimization(model, self.mechanism, **options)
         tree = model.tree()
-        actuators = [item for item in model.components(Actuator) if item.appliesForce]
-        self._paths = [tree.path_of(item) or "" for item in actuators]
-        own = [_name_on_bench(k) for k in range(len(actuators))]
+        actuators = [actuator for actuator in model.components(Actuator) if actuator.appliesForce]
+        self._paths = [tree.path_of(actuator) or "" for actuator in actuators]
+        bench_names = [_name_on_bench(k) for k in range(len(actuators))]
         # Paths of the model contain slashes and may repeat names, so that the bench has names of
         # its own.
-        self.bench = make_casadi_model(build_test_bench(actuators, own))
+        self.bench = make_casadi_model(build_test_bench(actuators, bench_names))
         size = len(self.bench.coordinates)
-        known = dict(zip(own, self._paths, strict=True))
+        model_path_by_name = dict(zip(bench_names, self._paths, strict=True))
         self.states = self.system_states = tuple(
-            _rename_to_model(name, known) for name in self.bench.states[2 * size :]
+            _rename_to_model(name, model_path_by_name) for name in self.bench.states[2 * size :]
         )
-        self.controls = tuple(_rename_to_model(name, known) for name in self.bench.controls)
+        self.controls = tuple(
+            _rename_to_model(name, model_path_by_name) for name in self.bench.controls
+        )
         # The coordinates of the bench may have another order than the actuators.
         names = [path.rpartition("/")[2] for path in self.bench.coordinates]
-        self.carriages = [names.index(name) for name in own]
+        self.carriages = [names.index(name) for name in bench_names]
         self.path_names = tuple(self._paths)
-        self.is_muscle = [isinstance(item, Muscle) for item in actuators]
+        self.is_muscle = [isinstance(actuator, Muscle) for actuator in actuators]
         self.moving = self._force_balance.moving
         self.constraint_count = self._force_balance.equation_count
         self.numbers = cache_last(self._tabulate_numbers)
-        self._model_paths = known
+        self._model_paths = model_path_by_name
         self._model = model
         self._folder = folder
 
     def list_forces(self) -> list[tuple[str, Any]]:
         """Return the forces on the bench with their paths in the model."""
         return [
-            (_rename_to_model(item.path, self._model_paths), item)
-            for item in self.bench.forces.elements
+            (_rename_to_model(element.path, self._model_paths), element)
+            for element in self.bench.forces.elements
         ]
 
     @property
@@ -163,12 +167,17 @@ class PrescribedMotion:
             Numbers (t, k).
         """
         values, speeds, accelerations = self._motion(times)
-        needed, *matrices = self._force_balance.compute_balance(
+        required_forces, *matrices = self._force_balance.compute_balance(
             times, values, speeds, accelerations
         )
         lengths, rates = self._path_geometry.compute_path_lengths(times, values, speeds)
         return np.hstack(
-            [lengths, rates, needed, *(item.reshape(len(times), -1) for item in matrices)]
+            [
+                lengths,
+                rates,
+                required_forces,
+                *(matrix.reshape(len(times), -1) for matrix in matrices),
+            ]
         )
 
     @cached_property
@@ -176,9 +185,9 @@ class PrescribedMotion:
         """CasADi functions of the model in which the control of each actuator is its force, N or N m."""
         model = self._model.copy_deep()
         forces: Any = model.force_set.objects
-        for index, item in enumerate(forces):
-            if isinstance(item, ScalarActuator) and item.appliesForce:
-                forces[index] = make_ideal_actuator(item, 1.0) or item
+        for index, force in enumerate(forces):
+            if isinstance(force, ScalarActuator) and force.appliesForce:
+                forces[index] = make_ideal_actuator(force, 1.0) or force
         return make_casadi_model(model, folder=self._folder)
 
     def compute_linear_response(self, function: Callable[..., Any], times: Array) -> Array:
@@ -196,22 +205,24 @@ class PrescribedMotion:
         force_model = self.force_model
         infos = [info.path for info in self.mechanism.coordinates]
         order = [infos.index(path) for path in force_model.coordinates]
-        values, speeds, accelerations = (part[:, order].T for part in self._motion(times))
+        values, speeds, accelerations = (
+            motion_values[:, order].T for motion_values in self._motion(times)
+        )
         x = np.tile(force_model.x[:, None], len(times))
         x[: 2 * len(order)] = np.vstack([values, speeds])
         xdot = np.zeros_like(x)
         xdot[: 2 * len(order)] = np.vstack([speeds, accelerations])
         indices = [force_model.controls.index(path) for path in self._paths]
         count = len(self._paths)
-        found = []
+        responses = []
         # A linear function is known by its value without forces and with each force alone.
         for unit in np.eye(1 + count + self.constraint_count):
             u = np.zeros(len(force_model.controls))
             u[indices] = unit[1 : 1 + count]
-            found.append(np.array(function(times[None], x, xdot, u, [], unit[1 + count :])))
+            responses.append(np.array(function(times[None], x, xdot, u, [], unit[1 + count :])))
         # Less the value without forces, which every row contains.
-        found[1:] = [item - found[0] for item in found[1:]]
-        return np.vstack(found).T
+        responses[1:] = [response - responses[0] for response in responses[1:]]
+        return np.vstack(responses).T
 
     def tabulate_states(self, times: Array) -> dict[str, Array]:
         """Tabulate values and speeds of all coordinates.
@@ -224,12 +235,12 @@ class PrescribedMotion:
         """
         values, speeds, _ = self._motion(times)
         infos = self.mechanism.coordinates
-        own = (
-            (f"{info.path}/{what}", rows[:, k])
+        columns = (
+            (f"{info.path}/{quantity}", rows[:, k])
             for k, info in enumerate(infos)
-            for what, rows in (("value", values), ("speed", speeds))
+            for quantity, rows in (("value", values), ("speed", speeds))
         )
-        return dict(own)
+        return dict(columns)
 
 
 class PrescribedDynamics(Dynamics):
@@ -249,15 +260,15 @@ class PrescribedDynamics(Dynamics):
         # No accelerations vary, whatever multibody_dynamics_mode says, as in Moco.
         self.is_implicit, self._first_rate = False, 0
         # The numbers of the motion are tabulated once, at the times of the grid.
-        if any(low != high for low, high in problem.times):
+        if any(lower != upper for lower, upper in problem.times):
             raise problem.unsupported_error(
                 problem.phase, "initial and final time must be fixed with a prescribed motion"
             )
-        given: PrescribedMotion = self.functions
+        prescribed_motion: PrescribedMotion = self.functions
         start = problem.times[0][0]
         end = problem.times[1][0]
         self._times = start + problem.grid.fractions * (end - start)
-        self._entries = self._add_series(given.numbers)
+        self._entries = self._add_series(prescribed_motion.numbers)
 
     def _add_series(self, numbers: Callable[[Array], Array]) -> list[TimeFunction | None]:
         """Add functions of time for numbers that change along the motion.
@@ -270,11 +281,15 @@ class PrescribedDynamics(Dynamics):
         Returns:
             Function of time for each number; None for one that is zero at all times.
         """
-        found = numbers(self._times)
-        matters = np.abs(found).max(axis=0) > RELATIVE_ZERO * np.abs(found).max()
+        motion_numbers = numbers(self._times)
+        significant = (
+            np.abs(motion_numbers).max(axis=0) > RELATIVE_ZERO * np.abs(motion_numbers).max()
+        )
         return [
-            self.problem.add_time_function(partial(_sample_column, numbers, k)) if own else None
-            for k, own in enumerate(matters)
+            self.problem.add_time_function(partial(_sample_column, numbers, k))
+            if is_significant
+            else None
+            for k, is_significant in enumerate(significant)
         ]
 
     def list_forces(self) -> list[tuple[str, Any]]:
@@ -293,9 +308,9 @@ class PrescribedDynamics(Dynamics):
         count = len(self.functions.path_names)
         return self._select_entries(point, 0, count), self._select_entries(point, count, count)
 
-    def _select_entries(self, point: PointSymbols, first: int, count: int) -> Formula:
-        """Return the column of `count` numbers of the motion from the index `first` on."""
-        return _stack_series(point, self._entries[first : first + count])
+    def _select_entries(self, point: PointSymbols, first_index: int, count: int) -> Formula:
+        """Return the column of `count` numbers of the motion from the index `first_index` on."""
+        return _stack_series(point, self._entries[first_index : first_index + count])
 
     def _compute_bench_residual(self, point: PointSymbols) -> Formula:
         """Compute the residual of the test bench with all rates at zero.
@@ -339,21 +354,31 @@ class PrescribedDynamics(Dynamics):
         """
         names, errors = self.tendons.compute_residuals(point, point.derivatives)
         count = len(self.functions.path_names)
-        moving = self.functions.moving
-        first = 2 * count + len(moving)
-        size = count * len(moving)
-        needed = self._select_entries(point, 2 * count, len(moving))
+        free_coordinates = self.functions.moving
+        first_entry = 2 * count + len(free_coordinates)
+        size = count * len(free_coordinates)
+        required_forces = self._select_entries(point, 2 * count, len(free_coordinates))
         # CasADi fills matrices column by column, so that rows of the table become columns; hence
         # the transpose.
-        pushes = casadi.reshape(self._select_entries(point, first, size), count, -1).T
-        bound = casadi.reshape(
-            self._select_entries(point, first + size, point.multipliers.numel() * len(moving)),
-            len(moving),
+        actuator_matrix = casadi.reshape(
+            self._select_entries(point, first_entry, size), count, -1
+        ).T
+        constraint_jacobian = casadi.reshape(
+            self._select_entries(
+                point, first_entry + size, point.multipliers.numel() * len(free_coordinates)
+            ),
+            len(free_coordinates),
             -1,
         )
         # Multipliers push with -Gᵀ multipliers here, as in StaticOptimization.
-        rows = needed - pushes @ self._compute_actuator_forces(point) + bound @ point.multipliers
-        return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
+        rows = (
+            required_forces
+            - actuator_matrix @ self._compute_actuator_forces(point)
+            + constraint_jacobian @ point.multipliers
+        )
+        return [*(f"{name} residual" for name in free_coordinates), *names], casadi.vertcat(
+            rows, errors
+        )
 
     def make_joint_load(
         self, path: str, side: str, frame: str
@@ -366,13 +391,15 @@ class PrescribedDynamics(Dynamics):
             frame: as for :meth:`Dynamics.make_joint_load`.
         """
         load = self.functions.force_model.joint_load(path, side)
-        turned = self.functions.force_model.frames([frame])
+        compute_frame = self.functions.force_model.frames([frame])
 
         def function(t: Any, x: Any, xdot: Any, u: Any, p: Any, multipliers: Any) -> Any:
-            turn = np.array(turned(t, x, p)[1]).T.reshape(-1, 3, 3)
-            force, moment = (np.array(part) for part in load(t, x, xdot, u, p, multipliers))
+            rotation = np.array(compute_frame(t, x, p)[1]).T.reshape(-1, 3, 3)
+            force, moment = (np.array(vectors) for vectors in load(t, x, xdot, u, p, multipliers))
             # CasADi flattens matrices column by column.
-            return np.vstack([np.einsum("tij,jt->it", turn, part) for part in (moment, force)])
+            return np.vstack(
+                [np.einsum("tij,jt->it", rotation, vectors) for vectors in (moment, force)]
+            )
 
         return self._make_linear_formula(function, 6)
 
@@ -385,10 +412,10 @@ class PrescribedDynamics(Dynamics):
             pushing: as for :meth:`Dynamics.make_generalized_forces`.
             coordinates: as for :meth:`Dynamics.make_generalized_forces`.
         """
-        missing = self.functions.force_model.generalized_forces(pushing)
+        compute_forces = self.functions.force_model.generalized_forces(pushing)
         rows = [self.functions.force_model.coordinates.index(path) for path in coordinates]
         return self._make_linear_formula(
-            lambda *given: np.array(missing(*given[:-1]))[rows], len(rows)
+            lambda *arguments: np.array(compute_forces(*arguments[:-1]))[rows], len(rows)
         )
 
     def _make_linear_formula(
@@ -406,8 +433,10 @@ class PrescribedDynamics(Dynamics):
 
         def formula(point: PointSymbols) -> Formula:
             # 1 multiplies the value without forces.
-            given = casadi.vertcat(1.0, self._compute_actuator_forces(point), point.multipliers)
-            return casadi.reshape(_stack_series(point, entries), size, -1) @ given
+            forces_and_multipliers = casadi.vertcat(
+                1.0, self._compute_actuator_forces(point), point.multipliers
+            )
+            return casadi.reshape(_stack_series(point, entries), size, -1) @ forces_and_multipliers
 
         return formula
 
@@ -441,8 +470,8 @@ def _sample_column(numbers: Callable[[Array], Array], number: int, times: Array)
     The derivatives are zero: the times of a prescribed motion are fixed, and no others are
     evaluated.
     """
-    found = numbers(times)[:, number]
-    return np.stack([found, np.zeros_like(found), np.zeros_like(found)])
+    column = numbers(times)[:, number]
+    return np.stack([column, np.zeros_like(column), np.zeros_like(column)])
 
 
 def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
@@ -456,7 +485,7 @@ def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
         The model; body, coordinate and force of each actuator have its name.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
-    for item, name in zip(actuators, names, strict=True):
+    for actuator, name in zip(actuators, names, strict=True):
         body = Body(
             name=name, mass=1.0, mass_center=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
         )
@@ -468,20 +497,20 @@ def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
         # A path of length zero would have no direction.
         slider.coordinates[0].default_value = 1.0
         model.add(slider)
-        if isinstance(item, Muscle):
-            own: Any = item.copy_deep()
-            own.geometry_path = GeometryPath(name="path")
+        if isinstance(actuator, Muscle):
+            bench_force: Any = actuator.copy_deep()
+            bench_force.geometry_path = GeometryPath(name="path")
             for end, frame in enumerate(("/ground", f"/bodyset/{name}")):
-                own.geometry_path.path_point_set.objects.append(
+                bench_force.geometry_path.path_point_set.objects.append(
                     PathPoint(name=f"p{end}", socket_parent_frame=frame)
                 )
-        elif isinstance(item, ActivationCoordinateActuator):
-            own = item.copy_deep()
-            own.coordinate = name
+        elif isinstance(actuator, ActivationCoordinateActuator):
+            bench_force = actuator.copy_deep()
+            bench_force.coordinate = name
         else:
-            own = CoordinateActuator(coordinate=name, optimal_force=item.optimal_force)
-        own.name = name
-        model.add(own)
+            bench_force = CoordinateActuator(coordinate=name, optimal_force=actuator.optimal_force)
+        bench_force.name = name
+        model.add(bench_force)
     return model
 
 
@@ -490,7 +519,7 @@ def _name_on_bench(number: int) -> str:
     return f"bench{number}"
 
 
-def _rename_to_model(path: str, known: Mapping[str, str]) -> str:
+def _rename_to_model(path: str, model_path_by_name: Mapping[str, str]) -> str:
     """Return a path on the bench as a path of the model."""
-    _, _, name, *rest = path.split("/")
-    return "/".join([known[name], *rest])
+    _, _, name, *suffix_names = path.split("/")
+    return "/".join([model_path_by_name[name], *suffix_names])

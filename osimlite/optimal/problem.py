@@ -128,7 +128,9 @@ class Problem(StudyContext):
         # A PositionMotion makes the coordinates functions of time, so that only actuators vary.
         motion = motion or self._remove_motion()
         self.components = {
-            part.path: part for part in self.model.walk() if isinstance(part, Component)
+            component.path: component
+            for component in self.model.walk()
+            if isinstance(component, Component)
         }
         self._check_components()
         self.loads: list[TimeFunction] = []
@@ -137,7 +139,7 @@ class Problem(StudyContext):
             for parameter in self.phase.parameters
         }
         self.functions: Any = self._make_functions(
-            [path for owned in paths.values() for path in owned], motion
+            [path for property_paths in paths.values() for path in property_paths], motion
         )
         if not self.functions.states:
             raise self.invalid_error(self.phase, "the model has no states")
@@ -146,12 +148,14 @@ class Problem(StudyContext):
             for parameter in self.phase.parameters
         }
         # A parameter may stand for several equal numbers of the model.
-        self.parameter_owners = [index for index, owned in enumerate(paths.values()) for _ in owned]
+        self.parameter_owners = [
+            index for index, property_paths in enumerate(paths.values()) for _ in property_paths
+        ]
         self._add_scale_factors()
         # OpenSim has no controls of actuators that do not act.
-        acting = [name for name in self.functions.controls if self._is_acting(name)]
-        self._check_infos(acting)
-        self.controls = find_control_bounds(self.phase, acting, self.components)
+        active_controls = [name for name in self.functions.controls if self._is_acting(name)]
+        self._check_infos(active_controls)
+        self.controls = find_control_bounds(self.phase, active_controls, self.components)
         self.states = find_state_bounds(
             self.phase, self.functions.states, self.components, self.controls
         )
@@ -170,20 +174,20 @@ class Problem(StudyContext):
     # --------------------------------------------------------------------------------------- for goals and tools
     def find_weights(
         self,
-        part: Object,
+        owner: Object,
         by_name: MocoWeightSet,
         by_pattern: MocoWeightSet | None,
         names: Sequence[str],
-        what: str,
+        noun: str,
     ) -> list[float]:
         """Find the weights of names: by name, else by the last pattern that matches, else 1.
 
         Args:
-            part: goal, for messages.
+            owner: goal, for messages.
             by_name: weights by name.
             by_pattern: weights by pattern; None if the goal has no such property.
             names: names that need a weight.
-            what: what the names stand for, for messages.
+            noun: what the names stand for, for messages.
 
         Returns:
             Weight of each name.
@@ -193,7 +197,7 @@ class Problem(StudyContext):
         """
         weight_by_name = {weight.name: weight.weight for weight in by_name.objects}
         for name in weight_by_name:
-            self.check_name(part, name, names, what)
+            self.check_name(owner, name, names, noun)
         result = dict.fromkeys(names, 1.0)
         for weight in by_pattern.objects if by_pattern is not None else ():
             matches = self.compile_pattern(weight, weight.name)
@@ -235,9 +239,9 @@ class Problem(StudyContext):
         if not parameter.component_paths:
             raise self.invalid_error(parameter, "component_paths is required")
         element = parameter.property_element
-        behind = "" if element is None else f"/{element}"
+        suffix = "" if element is None else f"/{element}"
         return [
-            f"{str(path).rstrip('/')}/{parameter.property_name}{behind}"
+            f"{str(path).rstrip('/')}/{parameter.property_name}{suffix}"
             for path in parameter.component_paths
         ]
 
@@ -274,11 +278,11 @@ class Problem(StudyContext):
         Returns:
             The motion, or None if the model has no enabled PositionMotion.
         """
-        for part in list(self.model.components(PositionMotion)):
-            if part.default_enabled:
-                path = part.path
-                motion = read_position_motion(part, self.model)
-                self.model.remove(part)
+        for position_motion in list(self.model.components(PositionMotion)):
+            if position_motion.default_enabled:
+                path = position_motion.path
+                motion = read_position_motion(position_motion, self.model)
+                self.model.remove(position_motion)
                 if isinstance(motion, str):
                     raise self.invalid_error(
                         self.phase, f"PositionMotion '{path}' has no function for '{motion}'"
@@ -301,12 +305,17 @@ class Problem(StudyContext):
             except SettingError as error:
                 # The error of the model names a path; the parameter with this path is what the user
                 # wrote.
-                owners = (
-                    part
-                    for part in self.phase.parameters
-                    if any(f"'{path}'" in error.message for path in self.list_parameter_paths(part))
+                faulty_parameters = (
+                    parameter
+                    for parameter in self.phase.parameters
+                    if any(
+                        f"'{path}'" in error.message
+                        for path in self.list_parameter_paths(parameter)
+                    )
                 )
-                raise self.invalid_error(next(owners, self.phase), error.message) from None
+                raise self.invalid_error(
+                    next(faulty_parameters, self.phase), error.message
+                ) from None
             self.loads = [
                 self.add_time_function(partial(sample_function, load)) for load in functions.loads
             ]
@@ -320,17 +329,20 @@ class Problem(StudyContext):
 
     def _check_components(self) -> None:
         """Check the model for locked coordinates, controllers and joints that Moco or osimlite refuses."""
-        for part in self.components.values():
-            if isinstance(part, Coordinate) and part.locked:
+        for component in self.components.values():
+            if isinstance(component, Coordinate) and component.locked:
                 raise self.invalid_error(
                     self.phase,
-                    f"{part.path} is locked, which Moco rejects; use a WeldJoint instead",
+                    f"{component.path} is locked, which Moco rejects; use a WeldJoint instead",
                 )
-            if isinstance(part, Controller) and part.enabled:
-                message = f"the model's {type(part).tag} '{part.path}' sets controls, which is not supported; remove it"
+            if isinstance(component, Controller) and component.enabled:
+                message = f"the model's {type(component).tag} '{component.path}' sets controls, which is not supported; remove it"
                 raise self.unsupported_error(self.phase, message)
-            if type(part).tag in JOINTS_WITHOUT_RATES:
-                message = f"{type(part).tag} '{part.path}' has speeds other than the rates of its coordinates, which Moco rejects"
+            if type(component).tag in JOINTS_WITHOUT_RATES:
+                message = (
+                    f"{type(component).tag} '{component.path}' has speeds other than the rates of its "
+                    "coordinates, which Moco rejects"
+                )
                 raise self.invalid_error(self.phase, f"{message}; use a CustomJoint")
 
     def _check_settings(self) -> None:
@@ -353,7 +365,7 @@ class Problem(StudyContext):
             raise self.invalid_error(
                 solver, "minimize_lagrange_multipliers requires a model with constraints"
             )
-        for name, is_active, weight, part, bounds in (
+        for name, is_active, weight, selection, bounds in (
             (
                 "multipliers",
                 solver.minimize_lagrange_multipliers,
@@ -379,14 +391,14 @@ class Problem(StudyContext):
         ):
             if is_active:
                 # Moco's costs are squares of the scaled variables.
-                by = (
+                scaling = (
                     compute_scaling(*(read_range(bounds) or FREE))
                     if solver.scale_variables_using_bounds
                     else (1.0, 0.0)
                 )
                 yield (
                     MocoControlGoal(name=name, weight=weight),
-                    make_integral_terms(partial(_sum_scaled_squares, part, by)),
+                    make_integral_terms(partial(_sum_scaled_squares, selection, scaling)),
                 )
         if solver.minimize_state_projection_distance and self.uses_projection:
             goal = MocoControlGoal(
@@ -400,8 +412,8 @@ class Problem(StudyContext):
         Args:
             control: path of the actuator, with the suffix of the control if it has several.
         """
-        owner: Any = self.components.get(control) or self.components[control.rpartition("_")[0]]
-        return bool(owner.appliesForce)
+        actuator: Any = self.components.get(control) or self.components[control.rpartition("_")[0]]
+        return bool(actuator.appliesForce)
 
     def _check_infos(self, controls: Sequence[str]) -> None:
         """Check the names and patterns of the study's entries for states and controls.
@@ -411,12 +423,12 @@ class Problem(StudyContext):
         """
         for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
             self.compile_pattern(pattern, pattern.name)
-        for infos, known, what in (
+        for infos, known_names, variable_type in (
             (self.phase.state_infos, self.functions.states, "state"),
             (self.phase.control_infos, controls, "control"),
         ):
             for info in infos:
-                self.check_name(info, info.name, known, what)
+                self.check_name(info, info.name, known_names, variable_type)
         for info in (*self.phase.input_control_infos, *self.phase.input_control_infos_pattern):
             raise self.unsupported_error(info, "input controls are not supported")
 
@@ -432,11 +444,18 @@ class Problem(StudyContext):
         if not isinstance(self.functions, PrescribedMotion):
             self._check_constraint_method(count)
         # OpenSim counts the constraints that lock or prescribe coordinates first.
-        coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
+        coordinates = [
+            coordinate
+            for coordinate in self.components.values()
+            if isinstance(coordinate, Coordinate)
+        ]
         # Each coordinate has a lock, and one more constraint if it has a prescribed function.
-        first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
+        first_number = sum(
+            1 + (coordinate.prescribed_function is not None) for coordinate in coordinates
+        )
         return [
-            f"cid{first + number}_p{row}" for number, row in _number_equations(self.model, count)
+            f"cid{first_number + number}_p{row}"
+            for number, row in _number_equations(self.model, count)
         ]
 
     def _check_constraint_method(self, count: int) -> None:
@@ -468,9 +487,9 @@ class Problem(StudyContext):
         solver = self.solver
         intervals = len(solver.mesh) or solver.num_mesh_intervals
         # Checked before anything is allocated, as a typing error would use up the memory.
-        most = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
-        if intervals > most:
-            message = f"the mesh has {intervals} intervals; the maximum for this model is {most}"
+        maximum = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
+        if intervals > maximum:
+            message = f"the mesh has {intervals} intervals; the maximum for this model is {maximum}"
             raise self.invalid_error(solver, message)
         if not solver.mesh:
             return np.linspace(0.0, 1.0, solver.num_mesh_intervals + 1)
@@ -489,11 +508,13 @@ class Problem(StudyContext):
         if build is None:
             raise self.unsupported_error(goal, "this class of goals is not supported yet")
         self._factors = {self._scaled[factor.name]: factor.name for factor in goal.scale_factors}
-        first = len(self.time_functions)
+        first_function = len(self.time_functions)
         terms = build(goal, self)
-        used = [item.factor for item in self.time_functions[first:]]
+        used_factors = [
+            time_function.factor for time_function in self.time_functions[first_function:]
+        ]
         for factor in goal.scale_factors:
-            if [*self.parameters].index(factor.name) not in used:
+            if [*self.parameters].index(factor.name) not in used_factors:
                 raise self.invalid_error(
                     factor, f"the goal tracks no column '{self._scaled[factor.name]}'"
                 )
@@ -567,16 +588,18 @@ def _compute_projection_distance(point: PointSymbols) -> Formula:
     return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
 
 
-def _sum_scaled_squares(part: str | slice, by: tuple[float, float], point: PointSymbols) -> Formula:
+def _sum_scaled_squares(
+    selection: str | slice, scaling: tuple[float, float], point: PointSymbols
+) -> Formula:
     """Return the sum of squares of scaled multipliers or derivatives that are variables.
 
     Args:
-        part: "multipliers", or the slice of the derivatives.
-        by: factor and offset of the scaling.
+        selection: "multipliers", or the slice of the derivatives.
+        scaling: factor and offset of the scaling.
         point: point of the grid.
     """
-    column = point.multipliers if isinstance(part, str) else point.derivatives[part]
-    return casadi.sumsqr((column - by[1]) / by[0])
+    column = point.multipliers if isinstance(selection, str) else point.derivatives[selection]
+    return casadi.sumsqr((column - scaling[1]) / scaling[0])
 
 
 def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
@@ -592,9 +615,11 @@ def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
     # Other classes have one equation.
     sizes = {"WeldConstraint": 6, "PointConstraint": 3}
     rows: list[tuple[int, int]] = []
-    constraints: Mapping[str, Any] = {part.path: part for part in model.constraint_set.objects}
-    enforced = [part for part in constraints.values() if part.isEnforced]
-    for number, part in enumerate(enforced):
-        rows += [(number, row) for row in range(sizes.get(type(part).tag, 1))]
+    constraints: Mapping[str, Any] = {
+        constraint.path: constraint for constraint in model.constraint_set.objects
+    }
+    enforced = [constraint for constraint in constraints.values() if constraint.isEnforced]
+    for number, constraint in enumerate(enforced):
+        rows += [(number, row) for row in range(sizes.get(type(constraint).tag, 1))]
     # A constraint with another number of equations: their names count them one by one then.
     return rows if len(rows) == count else [(row, 0) for row in range(count)]

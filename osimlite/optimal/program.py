@@ -72,10 +72,10 @@ class Program:
         # Points between nodes have no constraint errors, and maybe no path constraints: other
         # formulas.
         groups = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
-        inside = (
+        has_rows_between_nodes = (
             problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
         )
-        if inside and not problem.has_constraints:
+        if has_rows_between_nodes and not problem.has_constraints:
             # Without such rows all points have the same formulas, which one call evaluates.
             groups = [[*points]]
         if problem.uses_projection:
@@ -89,42 +89,44 @@ class Program:
         self._map_ends()
 
     # --------------------------------------------------------------------------------------------- formulas
-    def point(self, s: Any, z: Any, fraction: Any, known: Any, number: int) -> PointSymbols:
+    def point(self, s: Any, z: Any, fraction: Any, time_data: Any, number: int) -> PointSymbols:
         """Return the formulas at a point of the grid, which hold for all points with the same variables.
 
         Args:
             s: symbols of the times and the parameters.
             z: symbols of the variables of the point.
             fraction: fraction of time, from 0 to 1.
-            known: symbols of the data of the functions of time.
+            time_data: symbols of the data of the functions of time.
             number: index of the point.
 
         Returns:
             Point whose controls are zero where the actuator does not act.
         """
-        parts = {}
-        first = 0
+        variables = {}
+        first_index = 0
         for kind in VARIABLE_KINDS:
             count = len(self.layout.names[kind]) if self.layout.has_kind(kind, number) else 0
-            parts[kind] = z[first : first + count]
-            first += count
-        parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
+            variables[kind] = z[first_index : first_index + count]
+            first_index += count
+        parameters = [s[2 + parameter_index] for parameter_index in self.problem.parameter_owners]
         u = SX(len(self.problem.functions.controls), 1)
         # Controls that do not vary stay structural zeros, which CasADi leaves out of formulas.
-        u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = parts["controls"]
+        u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = variables[
+            "controls"
+        ]
         t = s[0] + fraction * (s[1] - s[0])
         return PointSymbols(
             problem=self.problem,
-            t=casadi.vertcat(t, *(series.expand(t, known) for series in self.problem.loads)),
-            x=parts["states"],
+            t=casadi.vertcat(t, *(series.expand(t, time_data) for series in self.problem.loads)),
+            x=variables["states"],
             u=u,
-            multipliers=parts["multipliers"],
-            derivatives=parts["derivatives"],
-            slacks=parts["slacks"],
-            projections=parts["projections"],
+            multipliers=variables["multipliers"],
+            derivatives=variables["derivatives"],
+            slacks=variables["slacks"],
+            projections=variables["projections"],
             p=casadi.vertcat(*parameters) if parameters else SX(0, 1),
             parameters=s[2:],
-            known=known,
+            known=time_data,
         )
 
     def _make_ends(self) -> None:
@@ -132,14 +134,14 @@ class Program:
         problem = self.problem
         layout = self.layout
         size = layout.shared
-        last = len(layout.point_indices) - 1
+        last_point = len(layout.point_indices) - 1
         s = SX.sym("s", size)
         z0 = SX.sym("z0", len(layout.point_indices[0]))
-        z1 = SX.sym("z1", len(layout.point_indices[last]))
+        z1 = SX.sym("z1", len(layout.point_indices[last_point]))
         totals = SX.sym("integrals", len(self.integrals))
-        known = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
-        start = self.point(s, z0, SX(0.0), known[0], 0)
-        end = self.point(s, z1, SX(1.0), known[1], last)
+        time_data = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
+        start = self.point(s, z0, SX(0.0), time_data[0], 0)
+        end = self.point(s, z1, SX(1.0), time_data[1], last_point)
         costs = []
         rows = []
         self.costs: list[str] = []
@@ -147,17 +149,20 @@ class Program:
         limits: list[tuple[float, float]] = []
         for goal, terms in problem.goals:
             # By identity: goals may be equal.
-            indices = [k for k, pair in enumerate(self.integrals) if pair[0] is goal]
-            ends = Endpoints(start, end, totals[indices[0]] if indices else None)
-            value = SX(terms.value(ends))
+            indices = [k for k, integral in enumerate(self.integrals) if integral[0] is goal]
+            endpoints = Endpoints(start, end, totals[indices[0]] if indices else None)
+            value = SX(terms.value(endpoints))
             if (goal.mode or terms.modes[0]) == "cost":
                 # The values of an endpoint constraint are errors of either sign.
                 value = value**2 if terms.modes[0] != "cost" else value
-                costs.append(goal.weight * casadi.sum1(self._divide_value(goal, value, ends)))
+                costs.append(goal.weight * casadi.sum1(self._divide_value(goal, value, endpoints)))
                 self.costs.append(goal.name)
                 continue
-            rows.append(self._divide_value(goal, value, ends))
-            bounds = [read_range(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
+            rows.append(self._divide_value(goal, value, endpoints))
+            bounds = [
+                read_range(end_formula) or (0.0, 0.0)
+                for end_formula in goal.moco_constraint_info.bounds
+            ]
             # A goal such as the periodicity has one value per pair, and its bounds are one range
             # per value.
             count = rows[-1].numel()
@@ -167,7 +172,7 @@ class Program:
             self.end_labels += [
                 goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)
             ]
-        arguments = [s, z0, z1, totals, *known]
+        arguments = [s, z0, z1, totals, *time_data]
         cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
         end_rows = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
         # Accelerations at the ends are eliminated, as E is small and evaluated once.
@@ -175,31 +180,34 @@ class Program:
             factors = casadi.ldl(casadi.jacobian(equations, symbol))
             solution = casadi.ldl_solve(-casadi.substitute(equations, symbol, 0), *factors)
             cost, end_rows = casadi.substitute([cost, end_rows], [symbol], [solution])
-        both = casadi.vertcat(s, z0, z1, totals)
+        end_variables = casadi.vertcat(s, z0, z1, totals)
         total = casadi.sum1(cost)
         multipliers = SX.sym("multipliers", end_rows.numel())
         factor = SX.sym("factor")
         self.end_columns = np.concatenate(
-            [np.arange(size), layout.point_indices[0], layout.point_indices[last]]
+            [np.arange(size), layout.point_indices[0], layout.point_indices[last_point]]
         )
         lagrangian = factor * total + casadi.dot(multipliers, end_rows)
         self._end_value = BufferedFunction(casadi.Function("E", arguments, [cost, end_rows]))
         # Dense, as E depends on few variables; the pattern below tells which entries can be
         # nonzero.
-        slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, end_rows)]
+        slopes = [
+            casadi.densify(casadi.jacobian(end_formula, end_variables))
+            for end_formula in (total, end_rows)
+        ]
         self._end_slope = BufferedFunction(casadi.Function("dE", arguments, slopes))
         self._end_pattern = np.array(
-            casadi.DM(casadi.jacobian(end_rows, both).sparsity(), 1.0).full(), dtype=bool
+            casadi.DM(casadi.jacobian(end_rows, end_variables).sparsity(), 1.0).full(), dtype=bool
         )
-        hessian = casadi.hessian(lagrangian, both)[0]
+        hessian = casadi.hessian(lagrangian, end_variables)[0]
         self._end_hessian_pattern = np.array(casadi.DM(hessian.sparsity(), 1.0).full(), dtype=bool)
         self._end_curvature = BufferedFunction(
             casadi.Function("HE", [*arguments, factor, multipliers], [casadi.densify(hessian)])
         )
         self.labels += self.end_labels
         self.times = np.append(self.times, np.full(len(self.end_labels), np.nan))
-        self.lower = np.append(self.lower, [low for low, _ in limits])
-        self.upper = np.append(self.upper, [high for _, high in limits])
+        self.lower = np.append(self.lower, [lower for lower, _ in limits])
+        self.upper = np.append(self.upper, [upper for _, upper in limits])
 
     def _divide_value(self, goal: Any, value: Any, ends: Endpoints) -> Any:
         """Return the value of a goal after its divisions by displacement, duration and mass.
@@ -231,9 +239,11 @@ class Program:
         self._assemble_integrals(entries_b, starts)
         size = self._row_count + len(self.integrals)
 
-        def make_matrix(parts: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
+        def make_matrix(entry_groups: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
             rows, columns, values = (
-                np.concatenate([np.ravel(part[k]) for part in parts]) if parts else np.zeros(0)
+                np.concatenate([np.ravel(entries[k]) for entries in entry_groups])
+                if entry_groups
+                else np.zeros(0)
                 for k in range(3)
             )
             return SparseMatrix.from_entries(rows, columns, values, (size, width))
@@ -272,18 +282,18 @@ class Program:
         points = np.array([grid.get_points(interval) for interval in range(interval_count)])
         labels = [f"{name} defect" for name in states] * len(scheme.states)
         labels += [f"{name} between nodes" for name in controls] * len(lines)
-        first = len(labels) * np.arange(interval_count)[:, None]
+        first_row = len(labels) * np.arange(interval_count)[:, None]
         state_range = np.arange(count)
-        for number, pair in enumerate(zip(scheme.states, scheme.rates, strict=True)):
-            rows = first + number * count + state_range
-            for k, (state_factor, rate_factor) in enumerate(zip(*pair, strict=True)):
+        for number, factors in enumerate(zip(scheme.states, scheme.rates, strict=True)):
+            rows = first_row + number * count + state_range
+            for k, (state_factor, rate_factor) in enumerate(zip(*factors, strict=True)):
                 variables = layout.indices["states"][points[:, k]]
                 results = state_range
                 if projected and k == len(points[0]) - 1:
                     # The interval ends at the states before projection, whose rates follow those of
                     # the projected states among the results of F.
-                    ends = layout.indices["projections"][points[:, k]]
-                    variables = np.hstack([ends, variables[:, projected:]])
+                    indices_before_projection = layout.indices["projections"][points[:, k]]
+                    variables = np.hstack([indices_before_projection, variables[:, projected:]])
                     results = np.concatenate(
                         [count + state_range[:projected], state_range[projected:]]
                     )
@@ -291,10 +301,10 @@ class Program:
                     entries_a.append((rows, variables, np.full(rows.shape, state_factor)))
                 if rate_factor:
                     # F contains rates times the duration of the motion; the interval is a fraction.
-                    each = np.broadcast_to(grid.lengths[:, None] * rate_factor, rows.shape)
-                    entries_b.append((rows, starts[points[:, k]][:, None] + results, each))
+                    weights = np.broadcast_to(grid.lengths[:, None] * rate_factor, rows.shape)
+                    entries_b.append((rows, starts[points[:, k]][:, None] + results, weights))
         for number, line in enumerate(lines):
-            rows = first + len(scheme.states) * count + number * len(controls)
+            rows = first_row + len(scheme.states) * count + number * len(controls)
             rows = rows + np.arange(len(controls))
             for k in np.flatnonzero(line).tolist():
                 variables = layout.indices["controls"][points[:, k]]
@@ -323,16 +333,16 @@ class Program:
         count = len(self.layout.names["states"])
         for group in self.groups:
             size = len(group.labels) * len(group.numbers)
-            each = np.arange(len(group.labels))
+            row_indices = np.arange(len(group.labels))
             # The results of F are rates, rates before projection, these rows, and integrands.
-            results = starts[group.numbers][:, None] + count + group.projected + each
+            results = starts[group.numbers][:, None] + count + group.projected + row_indices
             entries_b.append((row + np.arange(size), results, np.ones(size)))
             fractions = self.problem.grid.fractions[group.numbers]
             self.labels += group.labels * len(group.numbers)
             self.times = np.append(self.times, np.repeat(fractions, len(group.labels)))
             limits = group.limits * len(group.numbers)
-            self.lower = np.append(self.lower, [low for low, _ in limits])
-            self.upper = np.append(self.upper, [high for _, high in limits])
+            self.lower = np.append(self.lower, [lower for lower, _ in limits])
+            self.upper = np.append(self.upper, [upper for _, upper in limits])
             row += size
         return row
 
@@ -364,23 +374,23 @@ class Program:
         Returns:
             Rows and columns in the program of each entry.
         """
-        first = []
-        second = []
+        row_arrays = []
+        column_arrays = []
         for group, start in zip(self.groups, self._offsets, strict=False):
-            r = getattr(group, rows)
-            c = getattr(group, columns)
+            local_rows = getattr(group, rows)
+            local_columns = getattr(group, columns)
             count = len(group.numbers)
             variables = np.hstack(
                 [np.tile(np.arange(self.layout.shared), (count, 1)), group.columns]
             )
             numbers = (
-                start + group.rows * np.arange(count)[:, None] + r
+                start + group.rows * np.arange(count)[:, None] + local_rows
                 if rows == "jacobian_rows"
-                else variables[:, r]
+                else variables[:, local_rows]
             )
-            first.append(numbers.ravel())
-            second.append(variables[:, c].ravel())
-        return np.concatenate(first), np.concatenate(second)
+            row_arrays.append(numbers.ravel())
+            column_arrays.append(variables[:, local_columns].ravel())
+        return np.concatenate(row_arrays), np.concatenate(column_arrays)
 
     def _map_jacobian(self) -> None:
         """Make the sparse map from the Jacobians of the points to that of A w + B F, and the part of A."""
@@ -388,20 +398,20 @@ class Program:
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
         # An entry of a point's Jacobian appears once in each row of B F that contains its result of
         # F.
-        spread = self._b.select_columns(rows.astype(np.int64))
+        point_entries = self._b.select_columns(rows.astype(np.int64))
         constant = self._a
         keys = np.concatenate(
             [
-                spread.rows * np.int64(width) + columns[spread.columns],
+                point_entries.rows * np.int64(width) + columns[point_entries.columns],
                 constant.rows * np.int64(width) + constant.columns,
             ]
         )
         # One integer per place of the Jacobian: entries of several points, and of A, at one place
         # are added.
         unique, inverse = np.unique(keys, return_inverse=True)
-        count = len(spread.rows)
+        count = len(point_entries.rows)
         self._jacobian_map = SparseMatrix.from_entries(
-            inverse[:count], spread.columns, spread.values, (len(unique), len(rows))
+            inverse[:count], point_entries.columns, point_entries.values, (len(unique), len(rows))
         )
         self._jacobian_constant = np.bincount(
             inverse[count:], weights=constant.values, minlength=len(unique)
@@ -480,10 +490,17 @@ class Program:
 
     def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
         """Return the arguments of E for variables w and integrals `totals`."""
-        known = self._sample_time_functions(w[:2])
-        first = self.layout.point_indices[0]
-        last = self.layout.point_indices[-1]
-        return [w[: self.layout.shared], w[first], w[last], totals, known[0], known[1]]
+        time_data = self._sample_time_functions(w[:2])
+        first_variables = self.layout.point_indices[0]
+        last_variables = self.layout.point_indices[-1]
+        return [
+            w[: self.layout.shared],
+            w[first_variables],
+            w[last_variables],
+            totals,
+            time_data[0],
+            time_data[1],
+        ]
 
     def compute_values(self, w: Array) -> tuple[Array, Array]:
         """Compute the parts of f, and g.
@@ -508,8 +525,8 @@ class Program:
             Gradient of f (n,), and the entries of the Jacobian of g in the order of
             `jacobian_sparsity`.
         """
-        gradient, ends, numbers, _ = self._compute_slopes(w)
-        entries = np.concatenate([numbers[self._of_g], ends[self._end_entries]])
+        gradient, end_jacobian, numbers, _ = self._compute_slopes(w)
+        entries = np.concatenate([numbers[self._of_g], end_jacobian[self._end_entries]])
         return gradient, entries[self._jacobian_order]
 
     def _compute_slopes(self, w: Array) -> tuple[Array, Array, Array, Array]:
@@ -528,10 +545,10 @@ class Program:
             self._jacobian_rows[is_integral] - self._row_count, self._jacobian_columns[is_integral]
         ] = numbers[is_integral]
         totals = self._compute_rows(w)[self._row_count :]
-        cost, end_slopes = (part.T for part in self._end_slope(*self._end_arguments(w, totals)))
+        cost, end_slopes = (matrix.T for matrix in self._end_slope(*self._end_arguments(w, totals)))
         # The chain rule: E depends on variables directly, and by the integrals.
         gradient = cost.ravel()[direct:] @ integrals
         gradient[self.end_columns] += cost.ravel()[:direct]
-        ends = end_slopes[:, direct:] @ integrals
-        ends[:, self.end_columns] += end_slopes[:, :direct]
-        return gradient, ends, numbers, integrals
+        end_jacobian = end_slopes[:, direct:] @ integrals
+        end_jacobian[:, self.end_columns] += end_slopes[:, :direct]
+        return gradient, end_jacobian, numbers, integrals

@@ -217,11 +217,11 @@ def split_intervals(grid: Grid, error: Array, tolerance: float) -> Array:
         Ends of the intervals of the new mesh, from 0 to 1.
     """
     order = 1 + int(grid.scheme.rates.any(axis=0).sum())
-    parts = np.ones(len(error), dtype=int)
+    part_counts = np.ones(len(error), dtype=int)
     large = error > tolerance
     # The error of an interval of length h is proportional to h ** order.
-    parts[large] = np.clip(np.ceil((error[large] / tolerance) ** (1.0 / order)), 2, MAX_PARTS)
-    lengths = np.repeat(grid.lengths / parts, parts)
+    part_counts[large] = np.clip(np.ceil((error[large] / tolerance) ** (1.0 / order)), 2, MAX_PARTS)
+    lengths = np.repeat(grid.lengths / part_counts, part_counts)
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1], [1.0]])
 
 
@@ -249,8 +249,8 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
     result[: layout.shared] = w[: layout.shared]
     for kind in VARIABLE_KINDS:
         indices = layout.indices[kind]
-        has = indices >= 0
-        result[indices[has]] = values[kind][has] if kind != "slacks" else 0.0
+        is_present = indices >= 0
+        result[indices[is_present]] = values[kind][is_present] if kind != "slacks" else 0.0
     return result
 
 
@@ -264,11 +264,11 @@ def _rebuild_program(problem: Problem, mesh: Array, hessian: str) -> Program:
     """
     # A shallow copy shares the model's functions and formulas; the solver's settings are the user's
     # and are copied.
-    other = copy(problem)
-    other.grid = Grid.from_mesh(problem.grid.scheme, mesh)
-    other.solver = problem.solver.copy_deep()
-    other.solver.optim_hessian_approximation = hessian
-    return Program(other)
+    refined_problem = copy(problem)
+    refined_problem.grid = Grid.from_mesh(problem.grid.scheme, mesh)
+    refined_problem.solver = problem.solver.copy_deep()
+    refined_problem.solver.optim_hessian_approximation = hessian
+    return Program(refined_problem)
 
 
 class _SolutionPolynomials:
@@ -292,14 +292,14 @@ class _SolutionPolynomials:
         self.grid = grid
         self.scheme = scheme
         # Legendre's schemes ignore the rates at some ends of an interval.
-        used = np.flatnonzero(scheme.rates.any(axis=0))
-        self.nodes = scheme.fractions[used]
+        node_indices = np.flatnonzero(scheme.rates.any(axis=0))
+        self.nodes = scheme.fractions[node_indices]
         points = np.array([grid.get_points(k) for k in range(len(grid.lengths))])
         count = len(layout.names["states"])
         rates = np.zeros((len(grid.fractions), count))
         for group in program.groups:
             rates[group.numbers] = group.value(*program._point_arguments(group, w))[0][:, :count]
-        self.rates = rates[points[:, used]]
+        self.rates = rates[points[:, node_indices]]
         self._lines = program.problem.solver.interpolate_control_mesh_interior_points
         self._values = {
             kind: w[layout.indices[kind]][points] for kind in VARIABLE_KINDS if kind != "slacks"
@@ -319,8 +319,8 @@ class _SolutionPolynomials:
         for kind, values in self._values.items():
             nodal = values[intervals]
             if kind == "states":
-                through = _integrate_basis(self.nodes, fractions)
-                change = np.einsum("nj,njs->ns", through, self.rates[intervals])
+                basis_integrals = _integrate_basis(self.nodes, fractions)
+                change = np.einsum("nj,njs->ns", basis_integrals, self.rates[intervals])
                 result[kind] = nodal[:, 0] + self.grid.lengths[intervals, None] * change
             # As the study interpolates controls between the nodes: by lines, or by the polynomial
             # of the scheme.

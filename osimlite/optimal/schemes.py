@@ -43,17 +43,24 @@ def make_scheme(name: str) -> Scheme:
     """
     if name == "trapezoidal":
         # x1 - x0 = h (f0 + f1) / 2.
-        half = np.array([0.5, 0.5])
+        weights = np.array([0.5, 0.5])
         return Scheme(
-            name, np.array([0.0, 1.0]), half, np.array([[-1.0, 1.0]]), -half[None], np.zeros((0, 2))
+            name,
+            np.array([0.0, 1.0]),
+            weights,
+            np.array([[-1.0, 1.0]]),
+            -weights[None],
+            np.zeros((0, 2)),
         )
     if name == "hermite-simpson":
         # Rows: the midpoint on Hermite's interpolant, and Simpson's rule over the interval.
-        between = [-0.5, 1.0, -0.5]
+        midpoint_row = [-0.5, 1.0, -0.5]
         simpson = np.array([1.0, 4.0, 1.0]) / 6.0
-        states = np.array([between, [-1.0, 0.0, 1.0]])
+        states = np.array([midpoint_row, [-1.0, 0.0, 1.0]])
         rates = np.array([[-0.125, 0.0, 0.125], -simpson])
-        return Scheme(name, np.array([0.0, 0.5, 1.0]), simpson, states, rates, np.array([between]))
+        return Scheme(
+            name, np.array([0.0, 0.5, 1.0]), simpson, states, rates, np.array([midpoint_row])
+        )
     family, _, degree = name.rpartition("-")
     return _make_legendre_scheme(name, int(degree), is_radau=family == "legendre-gauss-radau")
 
@@ -67,7 +74,9 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
         is_radau: whether the end of the interval is a collocation point (Radau).
     """
     roots = casadi.collocation_points(degree, "radau" if is_radau else "legendre")
-    slopes, end, weights = (np.array(part) for part in casadi.collocation_coeff(roots))
+    slopes, end, weights = (
+        np.array(coefficients) for coefficients in casadi.collocation_coeff(roots)
+    )
     count = degree + (1 if is_radau else 2)
     fractions = np.array([0.0, *roots] if is_radau else [0.0, *roots, 1.0])
     states = np.zeros((degree, count))
@@ -78,20 +87,20 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
     rates[:, 1 : degree + 1] = np.eye(degree)
     if not is_radau:
         # Gauss points exclude the end, whose state is that of the polynomial there.
-        last = np.zeros((1, count))
-        last[0, : degree + 1] = -end.ravel()
-        last[0, -1] = 1.0
-        states = np.vstack([states, last])
+        end_row = np.zeros((1, count))
+        end_row[0, : degree + 1] = -end.ravel()
+        end_row[0, -1] = 1.0
+        states = np.vstack([states, end_row])
         rates = np.vstack([rates, np.zeros((1, count))])
     # The quadrature is over the collocation points; the start of the interval has no weight.
     mean = np.zeros(count)
     mean[1 : degree + 1] = weights.ravel()
-    inner = fractions[1:-1]
-    controls = np.zeros((len(inner), count))
+    inner_fractions = fractions[1:-1]
+    controls = np.zeros((len(inner_fractions), count))
     # control(x) = (1 - x) first + x last at each inner point.
-    controls[:, 0] = inner - 1.0
-    controls[:, -1] = -inner
-    controls[:, 1:-1] += np.eye(len(inner))
+    controls[:, 0] = inner_fractions - 1.0
+    controls[:, -1] = -inner_fractions
+    controls[:, 1:-1] += np.eye(len(inner_fractions))
     return Scheme(name, fractions, mean, states, rates, controls)
 
 

@@ -41,16 +41,18 @@ class SimulationCheck:
     @property
     def matches_until(self) -> float:
         """Return the last time, s, up to which no coordinate differs by more than `MATCH_TOLERANCE`."""
-        far = np.flatnonzero(self.largest > MATCH_TOLERANCE)
-        return float(self.times[-1] if not len(far) else self.times[max(far[0] - 1, 0)])
+        mismatches = np.flatnonzero(self.largest > MATCH_TOLERANCE)
+        return float(
+            self.times[-1] if not len(mismatches) else self.times[max(mismatches[0] - 1, 0)]
+        )
 
     def __str__(self) -> str:
         """Return the summary line of the command ``run --simulate``."""
         at_end = {path: float(column[-1]) for path, column in self.apart.items()}
-        worst = max(at_end, key=lambda path: at_end[path])
+        worst_path = max(at_end, key=lambda path: at_end[path])
         return (
             f"within {MATCH_TOLERANCE:g} rad or m of it up to {self.matches_until:.4g} s of {self.times[-1]:.4g} s, "
-            f"{at_end[worst]:.2g} off at the end ({worst.rpartition('/')[2]})"
+            f"{at_end[worst_path]:.2g} off at the end ({worst_path.rpartition('/')[2]})"
         )
 
 
@@ -79,7 +81,7 @@ def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> Simulat
         raise OsimliteError(f"the motion {reason}")
     end = float(trajectory.times[-1])
     start = {name: float(trajectory.columns[name][0]) for name in trajectory.names["states"]}
-    run = simulate(
+    simulated = simulate(
         problem.model,
         end,
         accuracy=INTEGRATION_ACCURACY,
@@ -88,12 +90,14 @@ def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> Simulat
         controls=trajectory.table("controls"),
         folder=problem.folder,
     )
-    columns = {info.path: run.values[:, k] for k, info in enumerate(run.mechanism.coordinates)}
-    apart = {
+    columns = {
+        info.path: simulated.values[:, k] for k, info in enumerate(simulated.mechanism.coordinates)
+    }
+    differences = {
         path: np.abs(
-            np.interp(trajectory.times, run.times, columns[path])
+            np.interp(trajectory.times, simulated.times, columns[path])
             - trajectory.columns[f"{path}/value"]
         )
         for path in problem.functions.coordinates
     }
-    return SimulationCheck(trajectory.times, apart)
+    return SimulationCheck(trajectory.times, differences)

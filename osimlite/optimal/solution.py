@@ -141,8 +141,8 @@ def build_problem(
     if isinstance(study, MocoStudy):
         return Problem(study, folder=None if folder is None else Path(folder), scaled=scaled)
     with name_file_in_errors(study):
-        top: Any = read_document(Source.from_file(Path(study)), expected_class=MocoStudy).top
-        return Problem(top, Path(study), scaled=scaled)
+        study_object: Any = read_document(Source.from_file(Path(study)), of=MocoStudy).top
+        return Problem(study_object, Path(study), scaled=scaled)
 
 
 def solve_program(
@@ -182,8 +182,8 @@ def solve_program(
             program, start, Refinement.parse(refine), tell
         )
     # Rounds are empty without refinement.
-    iterations = sum(each.iterations for each in rounds) or result.iterations
-    duration = sum(each.duration for each in rounds) or result.duration
+    iterations = sum(mesh_round.iterations for mesh_round in rounds) or result.iterations
+    duration = sum(mesh_round.duration for mesh_round in rounds) or result.duration
     costs, rows = program.compute_values(result.w)
     terms = dict(zip(program.costs, costs.tolist(), strict=True))
     header = {
@@ -294,9 +294,11 @@ def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTraj
         pair = follows.get(name)
         if pair is None:
             # Continued by its increase, such as the distance travelled.
-            more = column + (column[-1] - column[0])
+            continuation = column + (column[-1] - column[0])
         else:
-            more = (-1.0 if pair.negate else 1.0) * trajectory.columns[pair.initial_variable]
-        columns[name] = np.concatenate([column, more[1:]])
+            continuation = (-1.0 if pair.negate else 1.0) * trajectory.columns[
+                pair.initial_variable
+            ]
+        columns[name] = np.concatenate([column, continuation[1:]])
     times = np.concatenate([trajectory.times, trajectory.times[1:] + (end - start)])
     return MocoTrajectory(times, columns, names, trajectory.parameters)

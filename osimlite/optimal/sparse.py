@@ -69,10 +69,10 @@ class SparseMatrix:
         starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))
         counts = (starts[1:] - starts[:-1])[indices]
         # In this order the entries of each column are adjacent.
-        first = np.repeat(
+        offsets = np.repeat(
             starts[:-1][indices] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
         )
-        selected = order[first + np.arange(counts.sum())]
+        selected = order[offsets + np.arange(counts.sum())]
         columns = np.repeat(np.arange(len(indices)), counts)
         return SparseMatrix.from_entries(
             self.rows[selected], columns, self.values[selected], (self.shape[0], len(indices))

@@ -69,7 +69,7 @@ class StudyContext:
         """
         return find_named_file(self.folder, name.strip())
 
-    def _locate_part(self, part: Object) -> dict[str, Any]:
+    def _locate_part(self, study_object: Object) -> dict[str, Any]:
         """Find a part of the study in its file.
 
         Objects know no lines, but their tags and names are in the text.
@@ -79,98 +79,117 @@ class StudyContext:
         """
         if self.file is None:
             return {}
-        tags = re.compile(rf"<{re.escape(_get_tag(part))}(\s[^>]*)?/?>")
-        named = re.compile(rf'name="{re.escape(part.name)}"')
+        tag_pattern = re.compile(rf"<{re.escape(_get_tag(study_object))}(\s[^>]*)?/?>")
+        name_pattern = re.compile(rf'name="{re.escape(study_object.name)}"')
         try:
             lines = read_file(self.file).decode("utf-8", "replace").splitlines()
         except OsimliteError:
             return {"file": str(self.file)}
-        found = [(number, text) for number, text in enumerate(lines, 1) if tags.search(text)]
-        found = [pair for pair in found if named.search(pair[1])] or found
-        return {"file": str(self.file), "line": found[0][0] if found else 1}
+        matches = [
+            (number, text) for number, text in enumerate(lines, 1) if tag_pattern.search(text)
+        ]
+        matches = [
+            numbered_line for numbered_line in matches if name_pattern.search(numbered_line[1])
+        ] or matches
+        return {"file": str(self.file), "line": matches[0][0] if matches else 1}
 
-    def unsupported_error(self, part: Object, reason: str) -> UnsupportedError:
+    def unsupported_error(self, study_object: Object, reason: str) -> UnsupportedError:
         """Return the error for a part that OpenSim accepts and osimlite does not support.
 
         Args:
-            part: part of the study.
+            study_object: part of the study.
             reason: what osimlite does not support, and what to do.
         """
-        name = f" '{part.name}'" if part.name else ""
-        return UnsupportedError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
+        name = f" '{study_object.name}'" if study_object.name else ""
+        return UnsupportedError(
+            f"{_get_tag(study_object)}{name}: {reason}", **self._locate_part(study_object)
+        )
 
-    def invalid_error(self, part: Object, reason: str) -> DocumentError:
+    def invalid_error(self, study_object: Object, reason: str) -> DocumentError:
         """Return the error for a part that is invalid.
 
         Args:
-            part: part of the study.
+            study_object: part of the study.
             reason: what is wrong, and what to do.
         """
-        name = f" '{part.name}'" if part.name else ""
-        return DocumentError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
+        name = f" '{study_object.name}'" if study_object.name else ""
+        return DocumentError(
+            f"{_get_tag(study_object)}{name}: {reason}", **self._locate_part(study_object)
+        )
 
     def check_name(
-        self, part: Object, name: str, known: Iterable[str], what: str, whose: str = "the model"
+        self,
+        study_object: Object,
+        name: str,
+        known_names: Iterable[str],
+        noun: str,
+        owner: str = "the model",
     ) -> None:
         """Check that a name is known; the error suggests the nearest known name.
 
         Args:
-            part: part of the study with the name, for the message.
+            study_object: part of the study with the name, for the message.
             name: name to check.
-            known: known names.
-            what: what the name stands for, for the message.
-            whose: owner of the known names, for the message.
+            known_names: known names.
+            noun: what the name stands for, for the message.
+            owner: owner of the known names, for the message.
 
         Raises:
             DocumentError: the name is unknown.
         """
-        known = [*known]
-        if name not in known:
+        known_names = [*known_names]
+        if name not in known_names:
             raise self.invalid_error(
-                part, f"{whose} has no {what} '{name}'{suggest_name(name, known)}"
+                study_object, f"{owner} has no {noun} '{name}'{suggest_name(name, known_names)}"
             )
 
-    def check_values(self, whole: Object) -> None:
+    def check_values(self, study_root: Object) -> None:
         """Check all parts of a study except its model for unknown classes and invalid values.
 
         Raises:
             DocumentError: a part is of an unknown class, or a value is invalid.
         """
-        for part in whole.walk():
-            if isinstance(part, Component) and part.model is not None:
+        for study_object in study_root.walk():
+            if isinstance(study_object, Component) and study_object.model is not None:
                 continue
-            if isinstance(part, Unknown):
-                near = (
-                    suggest_name(part.class_name, MODULES) if part.class_name not in MODULES else ""
+            if isinstance(study_object, Unknown):
+                suggestion = (
+                    suggest_name(study_object.class_name, MODULES)
+                    if study_object.class_name not in MODULES
+                    else ""
                 )
-                raise self.invalid_error(part, f"objects of this class are not allowed here{near}")
-            for spec in get_value_specs(type(part)):
-                value = getattr(part, spec.name)
-                for word in value if isinstance(value, tuple) else (value,):
-                    if spec.name in part.model_fields_set and (
-                        fault := _describe_invalid_value(spec, word)
+                raise self.invalid_error(
+                    study_object, f"objects of this class are not allowed here{suggestion}"
+                )
+            for spec in get_value_specs(type(study_object)):
+                value = getattr(study_object, spec.name)
+                for item_value in value if isinstance(value, tuple) else (value,):
+                    if spec.name in study_object.model_fields_set and (
+                        fault := _describe_invalid_value(spec, item_value)
                     ):
-                        raise self.invalid_error(part, f"{spec.tag} is {word!r}{fault}")
+                        raise self.invalid_error(
+                            study_object, f"{spec.tag} is {item_value!r}{fault}"
+                        )
                 if (
                     spec.name in ("bounds", "initial_bounds", "final_bounds")
                     and len(value)
                     and (value[0] == math.inf or value[-1] == -math.inf)
                 ):
-                    raise self.invalid_error(part, f"{spec.name} contain no finite value")
+                    raise self.invalid_error(study_object, f"{spec.name} contain no finite value")
                 if (
                     spec.name in ("bounds", "initial_bounds", "final_bounds")
                     and len(value) == 2
                     and value[0] > value[1]
                 ):
                     raise self.invalid_error(
-                        part, f"{spec.name} are reversed: from {value[0]:g} to {value[1]:g}"
+                        study_object, f"{spec.name} are reversed: from {value[0]:g} to {value[1]:g}"
                     )
 
-    def compile_pattern(self, part: Object, text: str) -> Callable[[str], Any]:
+    def compile_pattern(self, study_object: Object, text: str) -> Callable[[str], Any]:
         """Return the function that matches names against a pattern of the study.
 
         Args:
-            part: part of the study with the pattern, for messages.
+            study_object: part of the study with the pattern, for messages.
             text: pattern.
 
         Raises:
@@ -181,31 +200,37 @@ class StudyContext:
             return Pattern(text).fullmatch
         except UnsupportedPatternError as error:
             raise self.unsupported_error(
-                part, f"the pattern '{text}' is not supported: {error}"
+                study_object, f"the pattern '{text}' is not supported: {error}"
             ) from None
         except PatternError as error:
-            raise self.invalid_error(part, f"'{text}' is not a valid pattern: {error}") from None
+            raise self.invalid_error(
+                study_object, f"'{text}' is not a valid pattern: {error}"
+            ) from None
 
 
-def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
+def _describe_invalid_value(spec: FieldSpec, value: Any) -> str:
     """Return the end of the message on an invalid value of a property; empty if the value is valid.
 
     Args:
         spec: property.
-        word: its value, or one of its values.
+        value: its value, or one of its values.
     """
-    kind = spec.kind
-    if not isinstance(kind, Value) or word is None:
+    value_type = spec.kind
+    if not isinstance(value_type, Value) or value is None:
         return ""
-    if kind.choices and word not in kind.choices:
-        return f"; expected {join_words(map(repr, kind.choices))}{suggest_name(str(word), map(str, kind.choices))}"
-    if isinstance(word, float) and word != word:
+    if value_type.choices and value not in value_type.choices:
+        return f"; expected {join_words(map(repr, value_type.choices))}{suggest_name(str(value), map(str, value_type.choices))}"
+    if isinstance(value, float) and value != value:
         return ", which is not a number"
-    if kind.domain and kind.scalar in ("double", "int") and not make_domain_test(kind.domain)(word):
-        return f"; expected {kind.domain}"
+    if (
+        value_type.domain
+        and value_type.scalar in ("double", "int")
+        and not make_domain_test(value_type.domain)(value)
+    ):
+        return f"; expected {value_type.domain}"
     return ""
 
 
-def _get_tag(part: Object) -> str:
+def _get_tag(study_object: Object) -> str:
     """Return the XML tag of a part."""
-    return part.class_name if isinstance(part, Unknown) else type(part).tag
+    return study_object.class_name if isinstance(study_object, Unknown) else type(study_object).tag

@@ -38,12 +38,12 @@ TIME_TOLERANCE_S = 1e-6
 """Time, s, by which a motion may exceed the data that it tracks."""
 
 
-def read_reference(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
+def read_reference(problem: Problem, goal: Object, processor: TableProcessor) -> StoTable:
     """Read the reference table of a goal, with angles in rad.
 
     Args:
         problem: problem of the study.
-        part: goal with the processor, for messages; a table of `problem.tables` replaces the file.
+        goal: goal with the processor, for messages; a table of `problem.tables` replaces the file.
         processor: processor that names the file.
 
     Returns:
@@ -53,17 +53,17 @@ def read_reference(problem: Problem, part: Object, processor: TableProcessor) ->
         UnsupportedError: an operator of the processor is not supported here.
         OsimliteError: the file cannot be read.
     """
-    known_table = problem.tables.get(part.name)
+    known_table = problem.tables.get(goal.name)
     if known_table is not None:
         return known_table
     return process_table(
-        problem, part, processor, problem.functions.states, problem.functions.mechanism
+        problem, goal, processor, problem.functions.states, problem.functions.mechanism
     )
 
 
 def process_table(
     problem: StudyContext,
-    part: Object,
+    owner: Object,
     processor: TableProcessor,
     states: Sequence[str],
     mechanism: Mechanism,
@@ -72,7 +72,7 @@ def process_table(
 
     Args:
         problem: study, for its folder and messages.
-        part: part of the study with the processor, for messages.
+        owner: part of the study with the processor, for messages.
         processor: processor that names the file.
         states: paths of the model's states.
         mechanism: mechanism of the model.
@@ -85,7 +85,7 @@ def process_table(
         OsimliteError: the file cannot be read.
     """
     if not processor.filepath.strip():
-        raise problem.invalid_error(part, "a filepath is required")
+        raise problem.invalid_error(owner, "a filepath is required")
     table = read_table(problem.locate_file(processor.filepath))
     for operator in processor.operators:
         if isinstance(operator, TabOpLowPassFilter):
@@ -137,9 +137,9 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     if float(times[-1] - times[0]) / (len(times) - 1) - step > np.finfo(float).eps:
         # Resample at equal steps before the table is padded at both ends, in the order of OpenSim's
         # Storage.
-        even = times[0] + step * np.arange(int((times[-1] - times[0]) / step + 1e-9) + 1)
-        (rows,) = SampledCurves(times, rows).derivatives(even, (0,))
-        times = even
+        even_times = times[0] + step * np.arange(int((times[-1] - times[0]) / step + 1e-9) + 1)
+        (rows,) = SampledCurves(times, rows).derivatives(even_times, (0,))
+        times = even_times
     times, rows = filter_lowpass(times, rows, operator.cutoff_frequency)
     if operator.trim_to_original_time_range:
         # Times after resampling differ from the original ones by rounding.
@@ -165,21 +165,23 @@ def _append_coupled_values(
         mechanism: mechanism with the couplers.
     """
     paths = [f"{info.path}/value" for info in mechanism.coordinates]
-    for item in mechanism.constraints:
-        if not isinstance(item, Coupler):
+    for coupler in mechanism.constraints:
+        if not isinstance(coupler, Coupler):
             continue
-        if paths[item.dependent] in table.columns and not operator.overwrite_existing_columns:
+        if paths[coupler.dependent] in table.columns and not operator.overwrite_existing_columns:
             continue
-        independent = [paths[place] for place in item.independent]
+        independent = [paths[index] for index in coupler.independent]
         for name in independent:
-            problem.check_name(operator, name, table.columns, "column", whose="the table")
+            problem.check_name(operator, name, table.columns, "column", owner="the table")
         arguments = np.column_stack([table[name] for name in independent])
-        others = [k for k, name in enumerate(table.columns) if name != paths[item.dependent]]
+        kept_columns = [
+            k for k, name in enumerate(table.columns) if name != paths[coupler.dependent]
+        ]
         # Couplers are functions of rad and m, hence the refusal of degrees before.
-        values = [item.function.evaluate(row)[0] for row in arguments]
-        columns = (*(table.columns[k] for k in others), paths[item.dependent])
+        values = [coupler.function.evaluate(row)[0] for row in arguments]
+        columns = (*(table.columns[k] for k in kept_columns), paths[coupler.dependent])
         table = replace(
-            table, columns=columns, rows=np.column_stack([table.rows[:, others], values])
+            table, columns=columns, rows=np.column_stack([table.rows[:, kept_columns], values])
         )
     return table
 
@@ -204,8 +206,10 @@ def _convert_to_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
     if not table.in_degrees:
         return table
     angles = {info.path for info in mechanism.coordinates if info.unit == "rad"}
-    turns = [label in angles or label.rpartition("/")[0] in angles for label in table.columns]
-    return replace(table, rows=table.rows * np.where(turns, np.pi / 180.0, 1.0), in_degrees=False)
+    is_angle = [label in angles or label.rpartition("/")[0] in angles for label in table.columns]
+    return replace(
+        table, rows=table.rows * np.where(is_angle, np.pi / 180.0, 1.0), in_degrees=False
+    )
 
 
 def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[TimeFunction]:
@@ -223,13 +227,16 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
         DocumentError: a column is missing, has gaps, or does not cover the motion.
     """
     check_columns(table, columns)
-    first = float(table.times[0])
-    last = float(table.times[-1])
+    first_time = float(table.times[0])
+    last_time = float(table.times[-1])
     # The latest start and the earliest end: a motion with free times may stay within the data.
     start = problem.times[0][1]
     end = problem.times[1][0]
-    if start < first - TIME_TOLERANCE_S or end > last + TIME_TOLERANCE_S:
-        message = f"the table covers {first:g} s to {last:g} s, but the motion lasts at least from {start:g} s to {end:g} s"
+    if start < first_time - TIME_TOLERANCE_S or end > last_time + TIME_TOLERANCE_S:
+        message = (
+            f"the table covers {first_time:g} s to {last_time:g} s, but the motion lasts at least "
+            f"from {start:g} s to {end:g} s"
+        )
         raise DocumentError(message, file=table.file)
     curves = SplineCurves(
         table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:]

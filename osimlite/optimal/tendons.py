@@ -52,13 +52,13 @@ class TendonEquations:
         self.problem = problem
         self.muscles: list[tuple[str, SmoothMuscle, SmoothTendon]] = []
         for path, element in elements:
-            part = problem.components.get(path)
+            component = problem.components.get(path)
             if (
-                isinstance(part, DeGrooteFregly2016Muscle)
-                and part.tendon_compliance_dynamics_mode == mode
-                and not part.ignore_tendon_compliance
+                isinstance(component, DeGrooteFregly2016Muscle)
+                and component.tendon_compliance_dynamics_mode == mode
+                and not component.ignore_tendon_compliance
             ):
-                values = {type(each): each for each in element.values}
+                values = {type(muscle_part): muscle_part for muscle_part in element.values}
                 self.muscles.append((path, values[SmoothMuscle], values[SmoothTendon]))
         self.paths = [path for path, _, _ in self.muscles]
         self.names = [f"{path}/implicitderiv_normalized_tendon_force" for path in self.paths]
@@ -83,24 +83,24 @@ class TendonEquations:
         lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
         residual = make_symbolic(degroote_residual)
         for number, (path, muscle, tendon) in enumerate(self.muscles):
-            place = functions.path_names.index(path)
+            path_index = functions.path_names.index(path)
             force = point.state(f"{path}/normalized_tendon_force")
             activation = (
                 point.state(f"{path}/activation") if muscle.follows else point.control(path)
             )
             # Derivative of the tendon's length, the inverse of its exponential force curve, times
             # the rate of the force.
-            stretch = muscle.slack * rates[number] / (tendon.growth * (force + BELOW))
-            given = (
-                lengths[place],
-                speeds[place] - stretch,
+            tendon_speed = muscle.slack * rates[number] / (tendon.growth * (force + BELOW))
+            muscle_inputs = (
+                lengths[path_index],
+                speeds[path_index] - tendon_speed,
                 point.control(path),
                 activation,
                 0.0,
                 0.0,
                 force,
             )
-            rows.append(residual(force, MuscleInputs(*given), muscle, tendon))
+            rows.append(residual(force, MuscleInputs(*muscle_inputs), muscle, tendon))
         return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
 
     def compute_rate_errors(self, point: PointSymbols) -> Formula:
@@ -119,17 +119,19 @@ class TendonEquations:
         rows = [casadi.SX(0, 1)]
         lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
         for path, muscle, tendon in self.muscles:
-            place = functions.path_names.index(path)
+            path_index = functions.path_names.index(path)
             state = f"{path}/normalized_tendon_force"
             force = point.state(state)
             rate = point.rates[functions.states.index(state)]
             activation = (
                 point.state(f"{path}/activation") if muscle.follows else point.control(path)
             )
-            along = casadi.SX.sym("along")
+            fiber_along_tendon = casadi.SX.sym("along")
             # Pennate fibers keep their height normal to the tendon.
-            length = casadi.sqrt(along**2 + muscle.height**2)
-            fiber = speeds[place] - muscle.slack * rate / (tendon.growth * (force + BELOW))
+            length = casadi.sqrt(fiber_along_tendon**2 + muscle.height**2)
+            fiber_speed = speeds[path_index] - muscle.slack * rate / (
+                tendon.growth * (force + BELOW)
+            )
             velocity = casadi.SX.sym("velocity")
             active = activation * make_symbolic(degroote_active)(
                 length / muscle.optimal, muscle.scale
@@ -138,20 +140,24 @@ class TendonEquations:
                 length / muscle.optimal, tendon.passive_strain
             )
             springs = passive * muscle.passive + muscle.damping * velocity
-            borne = active * make_symbolic(degroote_factor)(velocity) + springs
+            fiber_force = active * make_symbolic(degroote_factor)(velocity) + springs
             # Differentiated for symbols that the present length and speed replace afterwards: the
             # speed counts as constant.
-            stiffness = casadi.jacobian(borne * along / length, along)
-            now = lengths[place] - muscle.slack * make_symbolic(smooth_tendon_length)(
-                force, tendon.growth
+            stiffness = casadi.jacobian(
+                fiber_force * fiber_along_tendon / length, fiber_along_tendon
             )
-            moves = (
-                fiber
-                * casadi.substitute(along / length, along, now)
+            present_length = lengths[path_index] - muscle.slack * make_symbolic(
+                smooth_tendon_length
+            )(force, tendon.growth)
+            present_velocity = (
+                fiber_speed
+                * casadi.substitute(fiber_along_tendon / length, fiber_along_tendon, present_length)
                 / (muscle.fastest * muscle.optimal)
             )
             stiffness = casadi.substitute(
-                stiffness, casadi.vertcat(along, velocity), casadi.vertcat(now, moves)
+                stiffness,
+                casadi.vertcat(fiber_along_tendon, velocity),
+                casadi.vertcat(present_length, present_velocity),
             )
-            rows.append(muscle.strength * (stiffness * fiber - rate))
+            rows.append(muscle.strength * (stiffness * fiber_speed - rate))
         return casadi.vertcat(*rows)

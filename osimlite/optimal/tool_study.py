@@ -57,12 +57,12 @@ def set_time_range(
         DocumentError: the tables have no data between the times of the tool, or the mesh is too
             fine.
     """
-    first = max(float(table.times[0]) for table in tables)
-    last = min(float(table.times[-1]) for table in tables)
-    start = first if tool.initial_time is None else tool.initial_time
-    end = last if tool.final_time is None else tool.final_time
-    if not first <= start < end <= last:
-        message = f"the tables cover {first:g} s to {last:g} s, not the motion from {start:g} s to {end:g} s"
+    first_time = max(float(table.times[0]) for table in tables)
+    last_time = min(float(table.times[-1]) for table in tables)
+    start = first_time if tool.initial_time is None else tool.initial_time
+    end = last_time if tool.final_time is None else tool.final_time
+    if not first_time <= start < end <= last_time:
+        message = f"the tables cover {first_time:g} s to {last_time:g} s, not the motion from {start:g} s to {end:g} s"
         raise context.invalid_error(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
     # For a tiny interval the quotient below would overflow.

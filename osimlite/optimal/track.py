@@ -52,7 +52,7 @@ def build_track_problem(
         UnsupportedError: the settings contain something that is not supported here.
         OsimliteError: the settings or their files are invalid.
     """
-    place = file.parent if file is not None else folder or Path(".")
+    base_folder = file.parent if file is not None else folder or Path(".")
     solver = MocoCasADiSolver(
         name="solver",
         # These settings are MocoTrack's own.
@@ -60,15 +60,17 @@ def build_track_problem(
         optim_constraint_tolerance=1e-2,
         optim_finite_difference_scheme="forward",
     )
-    study = make_study(tool, process_model(tool.model, place), solver)
+    study = make_study(tool, process_model(tool.model, base_folder), solver)
     phase = study.problem.phases
     # A problem without goals gives the names of states, and errors with their line.
-    bare = Problem(study, file, place)
+    problem_without_goals = Problem(study, file, base_folder)
     tables: dict[str, StoTable] = {}
-    states = bare.functions.states
-    mechanism = bare.functions.mechanism
+    states = problem_without_goals.functions.states
+    mechanism = problem_without_goals.functions.mechanism
     if tool.states_reference.filepath.strip():
-        table = process_table(bare, tool.states_reference, tool.states_reference, states, mechanism)
+        table = process_table(
+            problem_without_goals, tool.states_reference, tool.states_reference, states, mechanism
+        )
         if tool.track_reference_position_derivatives:
             # Speeds are tracked too, at derivatives of the splines through the values.
             table = _append_speeds(table)
@@ -80,17 +82,20 @@ def build_track_problem(
                 allow_unused_references=tool.allow_unused_references,
                 scale_weights_with_range=tool.scale_state_weights_with_range,
                 state_weights=MocoWeightSet(
-                    name="state_weights", objects=_find_state_weights(bare, tool, table)
+                    name="state_weights",
+                    objects=_find_state_weights(problem_without_goals, tool, table),
                 ),
             )
         )
     if tool.markers_reference.filepath.strip():
         tables["marker_tracking"] = process_table(
-            bare, tool.markers_reference, tool.markers_reference, (), mechanism
+            problem_without_goals, tool.markers_reference, tool.markers_reference, (), mechanism
         )
         phase.goals.append(_make_marker_goal(tool))
     if not tables:
-        raise bare.invalid_error(tool, "a states_reference or a markers_reference is required")
+        raise problem_without_goals.invalid_error(
+            tool, "a states_reference or a markers_reference is required"
+        )
     if tool.minimize_control_effort:
         weights = [weight.copy_deep() for weight in tool.controls_weight_set.objects]
         phase.goals.append(
@@ -100,20 +105,20 @@ def build_track_problem(
                 control_weights=MocoWeightSet(name="control_weights", objects=weights),
             )
         )
-    first, last = set_time_range(bare, tool, [*tables.values()], study)
+    start, end = set_time_range(problem_without_goals, tool, [*tables.values()], study)
     if more is not None:
         more(study)
     guess = None
     if tool.guess_file.strip():
-        guess = MocoTrajectory.read(bare.locate_file(tool.guess_file))
-    problem = Problem(study, file, place, tables, scaled=scaled)
+        guess = MocoTrajectory.read(problem_without_goals.locate_file(tool.guess_file))
+    problem = Problem(study, file, base_folder, tables, scaled=scaled)
     if tool.apply_tracked_states_to_guess and "state_tracking" in tables:
         table = tables["state_tracking"]
         # Moco spreads the rows evenly from the first time to the last, whatever their own times.
-        times = np.linspace(first, last, len(table.times))
+        times = np.linspace(start, end, len(table.times))
         states = {name: table[name] for name in table.columns if name in problem.states}
         if guess is not None:
-            raise bare.unsupported_error(
+            raise problem_without_goals.unsupported_error(
                 tool, "guess_file and apply_tracked_states_to_guess cannot be combined"
             )
         guess = MocoTrajectory(times, states, {"states": tuple(states)})
@@ -155,8 +160,8 @@ def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
     """Return the goal that tracks markers; markers without a weight have weight 1."""
     weights = [
         # The tool has MocoWeights, and the goal MarkerWeights.
-        MarkerWeight(name=item.name, weight=item.weight)
-        for item in tool.markers_weight_set.objects
+        MarkerWeight(name=marker_weight.name, weight=marker_weight.weight)
+        for marker_weight in tool.markers_weight_set.objects
     ]
     reference = MarkersReference(
         name="markers_reference",
@@ -172,12 +177,14 @@ def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
 
 def _append_speeds(table: StoTable) -> StoTable:
     """Return the table with derivatives of those coordinate values that have no speed column."""
-    pairs = [
+    value_and_speed_names = [
         (name, f"{name.removesuffix('/value')}/speed")
         for name in table.columns
         if name.endswith("/value")
     ]
-    missing = [(value, speed) for value, speed in pairs if speed not in table.columns]
+    missing = [
+        (value, speed) for value, speed in value_and_speed_names if speed not in table.columns
+    ]
     if not missing:
         return table
     values = np.column_stack([table[value] for value, _ in missing])
@@ -203,9 +210,9 @@ def _find_state_weights(problem: Problem, tool: MocoTrack, table: StoTable) -> l
         # A constraint determines its dependent coordinate, whose tracking would fight with that of
         # the others.
         is_dependent = any(
-            str(getattr(part, "dependent_coordinate_name", "")) == path.rpartition("/")[2]
-            for part in problem.model.constraint_set.objects
-            if part.isEnforced
+            str(getattr(constraint, "dependent_coordinate_name", "")) == path.rpartition("/")[2]
+            for constraint in problem.model.constraint_set.objects
+            if constraint.isEnforced
         )
         for name in (f"{path}/value", f"{path}/speed"):
             if name in table.columns and (name in weight_by_name or is_dependent):

@@ -106,13 +106,13 @@ class MocoTrajectory:
         table = read_sto(path)
         if not len(table.times):
             raise DocumentError("the file has no times", file=str(path))
-        counted = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COLUMN_KINDS}
-        for name, word in counted.items():
-            if not word.isdecimal():
+        count_texts = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COLUMN_KINDS}
+        for name, count_text in count_texts.items():
+            if not count_text.isdecimal():
                 raise DocumentError(
-                    f"the header says {name}={word}, which is not a count", file=str(path)
+                    f"the header says {name}={count_text}, which is not a count", file=str(path)
                 )
-        counts = [*map(int, counted.values())]
+        counts = [*map(int, count_texts.values())]
         # A table that no Moco wrote has no counts; its columns are states for the guess, whatever
         # they are.
         if not any(counts):
@@ -121,10 +121,10 @@ class MocoTrajectory:
             message = f"the header counts {sum(counts)} columns besides the time, but the file has {len(table.columns)}"
             raise DocumentError(message, file=str(path))
         names = dict[str, tuple[str, ...]]()
-        first = 0
+        first_column = 0
         for kind, count in zip(COLUMN_KINDS, counts, strict=True):
-            names[kind] = table.columns[first : first + count]
-            first += count
+            names[kind] = table.columns[first_column : first_column + count]
+            first_column += count
         column_by_name = {name: table.rows[:, index] for index, name in enumerate(table.columns)}
         parameters = {name: float(column_by_name.pop(name)[0]) for name in names.pop("parameters")}
         return cls(table.times, column_by_name, names, parameters, table.header)
@@ -135,8 +135,8 @@ class MocoTrajectory:
         Args:
             kind: one of `COLUMN_KINDS`; empty for all columns.
         """
-        kinds: Iterable[str] = [kind] if kind else COLUMN_KINDS[:-1]
-        names = [name for each in kinds for name in self.names.get(each, ())]
+        column_kinds: Iterable[str] = [kind] if kind else COLUMN_KINDS[:-1]
+        names = [name for column_kind in column_kinds for name in self.names.get(column_kind, ())]
         rows = (
             np.column_stack([self.columns[name] for name in names])
             if names
@@ -145,15 +145,16 @@ class MocoTrajectory:
         header = {}
         if not kind:
             # OpenSim writes the values of parameters into the first row only.
-            first = np.full((len(self.times), len(self.parameters)), np.nan)
-            first[0] = [*self.parameters.values()]
-            rows = np.hstack([rows, first])
-            counted = self.names | {"parameters": tuple(self.parameters)}
+            parameter_rows = np.full((len(self.times), len(self.parameters)), np.nan)
+            parameter_rows[0] = [*self.parameters.values()]
+            rows = np.hstack([rows, parameter_rows])
+            all_names = self.names | {"parameters": tuple(self.parameters)}
             names += self.parameters
-            said = self.header | {
-                f"num_{each}": str(len(counted.get(each, ()))) for each in COLUMN_KINDS
+            header_entries = self.header | {
+                f"num_{column_kind}": str(len(all_names.get(column_kind, ())))
+                for column_kind in COLUMN_KINDS
             }
-            header = {"inDegrees": "no", **dict(sorted(said.items()))}
+            header = {"inDegrees": "no", **dict(sorted(header_entries.items()))}
         return StoTable("", self.times, tuple(names), rows, header=header)
 
     def write(self, path: str | Path) -> None:

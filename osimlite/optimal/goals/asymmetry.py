@@ -51,9 +51,9 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
                 )
                 for path in paths
             )
-            above = load - goal.contact_force_threshold
+            excess_load = load - goal.contact_force_threshold
             # 1 on the ground and 0 in the air.
-            contacts.append(smooth_step(above, 0.5, 0.5, goal.contact_detection_smoothing))
+            contacts.append(smooth_step(excess_load, 0.5, 0.5, goal.contact_detection_smoothing))
             positions.append(get_component(goal.walking_direction, point.frame(foot).position))
         right, left = contacts
         front = smooth_step(positions[0] - positions[1], 0.0, 1.0, FRONT_FOOT_SHARPNESS_PER_M)
@@ -91,17 +91,20 @@ def build_step_length_asymmetry_goal(
     if goal.stride_length <= 0.0:
         raise problem.invalid_error(goal, "stride_length must be positive, as in OpenSim")
     sharpness = 100.0 * goal.asymmetry_smoothing
-    half = 0.5 * goal.stride_length
-    lengths = half * (1.0 + goal.target_asymmetry), half * (1.0 - goal.target_asymmetry)
+    half_stride = 0.5 * goal.stride_length
+    lengths = (
+        half_stride * (1.0 + goal.target_asymmetry),
+        half_stride * (1.0 - goal.target_asymmetry),
+    )
 
     def integrand(point: PointSymbols) -> Formula:
         right, left = (
             get_component(goal.walking_direction, point.frame(foot).position) for foot in feet
         )
-        ahead = right - left, left - right
+        leads = right - left, left - right
         return sum(
             smooth_step(distance - length, 0.5, 0.5, sharpness)
-            for distance, length in zip(ahead, lengths, strict=True)
+            for distance, length in zip(leads, lengths, strict=True)
         )
 
     result = make_integral_terms(integrand)
@@ -119,16 +122,16 @@ def get_component(direction: str, vector: Sequence[Formula] | Formula) -> Formul
     return vector["xyz".index(axis)] * (1.0 if sign == "positive" else -1.0)
 
 
-def smooth_step(value: Formula, middle: float, half: float, sharpness: float) -> Formula:
+def smooth_step(value: Formula, center: float, half_height: float, sharpness: float) -> Formula:
     """Return ``middle + half * tanh(sharpness * value)``, a smooth step at zero.
 
     Args:
         value: argument of the step.
-        middle: result at zero.
-        half: half of the height of the step.
+        center: result at zero.
+        half_height: half of the height of the step.
         sharpness: factor of the argument; the larger, the steeper the step.
     """
-    return middle + half * casadi.tanh(sharpness * value)
+    return center + half_height * casadi.tanh(sharpness * value)
 
 
 def _find_foot(
@@ -147,10 +150,10 @@ def _find_foot(
     names = [str(name) for name in group.contact_force_paths]
     selected = group.foot_position_contact_force_path
     if selected not in names:
-        near = suggest_name(selected, names)
+        suggestion = suggest_name(selected, names)
         raise problem.invalid_error(
             goal,
-            f"contact_force_paths of '{group.name}' do not contain foot_position_contact_force_path '{selected}'{near}",
+            f"contact_force_paths of '{group.name}' do not contain foot_position_contact_force_path '{selected}'{suggestion}",
         )
     contacts = dict(find_contact(goal, problem, name) for name in names)
     sphere = find_contact(goal, problem, selected)[1]

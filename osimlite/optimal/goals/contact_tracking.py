@@ -138,9 +138,9 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
     for group in goal.contact_groups:
         force = force_by_name.get(group.external_force_name)
         if force is None:
-            near = suggest_name(group.external_force_name, force_by_name)
+            suggestion = suggest_name(group.external_force_name, force_by_name)
             raise problem.invalid_error(
-                goal, f"the loads have no force '{group.external_force_name}'{near}"
+                goal, f"the loads have no force '{group.external_force_name}'{suggestion}"
             )
         if force.force_expressed_in_body not in ("ground", "/ground"):
             raise problem.unsupported_error(
@@ -177,13 +177,14 @@ def find_contact(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, Cont
     path = f"/{name.strip('/')}"
     contact: Any = problem.components.get(path)
     if not isinstance(contact, SmoothSphereHalfSpaceForce):
-        known = [
+        contact_paths = [
             key
-            for key, part in problem.components.items()
-            if isinstance(part, SmoothSphereHalfSpaceForce)
+            for key, component in problem.components.items()
+            if isinstance(component, SmoothSphereHalfSpaceForce)
         ]
         raise problem.invalid_error(
-            goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{suggest_name(path, known)}"
+            goal,
+            f"the model has no SmoothSphereHalfSpaceForce '{path}'{suggest_name(path, contact_paths)}",
         )
     sphere = problem.model.tree().target(contact, "socket_sphere", contact.socket_sphere)
     assert isinstance(sphere, ContactSphere)
@@ -212,7 +213,7 @@ def _find_contact_path(
         *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths),
     ]
     # OpenSim negates the force for the body of the half space; here only the sphere's side is done.
-    if not any(each.rpartition("/")[2] in frames for each in targets):
+    if not any(target.rpartition("/")[2] in frames for target in targets):
         message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' acts on {force.applied_to_body}"
         raise problem.unsupported_error(
             goal, f"{message}; forces on the body of the half space are not supported"

@@ -72,7 +72,7 @@ def build_joint_reaction_goal(goal: MocoJointReactionGoal, problem: Problem) -> 
     """
     path = str(goal.joint_path)
     side = goal.loads_frame
-    joints = [key for key, part in problem.components.items() if isinstance(part, Joint)]
+    joints = [key for key, component in problem.components.items() if isinstance(component, Joint)]
     problem.check_name(goal, path, joints, "joint")
     joint = problem.components[path]
     frame = str(goal.expressed_in_frame_path)

@@ -98,13 +98,13 @@ def build_initial_velocity_equilibrium_goal(
         goal: goal of the study.
         problem: problem with the muscles.
     """
-    both = [
+    equations = [
         TendonEquations(problem, problem.dynamics.list_forces(), mode)
         for mode in (IMPLICIT, EXPLICIT)
     ]
 
     def value(ends: Endpoints) -> Formula:
-        return casadi.vertcat(*(tendons.compute_rate_errors(ends.start) for tendons in both))
+        return casadi.vertcat(*(tendons.compute_rate_errors(ends.start) for tendons in equations))
 
     return GoalTerms(value, modes=CONSTRAINT_FIRST)
 
@@ -121,21 +121,22 @@ def build_periodicity_goal(goal: MocoPeriodicityGoal, problem: Problem) -> GoalT
     """
     functions = problem.functions
     pairs = []
-    for goal_pairs, known, what in (
+    for goal_pairs, known_names, variable_type in (
         (goal.state_pairs, functions.states, "state"),
         (goal.control_pairs, problem.controls, "control"),
     ):
         for pair in goal_pairs:
-            first = pair.initial_variable
-            last = pair.final_variable
-            for name in (first, last):
-                problem.check_name(pair, name, known, what)
-            pairs.append((what, first, last, -1.0 if pair.negate else 1.0))
+            initial_name = pair.initial_variable
+            final_name = pair.final_variable
+            for name in (initial_name, final_name):
+                problem.check_name(pair, name, known_names, variable_type)
+            pairs.append((variable_type, initial_name, final_name, -1.0 if pair.negate else 1.0))
 
     def value(ends: Endpoints) -> Formula:
         differences = [
-            sign * getattr(ends.start, what)(first) - getattr(ends.end, what)(last)
-            for what, first, last, sign in pairs
+            sign * getattr(ends.start, variable_type)(initial_name)
+            - getattr(ends.end, variable_type)(final_name)
+            for variable_type, initial_name, final_name, sign in pairs
         ]
         return casadi.vertcat(*differences) if differences else casadi.SX(0, 1)
 
@@ -157,8 +158,8 @@ def build_marker_final_goal(goal: MocoMarkerFinalGoal, problem: Problem) -> Goal
 
     def value(ends: Endpoints) -> Formula:
         positions = ends.end.output("stations")
-        pairs = zip("xyz", goal.reference_location, strict=True)
-        return sum((positions[f"{name}|{axis}"] - target) ** 2 for axis, target in pairs)
+        axis_targets = zip("xyz", goal.reference_location, strict=True)
+        return sum((positions[f"{name}|{axis}"] - target) ** 2 for axis, target in axis_targets)
 
     return GoalTerms(value)
 
@@ -188,14 +189,17 @@ def build_expression_based_parameter_goal(
     except ModelError as error:
         raise problem.invalid_error(goal, error.message) from None
     steps, constants = expressions.program(formula)
-    known = problem.functions.parameters
+    parameter_paths = problem.functions.parameters
     # OpenSim takes the first of the components, which all have one value.
     paths = [problem.list_parameter_paths(parameter)[0] for parameter in goal.parameters]
-    numbers = {path: _read_number(goal, problem, path) for path in paths if path not in known}
+    numbers = {
+        path: _read_number(goal, problem, path) for path in paths if path not in parameter_paths
+    }
 
     def value(ends: Endpoints) -> Formula:
         arguments = [
-            numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths
+            numbers[path] if path in numbers else ends.start.p[parameter_paths.index(path)]
+            for path in paths
         ]
         registers = RecordedVector([*arguments, *[0.0] * len(formula.steps)])
         return make_symbolic(run_program)(

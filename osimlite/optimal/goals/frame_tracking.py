@@ -156,12 +156,12 @@ def compute_squared_angle(point: PointSymbols, frame: FrameSymbols, quaternion: 
         casadi.vertcat(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
     )
     # Rotation of the reference relative to the frame.
-    turn = frame.rotation.T @ target
-    cosine = (casadi.trace(turn) - 1) / 2
+    relative_rotation = frame.rotation.T @ target
+    cosine = (casadi.trace(relative_rotation) - 1) / 2
     square = (
-        (turn[2, 1] - turn[1, 2]) ** 2
-        + (turn[0, 2] - turn[2, 0]) ** 2
-        + (turn[1, 0] - turn[0, 1]) ** 2
+        (relative_rotation[2, 1] - relative_rotation[1, 2]) ** 2
+        + (relative_rotation[0, 2] - relative_rotation[2, 0]) ** 2
+        + (relative_rotation[1, 0] - relative_rotation[0, 1]) ** 2
     ) / 4
     angle = casadi.atan2(
         casadi.sqrt(casadi.fmax(square, SMALL_SQUARED_SINE * SMALL_SQUARED_SINE)), cosine
@@ -222,8 +222,11 @@ class FrameReference:
         def integrand(point: PointSymbols) -> Formula:
             total = casadi.SX(0.0)
             for number, path in enumerate(paths):
-                first = size * number
-                target = [point.evaluate(each) for each in series[first : first + size]]
+                first_series = size * number
+                target = [
+                    point.evaluate(component_series)
+                    for component_series in series[first_series : first_series + size]
+                ]
                 total += weight_by_path.get(path, 1.0) * error(
                     point, point.frame(path), casadi.vertcat(*target)
                 )
@@ -253,10 +256,10 @@ class FrameReference:
                 message = f"the table holds {table.kind}, not {self.kind}; its header must say DataType={self.kind}"
                 raise DocumentError(message, file=table.file)
             columns = table.columns[:: len(endings)]
-            known = [column.removesuffix(endings[0]) for column in columns]
-            if other := [path for path in known if path not in paths]:
+            column_paths = [column.removesuffix(endings[0]) for column in columns]
+            if unlisted_paths := [path for path in column_paths if path not in paths]:
                 # OpenSim 4.6 takes all columns of the file, whatever frame_paths says.
-                message = f"frame_paths leaves out '{other[0]}' of {self.file}, which OpenSim tracks nevertheless"
+                message = f"frame_paths leaves out '{unlisted_paths[0]}' of {self.file}, which OpenSim tracks nevertheless"
                 raise problem.invalid_error(
                     goal, f"{message}; add it to frame_paths, or remove the column from the file"
                 )
@@ -282,8 +285,8 @@ class FrameReference:
         functions = problem.functions
         for column in motion.columns:
             problem.check_name(self.goal, column, functions.states, "state")
-        needed = [f"{path}/value" for path in functions.coordinates]
-        if missing := [name for name in needed if name not in motion.columns]:
+        required_columns = [f"{path}/value" for path in functions.coordinates]
+        if missing := [name for name in required_columns if name not in motion.columns]:
             raise problem.invalid_error(self.goal, f"states_reference has no column '{missing[0]}'")
         frames = functions.frames(paths)
         rows = []

@@ -129,12 +129,12 @@ OUTPUT_FORMULAS: dict[type[Any], dict[str, Callable[[PointSymbols, str], Formula
 
 
 def build_output_formula(
-    part: MocoOutputBase | MocoOutputBoundConstraint, problem: Problem
+    owner: MocoOutputBase | MocoOutputBoundConstraint, problem: Problem
 ) -> Callable[[PointSymbols], Formula]:
     """Build the formula that a goal or a constraint makes of one or two outputs.
 
     Args:
-        part: goal or constraint with the paths of the outputs.
+        owner: goal or constraint with the paths of the outputs.
         problem: problem with the components.
 
     Returns:
@@ -145,30 +145,32 @@ def build_output_formula(
         DocumentError: there is no such component, or index, operation and exponent do not fit it.
         UnsupportedError: the output has no formula.
     """
-    index = part.output_index
-    exponent = part.exponent
+    index = owner.output_index
+    exponent = owner.exponent
     if exponent < 1:
-        raise problem.invalid_error(part, f"exponent is {exponent}; expected 1 or more")
-    if bool(part.second_output_path) != bool(part.operation):
-        raise problem.invalid_error(part, "second_output_path and operation require each other")
+        raise problem.invalid_error(owner, f"exponent is {exponent}; expected 1 or more")
+    if bool(owner.second_output_path) != bool(owner.operation):
+        raise problem.invalid_error(owner, "second_output_path and operation require each other")
     outputs = [
-        _find_output(part, problem, text)
-        for text in (part.output_path, part.second_output_path)
+        _find_output(owner, problem, text)
+        for text in (owner.output_path, owner.second_output_path)
         if text
     ]
     if not outputs:
-        raise problem.invalid_error(part, "output_path is required")
+        raise problem.invalid_error(owner, "output_path is required")
     sizes = {size for size, _ in outputs}
     if len(sizes) > 1:
-        raise problem.invalid_error(part, "output_path and second_output_path have different types")
+        raise problem.invalid_error(
+            owner, "output_path and second_output_path have different types"
+        )
     if not -1 <= index < max(sizes) or (index >= 0 and max(sizes) == 1):
-        raise problem.invalid_error(part, f"the output has no component output_index {index}")
+        raise problem.invalid_error(owner, f"the output has no component output_index {index}")
 
     def value(point: PointSymbols) -> Formula:
         values = [formula(point, path) for _, (formula, path) in outputs]
         if index >= 0:
             values = [column[index] for column in values]
-        result = OPERATIONS[part.operation](*values) if part.operation else values[0]
+        result = OPERATIONS[owner.operation](*values) if owner.operation else values[0]
         if result.numel() > 1:
             square = casadi.sumsqr(result)
             # The square of the length needs no root, which has no slope at zero.
@@ -184,12 +186,12 @@ def build_output_formula(
 
 
 def _find_output(
-    part: Any, problem: Problem, text: str
+    owner: Any, problem: Problem, text: str
 ) -> tuple[int, tuple[Callable[[PointSymbols, str], Formula], str]]:
     """Find the formula of an output by its path.
 
     Args:
-        part: goal or constraint, for messages.
+        owner: goal or constraint, for messages.
         problem: problem with the components.
         text: path of the component, "|" and the name of the output.
 
@@ -205,7 +207,7 @@ def _find_output(
     component: Any = problem.model if path == "/" else problem.components.get(path)
     if component is None:
         raise problem.invalid_error(
-            part, f"the model has no component '{path}'{suggest_name(path, problem.components)}"
+            owner, f"the model has no component '{path}'{suggest_name(path, problem.components)}"
         )
     for component_class, formulas in OUTPUT_FORMULAS.items():
         if isinstance(component, component_class) and name in formulas:
@@ -215,15 +217,15 @@ def _find_output(
     forces: Any = problem.functions.forces.elements
     law = next(
         (
-            each.force_type
-            for each in forces
-            if each.path == path and isinstance(each, DeclaredForce)
+            element.force_type
+            for element in forces
+            if element.path == path and isinstance(element, DeclaredForce)
         ),
         None,
     )
     index = law.record_names.get(name) if law is not None else None
     if law is None or index is None:
-        raise problem.unsupported_error(part, f"the output '{name}' of {path} is not supported")
+        raise problem.unsupported_error(owner, f"the output '{name}' of {path} is not supported")
     # The record of the force may have another label for the output.
-    label = f"{path}|{next(label for label, at in law.record_offsets.items() if at == index)}"
+    label = f"{path}|{next(label for label, record_index in law.record_offsets.items() if record_index == index)}"
     return 1, (lambda point, path: point.output("forces")[label], path)

@@ -50,12 +50,12 @@ def build_state_tracking_goal(goal: MocoStateTrackingGoal, problem: Problem) -> 
     if goal.scale_weights_with_range:
         # As in Moco, the weight is divided by the range once, although the error is squared.
         weights |= {name: weights[name] / float(np.ptp(table[name])) for name in tracked}
-    pairs = [*zip(tracked, fit_splines(problem, table, tracked), strict=True)]
+    tracked_series = [*zip(tracked, fit_splines(problem, table, tracked), strict=True)]
 
     def integrand(point: PointSymbols) -> Formula:
         return sum(
             weights[name] * (point.state(name) - point.evaluate(series)) ** 2
-            for name, series in pairs
+            for name, series in tracked_series
         )
 
     return make_integral_terms(integrand)
@@ -73,7 +73,9 @@ def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem)
     """
     controls = [*problem.controls]
     table = read_reference(problem, goal, goal.reference)
-    columns = {item.name: item.reference for item in goal.reference_labels}
+    columns = {
+        reference_label.name: reference_label.reference for reference_label in goal.reference_labels
+    }
     if not columns:
         columns = {
             name: name
@@ -88,12 +90,12 @@ def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem)
             )
     control_weights = problem.find_weights(goal, goal.control_weights, None, controls, "control")
     weights = dict(zip(controls, control_weights, strict=True))
-    pairs = [*zip(columns, fit_splines(problem, table, [*columns.values()]), strict=True)]
+    tracked_series = [*zip(columns, fit_splines(problem, table, [*columns.values()]), strict=True)]
 
     def integrand(point: PointSymbols) -> Formula:
         return sum(
             weights[name] * (point.control(name) - point.evaluate(series)) ** 2
-            for name, series in pairs
+            for name, series in tracked_series
         )
 
     return make_integral_terms(integrand)
@@ -116,16 +118,21 @@ def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -
             raise problem.invalid_error(goal, "markers_reference has no marker_file")
         table = read_table(problem.locate_file(reference.marker_file))
     # Labels end in _1, _2 and _3; a marker with three columns is named once.
-    measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
+    measured_names = [*dict.fromkeys(label[:-2] for label in table.columns)]
     paths = {
-        part.name: path for path, part in problem.components.items() if isinstance(part, Marker)
+        component.name: path
+        for path, component in problem.components.items()
+        if isinstance(component, Marker)
     }
     # Tables may name markers by their paths, too.
     paths |= {path: path for path in paths.values()}
-    tracked = [name for name in measured if name in paths or not goal.allow_unused_references]
+    tracked = [name for name in measured_names if name in paths or not goal.allow_unused_references]
     for name in tracked:
         problem.check_name(goal, name, paths, "marker")
-    given_weights = {item.name: item.weight for item in reference.marker_weights.objects}
+    given_weights = {
+        marker_weight.name: marker_weight.weight
+        for marker_weight in reference.marker_weights.objects
+    }
     weights = [given_weights.get(name, reference.default_weight) for name in tracked]
     labels = [f"{name}_{k}" for name in tracked for k in (1, 2, 3)]
     series = fit_splines(problem, table, labels)
@@ -210,14 +217,16 @@ def _match_forces(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> l
         goal: goal with the patterns.
         problem: problem with the forces.
     """
-    forces = [path for path, part in problem.components.items() if isinstance(part, Force)]
+    forces = [
+        path for path, component in problem.components.items() if isinstance(component, Force)
+    ]
     result: list[str] = []
     for pattern in map(str, goal.force_paths):
         matched = [*filter(problem.compile_pattern(goal, pattern), forces)]
         if not matched:
             problem.check_name(goal, pattern, forces, "force")
-        if twice := [path for path in matched if path in result]:
-            raise problem.invalid_error(goal, f"force_paths matches '{twice[0]}' twice")
+        if repeated := [path for path in matched if path in result]:
+            raise problem.invalid_error(goal, f"force_paths matches '{repeated[0]}' twice")
         result += matched
     return result
 
@@ -230,11 +239,13 @@ def _is_constrained(problem: Problem, coordinate: Coordinate) -> bool:
         coordinate: coordinate of the model.
     """
     couplers = (
-        part
-        for part in problem.components.values()
-        if isinstance(part, CoordinateCouplerConstraint)
+        component
+        for component in problem.components.values()
+        if isinstance(component, CoordinateCouplerConstraint)
     )
-    dependent = {str(part.dependent_coordinate_name) for part in couplers if part.isEnforced}
+    dependent = {
+        str(component.dependent_coordinate_name) for component in couplers if component.isEnforced
+    }
     return (
         coordinate.prescribed
         or coordinate.is_free_to_satisfy_constraints
