@@ -108,36 +108,36 @@ def _undo_writes() -> Writes:
     Returns:
         The undone writes, which `_apply_writes` can repeat.
     """
-    written: Writes = {}
-    for key, (cells, place, before) in RecordedVector.journals.pop().items():
+    undone: Writes = {}
+    for key, (cells, index, old_value) in RecordedVector.journals.pop().items():
         # Both sides of a branch must begin with the same vectors; the merge needs what this side wrote.
-        written[key] = cells, place, cells[place]
-        cells[place] = before
-    return written
+        undone[key] = cells, index, cells[index]
+        cells[index] = old_value
+    return undone
 
 
-def _apply_writes(written: Writes) -> None:
+def _apply_writes(writes: Writes) -> None:
     """Write values into their cells."""
-    for cells, place, value in written.values():
-        RecordedVector(cells)[place] = value
+    for cells, index, value in writes.values():
+        RecordedVector(cells)[index] = value
 
 
-def _merge_writes(test: Any, one: Writes, other: Writes, part: Any) -> Writes:
+def _merge_writes(test: Any, true_writes: Writes, false_writes: Writes, code_part: Any) -> Writes:
     """Return the writes of two sides, merged by a test.
 
     Args:
         test: condition of the branch.
-        one: writes of the side on which the condition holds.
-        other: writes of the other side.
-        part: part of the code, for messages and identity.
+        true_writes: writes of the side on which the condition holds.
+        false_writes: writes of the other side.
+        code_part: part of the code, for messages and identity.
     """
     result: Writes = {}
-    for key in one | other:
-        cells, place, _ = one.get(key) or other[key]
+    for key in true_writes | false_writes:
+        cells, index, _ = true_writes.get(key) or false_writes[key]
         # A cell that one side did not write keeps its value on that side.
-        a = one[key][2] if key in one else cells[place]
-        b = other[key][2] if key in other else cells[place]
-        result[key] = cells, place, merge_values(test, a, b, part)
+        true_value = true_writes[key][2] if key in true_writes else cells[index]
+        false_value = false_writes[key][2] if key in false_writes else cells[index]
+        result[key] = cells, index, merge_values(test, true_value, false_value, code_part)
     return result
 
 
@@ -152,12 +152,12 @@ class AssigningBranch:
         ends: values of the variables at the end of each side that was run.
     """
 
-    def __init__(self, part: str, test: Any) -> None:
-        self.part = part
+    def __init__(self, code_part: str, test: Any) -> None:
+        self.part = code_part
         test = simplify_number(test)
-        if is_symbol(test) and part in run.widened:
+        if is_symbol(test) and code_part in run.widened:
             # A widened branch is decided by its caller, which runs both combinations.
-            test = decide(part, test)
+            test = decide(code_part, test)
         self.test = test
         self.ends: list[tuple[Any, ...]] = []
 
@@ -169,16 +169,18 @@ class AssigningBranch:
         if not is_symbol(self.test):
             yield bool(self.test)
             return
-        before = where.condition
-        written: list[Writes] = []
-        for side in (True, False):
-            where.condition = before
-            where.condition = combine_condition(self.test if side else casadi.logic_not(self.test))
+        outer_condition = where.condition
+        writes_by_side: list[Writes] = []
+        for is_true_side in (True, False):
+            where.condition = outer_condition
+            where.condition = combine_condition(
+                self.test if is_true_side else casadi.logic_not(self.test)
+            )
             RecordedVector.journals.append({})
-            yield side
-            written.append(_undo_writes())
-        where.condition = before
-        _apply_writes(_merge_writes(self.test, written[0], written[1], self.part))
+            yield is_true_side
+            writes_by_side.append(_undo_writes())
+        where.condition = outer_condition
+        _apply_writes(_merge_writes(self.test, writes_by_side[0], writes_by_side[1], self.part))
 
     @property
     def end(self) -> tuple[Any, ...]:
@@ -189,17 +191,18 @@ class AssigningBranch:
         """
         if len(self.ends) == 1:
             return self.ends[0]
-        one, other = self.ends
+        true_values, false_values = self.ends
         return tuple(
-            merge_values(self.test, a, b, self.part) for a, b in zip(one, other, strict=True)
+            merge_values(self.test, a, b, self.part)
+            for a, b in zip(true_values, false_values, strict=True)
         )
 
 
-def decide(part: str, test: Any) -> bool:
+def decide(code_part: str, test: Any) -> bool:
     """Return the side of a branch in the combination that is being run.
 
     Args:
-        part: part of the code, for messages.
+        code_part: part of the code, for messages.
         test: condition of the branch.
 
     Raises:
@@ -210,7 +213,7 @@ def decide(part: str, test: Any) -> bool:
         return bool(test)
     frame = run.frame
     if frame is None:
-        raise NoFormula(f"{part} branches by the state")
+        raise NoFormula(f"{code_part} branches by the state")
     number = frame.at
     frame.at += 1
     # A new branch is taken on its true side first; `run_all_branches` repeats the function for the
@@ -218,9 +221,9 @@ def decide(part: str, test: Any) -> bool:
     if number == len(frame.sides):
         frame.sides.append(True)
         frame.tests.append(test)
-    side = frame.sides[number]
-    where.condition = combine_condition(test if side else casadi.logic_not(test))
-    return side
+    is_true_side = frame.sides[number]
+    where.condition = combine_condition(test if is_true_side else casadi.logic_not(test))
+    return is_true_side
 
 
 def record_failure(test: Any) -> bool:
@@ -239,7 +242,7 @@ def record_failure(test: Any) -> bool:
     return False
 
 
-def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> Any:
+def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a function returns, merged over all combinations of its branches.
 
     Writes into vectors are merged in the same way. The combinations are the leaves of a binary
@@ -247,9 +250,9 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
     the last branch to the first.
 
     Args:
-        part: part of the code, for messages and identity.
+        code_part: part of the code, for messages and identity.
         function: function.
-        *given: arguments of the function.
+        *arguments: arguments of the function.
 
     Returns:
         The merged result.
@@ -257,14 +260,14 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
     Raises:
         NoFormula: there are more than `MAX_BRANCH_COMBINATIONS` combinations.
     """
-    outer = run.frame
+    outer_frame = run.frame
     condition = where.condition
     # The caller runs the combinations of a widened part, as if its branches were the caller's own.
-    if part in run.widened and outer is not None:
-        return function(*given)
+    if code_part in run.widened and outer_frame is not None:
+        return function(*arguments)
     frame = run.frame = _FunctionFrame()
     RecordedVector.journals.append({})
-    result = function(*given)
+    result = function(*arguments)
     # A function without branches on symbols has one combination; its writes belong to the outer
     # journal.
     if not frame.sides:
@@ -273,15 +276,15 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
             RecordedVector.journals[-1].update(
                 {key: writes[key] for key in writes if key not in RecordedVector.journals[-1]}
             )
-        run.frame = outer
+        run.frame = outer_frame
         where.condition = condition
         return result
 
-    def run_others(first: int, result: Any) -> tuple[Any, Writes]:
+    def run_others(fixed_count: int, result: Any) -> tuple[Any, Writes]:
         """Merge a run with those of the combinations that agree in the first branches.
 
         Args:
-            first: number of branches that all combinations share.
+            fixed_count: number of branches that all combinations share.
             result: result of the present run.
 
         Returns:
@@ -290,31 +293,31 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
         Raises:
             NoFormula: the function has too many combinations of branches.
         """
-        written = _undo_writes()
+        merged_writes = _undo_writes()
         sides = frame.sides
         tests = frame.tests
         # The first sides are fixed by outer calls; the rest of the tree below side k is explored by
         # recursion.
-        for k in range(len(sides) - 1, first - 1, -1):
+        for k in range(len(sides) - 1, fixed_count - 1, -1):
             frame.sides = [*sides[:k], False]
             frame.tests = tests[: k + 1]
             frame.at = 0
             frame.count += 1
             if frame.count > MAX_BRANCH_COMBINATIONS:
                 raise NoFormula(
-                    f"{part} has more than {MAX_BRANCH_COMBINATIONS} combinations of branches"
+                    f"{code_part} has more than {MAX_BRANCH_COMBINATIONS} combinations of branches"
                 )
             where.condition = condition
             RecordedVector.journals.append({})
-            other, also_written = run_others(k + 1, function(*given))
-            result = merge_values(tests[k], result, other, part)
-            written = _merge_writes(tests[k], written, also_written, part)
-        return result, written
+            other_result, other_writes = run_others(k + 1, function(*arguments))
+            result = merge_values(tests[k], result, other_result, code_part)
+            merged_writes = _merge_writes(tests[k], merged_writes, other_writes, code_part)
+        return result, merged_writes
 
-    result, written = run_others(0, result)
-    run.frame = outer
+    result, merged_writes = run_others(0, result)
+    run.frame = outer_frame
     where.condition = condition
-    _apply_writes(written)
+    _apply_writes(merged_writes)
     return result
 
 

@@ -44,10 +44,14 @@ def list_position_equations(structure: Sequence[int]) -> list[int]:
     h = structure[structure[MODEL.CONSTRAINED] :]
     records = structure[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
     ranges = (
-        (structure[at + CONSTRAINT.FIRST_EQUATION], structure[at + CONSTRAINT.END_POSITION], k)
-        for k, at in enumerate(records)
+        (
+            structure[record + CONSTRAINT.FIRST_EQUATION],
+            structure[record + CONSTRAINT.END_POSITION],
+            index,
+        )
+        for index, record in enumerate(records)
     )
-    return [row for first, end, _ in ranges for row in range(first, end)]
+    return [row for first_row, end_row, _ in ranges for row in range(first_row, end_row)]
 
 
 def find_independent_equations(
@@ -74,7 +78,7 @@ def find_independent_equations(
     ints[MODEL.CONTROLS] = 0
     count = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.EQUATIONS])
     at_rows = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS])
-    best: list[int] = []
+    largest_set: list[int] = []
     # A fixed seed makes the functions reproducible.
     rng = np.random.default_rng(0)
     infos = mechanism.coordinates
@@ -92,8 +96,8 @@ def find_independent_equations(
         evaluate(ints, packed.numbers, w, y, f, STAGE.VELOCITY)
         evaluate_constraints(ints, packed.numbers, w, y, f)
         rows = _select_independent_rows(w[at_rows : at_rows + count * size].reshape(count, size))
-        best = max(best, rows, key=len)
-    return sorted(best)
+        largest_set = max(largest_set, rows, key=len)
+    return sorted(largest_set)
 
 
 def _select_independent_rows(rows: Array) -> list[int]:
@@ -109,23 +113,23 @@ def _select_independent_rows(rows: Array) -> list[int]:
         Indices of the selected rows, in the order of the selection.
     """
     lengths = np.linalg.norm(rows, axis=1)
-    rest = (
+    remainders = (
         rows
         / np.where(lengths > REDUNDANT * max(lengths.max(initial=0.0), 1.0), lengths, np.inf)[
             :, None
         ]
     )
-    chosen: list[int] = []
+    selected: list[int] = []
     for _ in range(min(rows.shape)):
-        left = np.linalg.norm(rest, axis=1)
-        k = int(np.argmax(left))
-        if left[k] < REDUNDANT:
+        remaining_lengths = np.linalg.norm(remainders, axis=1)
+        pivot = int(np.argmax(remaining_lengths))
+        if remaining_lengths[pivot] < REDUNDANT:
             break
-        chosen.append(k)
-        direction = rest[k] / left[k]
+        selected.append(pivot)
+        direction = remainders[pivot] / remaining_lengths[pivot]
         # Gram-Schmidt with pivots: what is left of each row is normal to all chosen rows.
-        rest = rest - np.outer(rest @ direction, direction)
-    return chosen
+        remainders = remainders - np.outer(remainders @ direction, direction)
+    return selected
 
 
 def make_constrained_dynamics(equations: Sequence[int]) -> Law:
@@ -145,10 +149,10 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     ) -> int:
         h = model.rest(model[MODEL.CONSTRAINED])
         size = model[MODEL.DOFS]
-        right = f.rest(size)
+        right_side = f.rest(size)
         freedoms = model.rest(model[MODEL.DOF_AT])
         make_symbolic(evaluate_constraints)(model, reals, data, y, f)
-        make_symbolic(solve_accelerations)(model, data, right)
+        make_symbolic(solve_accelerations)(model, data, right_side)
         # M = Lᵀ D L; the diagonal of D stands first in each row of the stored factors.
         inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
         rows = []
@@ -157,22 +161,24 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
             row = [data[h[CONSTRAINED.WORK_ROWS] + size * number + k] for k in range(size)]
             missing.append(
                 data[h[CONSTRAINED.WORK_DRIFTS] + number]
-                - sum(a * right[k] for k, a in enumerate(row))
+                - sum(a * right_side[k] for k, a in enumerate(row))
             )
-            turned = RecordedVector(row)
+            transformed_row = RecordedVector(row)
             # G M⁻¹ Gᵀ = (G L⁻¹) D⁻¹ (G L⁻¹)ᵀ: half of a solution per row suffices, and the product
             # is symmetric by its form.
-            make_symbolic(solve_transposed_factor)(model, data, turned)
-            rows.append(casadi.horzcat(*turned.cells))
-        g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
-        scaled = g @ casadi.diag(casadi.vertcat(*inverse))
+            make_symbolic(solve_transposed_factor)(model, data, transformed_row)
+            rows.append(casadi.horzcat(*transformed_row.cells))
+        jacobian = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
+        scaled = jacobian @ casadi.diag(casadi.vertcat(*inverse))
         multipliers = casadi.ldl_solve(
-            casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T)
+            casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ jacobian.T)
         )
-        push = RecordedVector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
-        make_symbolic(solve_factor)(model, data, push)
+        constraint_accelerations = RecordedVector(
+            casadi.vertsplit(casadi.densify(scaled.T @ multipliers))
+        )
+        make_symbolic(solve_factor)(model, data, constraint_accelerations)
         for k in range(size):
-            right[k] += push[k]
+            right_side[k] += constraint_accelerations[k]
         return OUTCOME.OK
 
     return law  # type: ignore[return-value]

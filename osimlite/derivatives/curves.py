@@ -37,7 +37,7 @@ ROUNDING_GRID = 2.0**53
 """Number of grid points per unit to which a root is rounded: the resolution of numbers from 0.5 to 1."""
 
 
-def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
+def evaluate_pieces(table: Any, z: Any, function_type: int) -> tuple[Any, Any, Any]:
     """Evaluate a piecewise polynomial as :func:`osimlite.mechanics.kernels.functions.evaluate_piecewise`.
 
     The coefficients of the active piece are selected before anything is computed.
@@ -45,7 +45,7 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     Args:
         table: table of the pieces.
         z: argument.
-        kind: PIECES or PIECES_OF_OPENSIM of `FUNCTION_TYPE`.
+        function_type: PIECES or PIECES_OF_OPENSIM of `FUNCTION_TYPE`.
 
     Returns:
         Value, first and second derivative; for PIECES_OF_OPENSIM the second one is the first, as in
@@ -56,20 +56,23 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     if not is_symbol(z):
         # A number selects its piece here, so that the formula does not contain the others.
         numbers: Any = [simplify_number(number) for number in table[: 4 + knots * (1 + width)]]
-        return evaluate_piecewise(numbers, float(simplify_number(z)), kind)
-    below = [SX.binary(casadi.OP_LT, z, table[4 + k]) for k in range(1, knots)]
-    # Exactly one of the tests in `here` holds.
-    beyond = [SX(1.0), *(SX.unary(casadi.OP_NOT, test) for test in below)]
-    here = [SX.binary(casadi.OP_AND, *pair) for pair in zip(beyond, [*below, SX(1.0)], strict=True)]
+        return evaluate_piecewise(numbers, float(simplify_number(z)), function_type)
+    is_below = [SX.binary(casadi.OP_LT, z, table[4 + k]) for k in range(1, knots)]
+    # Exactly one of the tests in `is_in_piece` holds.
+    is_beyond = [SX(1.0), *(SX.unary(casadi.OP_NOT, test) for test in is_below)]
+    is_in_piece = [
+        SX.binary(casadi.OP_AND, *pair)
+        for pair in zip(is_beyond, [*is_below, SX(1.0)], strict=True)
+    ]
 
     # A sum of selected coefficients is one formula, where nested selections would be one for each
     # piece.
-    def select_coefficient(first: int, step: int) -> Any:
-        parts = [
-            SX.binary(casadi.OP_IF_ELSE_ZERO, test, table[first + k * step])
-            for k, test in enumerate(here)
+    def select_coefficient(first_index: int, step: int) -> Any:
+        selected_terms = [
+            SX.binary(casadi.OP_IF_ELSE_ZERO, test, table[first_index + k * step])
+            for k, test in enumerate(is_in_piece)
         ]
-        return reduce(plus, parts)
+        return reduce(plus, selected_terms)
 
     t = minus(z, select_coefficient(4, 1))
     value = 0.0
@@ -80,39 +83,45 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
         curvature = plus(times(curvature, t), slope)
         slope = plus(times(slope, t), value)
         value = plus(times(value, t), select_coefficient(4 + knots + k, width))
-    return value, slope, slope if kind == FUNCTION_TYPE.PIECES_OF_OPENSIM else times(2.0, curvature)
+    return (
+        value,
+        slope,
+        slope if function_type == FUNCTION_TYPE.PIECES_OF_OPENSIM else times(2.0, curvature),
+    )
 
 
-def evaluate_curve(c: Any, x: Any) -> tuple[Any, Any]:
+def evaluate_curve(curve: Any, x: Any) -> tuple[Any, Any]:
     """Return value and slope of a curve, as :func:`osimlite.mechanics.laws.bezier.curve_value`.
 
     OpenSim's muscle curves are quintic Bezier curves x(u), y(u). The parameter u of x is found by a
     search, and the slope is y'(u) / x'(u).
 
     Args:
-        c: curve.
+        curve: curve.
         x: argument.
 
     Returns:
         Value, and slope.
     """
-    count = int(simplify_number(c[SECTIONS]))
+    count = int(simplify_number(curve[SECTIONS]))
     if not is_symbol(x):
-        numbers = [float(simplify_number(c[k])) for k in range(HEAD + (1 + SECTION) * count)]
+        numbers = [float(simplify_number(curve[k])) for k in range(HEAD + (1 + SECTION) * count)]
         return curve_value(numbers, float(simplify_number(x)))
-    start, scale, *rest = _select_section(c, [x >= c[HEAD + number] for number in range(count - 1)])
-    of_x = rest[:5]
-    of_y = rest[5:]
+    start, scale, *coefficients = _select_section(
+        curve, [x >= curve[HEAD + number] for number in range(count - 1)]
+    )
+    of_x = coefficients[:5]
+    of_y = coefficients[5:]
     # Within the curve the search has a root, also for arguments beyond its ends, whose results are
     # replaced below.
-    off = _clamp_value(x, c[FIRST], c[LAST]) - start
-    u = _find_root([-off, *of_x], off * scale / NODES)
+    distance = _clamp_value(x, curve[FIRST], curve[LAST]) - start
+    u = _find_root([-distance, *of_x], distance * scale / NODES)
     y = _evaluate_polynomial(of_y, u)
     slope = divide(_evaluate_slope(of_y, u), _evaluate_slope([0.0, *of_x], u))
     # Beyond its ends a curve is extrapolated linearly.
-    for test, end in ((x < c[FIRST], FIRST), (x > c[LAST], LAST)):
-        y = casadi.if_else(test, c[end + 1] + c[end + 2] * (x - c[end]), y)
-        slope = casadi.if_else(test, c[end + 2], slope)
+    for test, end in ((x < curve[FIRST], FIRST), (x > curve[LAST], LAST)):
+        y = casadi.if_else(test, curve[end + 1] + curve[end + 2] * (x - curve[end]), y)
+        slope = casadi.if_else(test, curve[end + 2], slope)
     return y, slope
 
 
@@ -121,7 +130,7 @@ def solve_damped_velocity(
 ) -> tuple[bool, Any, Any]:
     """Solve for the fiber velocity, as :func:`osimlite.mechanics.laws.millard2012_equilibrium.damped_velocity`.
 
-    There is no tolerance: the fiber force ``share * factor + damping * velocity`` is a polynomial
+    There is no tolerance: the fiber force ``active_factor * factor + damping * velocity`` is a polynomial
     on each section of the curve, whose root is found to rounding.
 
     Args:
@@ -136,55 +145,63 @@ def solve_damped_velocity(
     Returns:
         Whether it was solved, the normalized velocity, and the force-velocity factor.
     """
-    c = curves.velocity
-    share = active * by_length
-    wanted = divide(tendon, cos) - elastic
+    curve = curves.velocity
+    active_factor = active * by_length
+    target_force = divide(tendon, cos) - elastic
 
-    def borne(velocity: Any, factor: Any) -> Any:
-        return share * factor + m.damping * velocity
+    def compute_force(velocity: Any, factor: Any) -> Any:
+        return active_factor * factor + m.damping * velocity
 
-    count = int(simplify_number(c[SECTIONS]))
-    first = HEAD + count
+    count = int(simplify_number(curve[SECTIONS]))
+    first_section = HEAD + count
     # The force rises with the velocity, so the section follows from the forces at its ends.
-    knots = [borne(c[HEAD + k], c[first + SECTION * (k + 1) + Y]) for k in range(count - 1)]
-    start, _, *rest = _select_section(c, [wanted >= knot for knot in knots])
-    of_x = [start, *rest[:5]]
-    of_y = rest[5:]
-    low, high = (borne(c[end], c[end + 1]) for end in (FIRST, LAST))
-    off = _clamp_value(wanted, low, high)
-    both = [borne(*pair) for pair in zip(of_x, of_y, strict=True)]
-    both[0] -= off
-    u = _find_root(both, divide(-both[0], sum(both[1:])))
+    knots = [
+        compute_force(curve[HEAD + k], curve[first_section + SECTION * (k + 1) + Y])
+        for k in range(count - 1)
+    ]
+    start, _, *coefficients = _select_section(curve, [target_force >= knot for knot in knots])
+    of_x = [start, *coefficients[:5]]
+    of_y = coefficients[5:]
+    lowest_force, highest_force = (
+        compute_force(curve[end], curve[end + 1]) for end in (FIRST, LAST)
+    )
+    clamped_force = _clamp_value(target_force, lowest_force, highest_force)
+    force_coefficients = [compute_force(*pair) for pair in zip(of_x, of_y, strict=True)]
+    force_coefficients[0] -= clamped_force
+    u = _find_root(force_coefficients, divide(-force_coefficients[0], sum(force_coefficients[1:])))
     velocity = _evaluate_polynomial(of_x, u)
     factor = _evaluate_polynomial(of_y, u)
     # Beyond the curve both factor and velocity are linear, and so is the solution.
-    for test, end, edge in ((wanted < low, FIRST, low), (wanted > high, LAST, high)):
-        beyond = divide(wanted - edge, borne(1.0, c[end + 2]))
-        velocity = casadi.if_else(test, c[end] + beyond, velocity)
-        factor = casadi.if_else(test, c[end + 1] + c[end + 2] * beyond, factor)
+    for test, end, end_force in (
+        (target_force < lowest_force, FIRST, lowest_force),
+        (target_force > highest_force, LAST, highest_force),
+    ):
+        excess_velocity = divide(target_force - end_force, compute_force(1.0, curve[end + 2]))
+        velocity = casadi.if_else(test, curve[end] + excess_velocity, velocity)
+        factor = casadi.if_else(test, curve[end + 1] + curve[end + 2] * excess_velocity, factor)
     return True, velocity, factor
 
 
-def _select_section(c: Any, beyond: Sequence[Any]) -> list[Any]:
+def _select_section(curve: Any, is_beyond_knot: Sequence[Any]) -> list[Any]:
     """Return start, scale and coefficients of the section behind the last knot that is exceeded.
 
     Args:
-        c: curve.
-        beyond: for each inner knot, the test whether the argument is beyond it.
+        curve: curve.
+        is_beyond_knot: for each inner knot, the test whether the argument is beyond it.
     """
-    first = HEAD + len(beyond) + 1
-    places = [START, SCALE, *range(X, Y + 6)]
-    result = [c[first + place] for place in places]
-    for number, test in enumerate(beyond, 1):
-        at = first + SECTION * number
+    first_section = HEAD + len(is_beyond_knot) + 1
+    entry_offsets = [START, SCALE, *range(X, Y + 6)]
+    result = [curve[first_section + entry_offset] for entry_offset in entry_offsets]
+    for number, test in enumerate(is_beyond_knot, 1):
+        section = first_section + SECTION * number
         result = [
-            casadi.if_else(test, c[at + place], own)
-            for place, own in zip(places, result, strict=True)
+            casadi.if_else(test, curve[section + entry_offset], coefficient)
+            for entry_offset, coefficient in zip(entry_offsets, result, strict=True)
         ]
     return result
 
 
-def _find_root(c: Sequence[Any], u: Any) -> Any:
+def _find_root(coefficients: Sequence[Any], u: Any) -> Any:
     """Return the root of a polynomial that rises from u = 0 to 1.
 
     The search has no derivatives: its result is rounded to a grid of the resolution of numbers. A
@@ -192,42 +209,44 @@ def _find_root(c: Sequence[Any], u: Any) -> Any:
     first and second derivatives.
 
     Args:
-        c: coefficients of the polynomial (6,).
+        coefficients: coefficients of the polynomial (6,).
         u: first guess.
     """
-    return _make_root_function()(casadi.vertcat(*c), u)
+    return _make_root_function()(casadi.vertcat(*coefficients), u)
 
 
 @cache
 def _make_root_function() -> Any:
     """Return `_find_root` as a CasADi function, which CasADi inserts into expressions faster than Python."""
-    given = casadi.SX.sym("c", 6), casadi.SX.sym("u")
-    c = casadi.vertsplit(given[0])
-    u = given[1]
+    arguments = casadi.SX.sym("c", 6), casadi.SX.sym("u")
+    coefficients = casadi.vertsplit(arguments[0])
+    u = arguments[1]
     for _ in range(HALLEY_STEPS):
         # A step may leave the section; its root is from 0 to 1.
-        u = _clamp_value(_apply_halley_step(c, u), 0.0, 1.0)
+        u = _clamp_value(_apply_halley_step(coefficients, u), 0.0, 1.0)
     return casadi.Function(
         # `floor` has the derivative 0, so only the last step is differentiated.
         "search",
-        given,
-        [_apply_halley_step(c, casadi.floor(u * ROUNDING_GRID) / ROUNDING_GRID)],
+        arguments,
+        [_apply_halley_step(coefficients, casadi.floor(u * ROUNDING_GRID) / ROUNDING_GRID)],
     )
 
 
-def _apply_halley_step(c: Sequence[Any], u: Any) -> Any:
+def _apply_halley_step(coefficients: Sequence[Any], u: Any) -> Any:
     """Return the next iterate of Halley's method, u - g g' / (g'² - g g'' / 2).
 
     Args:
-        c: coefficients of g.
+        coefficients: coefficients of g.
         u: the iterate.
 
     Returns:
         The next iterate; the same one where the divisor is not positive.
     """
-    value = _evaluate_polynomial(c, u)
-    slope = _evaluate_slope(c, u)
-    divisor = slope * slope - value * _evaluate_slope(_differentiate_polynomial(c), u) / 2.0
+    value = _evaluate_polynomial(coefficients, u)
+    slope = _evaluate_slope(coefficients, u)
+    divisor = (
+        slope * slope - value * _evaluate_slope(_differentiate_polynomial(coefficients), u) / 2.0
+    )
     return u - casadi.if_else(
         # The inner selection keeps the unused side free of a division by zero, whose NaN would
         # enter derivatives.
@@ -237,24 +256,24 @@ def _apply_halley_step(c: Sequence[Any], u: Any) -> Any:
     )
 
 
-def _clamp_value(x: Any, low: Any, high: Any) -> Any:
+def _clamp_value(x: Any, lower: Any, upper: Any) -> Any:
     """Return a value clamped to a range; the derivative at an end is that inside."""
-    return casadi.if_else(x < low, low, casadi.if_else(x > high, high, x))
+    return casadi.if_else(x < lower, lower, casadi.if_else(x > upper, upper, x))
 
 
-def _evaluate_polynomial(c: Sequence[Any], u: Any) -> Any:
+def _evaluate_polynomial(coefficients: Sequence[Any], u: Any) -> Any:
     """Return the value of a polynomial."""
     result: Any = 0.0
-    for coefficient in reversed(c):
+    for coefficient in reversed(coefficients):
         result = result * u + coefficient
     return result
 
 
-def _evaluate_slope(c: Sequence[Any], u: Any) -> Any:
+def _evaluate_slope(coefficients: Sequence[Any], u: Any) -> Any:
     """Return the slope of a polynomial."""
-    return _evaluate_polynomial(_differentiate_polynomial(c), u)
+    return _evaluate_polynomial(_differentiate_polynomial(coefficients), u)
 
 
-def _differentiate_polynomial(c: Sequence[Any]) -> list[Any]:
+def _differentiate_polynomial(coefficients: Sequence[Any]) -> list[Any]:
     """Return the coefficients of the derivative of a polynomial."""
-    return [k * coefficient for k, coefficient in enumerate(c)][1:]
+    return [power * coefficient for power, coefficient in enumerate(coefficients)][1:]

@@ -62,22 +62,23 @@ class DifferentiableModel:
         self._packed: PackedModel = pack(self.mechanism, self.forces, apart=self._apart)
         self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
         infos = self.mechanism.coordinates
-        own = [
-            f"{infos[place].path}/{what}"
-            for what in ("value", "speed")
-            for place in self._packed.order
+        coordinate_states = [
+            f"{infos[index].path}/{quantity}"
+            for quantity in ("value", "speed")
+            for index in self._packed.order
         ]
-        moving = len(own)
+        coordinate_state_count = len(coordinate_states)
         paths = self._state.paths
         self.coordinates = tuple(
-            path.rpartition("/")[0] for path in sort_by_component(model, own[: moving // 2])
+            path.rpartition("/")[0]
+            for path in sort_by_component(model, coordinate_states[: coordinate_state_count // 2])
         )
         values, speeds = (
-            [f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed")
+            [f"{path}/{quantity}" for path in self.coordinates] for quantity in ("value", "speed")
         )
         self.states = (*values, *speeds, *sort_by_component(model, paths))
-        self.system_states = (*own, *paths)
-        names = {name: place for place, name in enumerate(self.system_states)}
+        self.system_states = (*coordinate_states, *paths)
+        names = {name: index for index, name in enumerate(self.system_states)}
         # From the order of the model, which users see, to that of the engine.
         self.state_indices = [names[name] for name in self.states]
         self.controls = self.forces.controls.names
@@ -130,27 +131,27 @@ class DifferentiableModel:
         forces = force_elements(model, mechanism, folder=self._folder)
         # Probes are outputs without their operation over time. Probes that Python measures after the
         # kernels have no formula.
-        kept = (
+        measurable = (
             e
             for e in forces.elements
             if not (isinstance(e, DeclaredProbe) and e.probe_type.measure)
         )
         elements = (
-            replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in kept
+            replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in measurable
         )
         return replace(forces, elements=tuple(elements))
 
-    def _pack_numbers(self, changed: Model) -> Array:
+    def _pack_numbers(self, changed_model: Model) -> Array:
         """Return the numbers that may depend on parameters.
 
         Args:
-            changed: the model with other values of the parameters.
+            changed_model: the model with other values of the parameters.
 
         Returns:
             Numbers (k,); none if the structure of the model changes.
         """
-        mechanism = build_mechanism(changed)
-        packed = pack(mechanism, self._collect_forces(changed, mechanism), apart=self._apart)
+        mechanism = build_mechanism(changed_model)
+        packed = pack(mechanism, self._collect_forces(changed_model, mechanism), apart=self._apart)
         return (
             packed.numbers
             # A change of the structure, such as of a number of points, is not a change of numbers:

@@ -128,11 +128,13 @@ class CasadiModel(DifferentiableModel):
         from osimlite.derivatives.wrapped_paths import WrappedPaths
 
         infos = mechanism.coordinates
-        moving = [k for k, info in enumerate(infos) if not info.locked]
-        paths = sort_by_component(model, [f"{infos[k].path}/value" for k in moving])
-        places = {f"{infos[k].path}/value": k for k in moving}
+        unlocked = [k for k, info in enumerate(infos) if not info.locked]
+        paths = sort_by_component(model, [f"{infos[k].path}/value" for k in unlocked])
+        index_by_path = {f"{infos[k].path}/value": k for k in unlocked}
         return WrappedPaths(
-            mechanism, super()._collect_forces(model, mechanism), [places[path] for path in paths]
+            mechanism,
+            super()._collect_forces(model, mechanism),
+            [index_by_path[path] for path in paths],
         )
 
     @property
@@ -144,30 +146,35 @@ class CasadiModel(DifferentiableModel):
         """
         return self._wrapped_paths.names
 
-    def _pack_numbers(self, changed: Model) -> Array:
+    def _pack_numbers(self, changed_model: Model) -> Array:
         """Return all numbers that may depend on parameters.
 
         Args:
-            changed: the model with other values of the parameters.
+            changed_model: the model with other values of the parameters.
 
         Returns:
             Numbers of the kernels, points and frames, and lengths of paths around surfaces; none if
             the
                 structure of the model changes.
         """
-        mechanism = build_mechanism(changed)
-        searched = self._find_wrapped_paths(changed, mechanism)
+        mechanism = build_mechanism(changed_model)
+        searched = self._find_wrapped_paths(changed_model, mechanism)
         packed = pack(mechanism, searched.forces, apart=self._apart)
         if not np.array_equal(packed.structure, self._packed.structure):
             return np.zeros(0)
         # Paths around surfaces must not depend on a parameter, because their lengths are not linear in
         # it. Two poses suffice to notice a dependence.
-        ways = (
-            [searched.measure_paths(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)]
+        path_measures = (
+            [
+                searched.measure_paths(self.x[: len(self.coordinates)] + shift)
+                for shift in (0.0, 0.1)
+            ]
             if searched.size
             else []
         )
-        return np.concatenate((packed.numbers, *_list_fixed_numbers(mechanism, packed), *ways))
+        return np.concatenate(
+            (packed.numbers, *_list_fixed_numbers(mechanism, packed), *path_measures)
+        )
 
     @cached_property
     def in_tangents(self) -> TangentModel:
@@ -221,56 +228,67 @@ class CasadiModel(DifferentiableModel):
             name: name of the column of symbols, "x" or "xdot".
         """
         result: list[Any] = [0.0] * len(self.states)
-        for place, entry in zip(self.state_indices, self._list_symbols(name), strict=True):
-            result[place] = entry
+        for index, entry in zip(self.state_indices, self._list_symbols(name), strict=True):
+            result[index] = entry
         return result
 
     def _sort_by_model(self, y: Sequence[Any]) -> list[Any]:
         """Return the entries of a state in the order of `states`."""
-        return [y[place] for place in self.state_indices]
+        return [y[index] for index in self.state_indices]
 
     @cached_property
     def _evaluation(self) -> SymbolicWorkspace:
         """Evaluation of the kernels up to the accelerations."""
         return self._evaluator.evaluate(STAGE.ACCELERATION)
 
-    def _make_function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
+    def _make_function(
+        self, name: str, argument_names: Sequence[str], results: dict[str, Any]
+    ) -> Any:
         """Return a CasADi function of named symbols and results.
 
         Paths around surfaces enter as the results of a callback, which an outer function inserts.
 
         Args:
             name: name of the function.
-            given: names of its arguments.
+            argument_names: names of its arguments.
             results: formulas by name.
         """
-        symbols = [self._symbols[item] for item in given]
-        if self._path_function is None or "x" not in given:
-            return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
+        symbols = [self._symbols[argument_name] for argument_name in argument_names]
+        if self._path_function is None or "x" not in argument_names:
+            return self._library.Function(
+                name, symbols, [*results.values()], [*argument_names], [*results]
+            )
         # The formulas are SX; the paths are a function that CasADi calls, which takes MX.
-        inner = self._library.Function(
+        function_of_paths = self._library.Function(
             f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()]
         )
-        outer = self._make_arguments(given)
-        found = inner(*outer, self._path_function(outer[given.index("x")][: len(self.coordinates)]))
+        arguments = self._make_arguments(argument_names)
+        outputs = function_of_paths(
+            *arguments,
+            self._path_function(arguments[argument_names.index("x")][: len(self.coordinates)]),
+        )
         return self._library.Function(
-            name, outer, [*found] if len(results) > 1 else [found], [*given], [*results]
+            name,
+            arguments,
+            [*outputs] if len(results) > 1 else [outputs],
+            [*argument_names],
+            [*results],
         )
 
-    def _make_arguments(self, given: Sequence[str]) -> list[Any]:
+    def _make_arguments(self, argument_names: Sequence[str]) -> list[Any]:
         """Return symbols for the arguments of a function: MX if it contains a callback, else SX."""
-        kind = self._library.SX if self._path_function is None else self._library.MX
-        return [kind.sym(name, self._symbols[name].numel()) for name in given]
+        symbol_class = self._library.SX if self._path_function is None else self._library.MX
+        return [symbol_class.sym(name, self._symbols[name].numel()) for name in argument_names]
 
     # --------------------------------------------------------------------------------------------- functions
     @cached_property
     def dynamics(self) -> Any:
         """``dynamics(t, x, u, p) -> xdot``: derivative of the state."""
-        found = self._evaluation
+        evaluation = self._evaluation
         return self._make_function(
             "dynamics",
             ("t", "x", "u", "p"),
-            {"xdot": found.mask_failures(self._sort_by_model(found.f.cells))},
+            {"xdot": evaluation.mask_failures(self._sort_by_model(evaluation.f.cells))},
         )
 
     @cached_property
@@ -279,12 +297,14 @@ class CasadiModel(DifferentiableModel):
 
         A is the derivative by the state (x, x), B that by the controls (x, u).
         """
-        given = "t", "x", "u", "p"
-        symbols = self._make_arguments(given)
+        argument_names = "t", "x", "u", "p"
+        symbols = self._make_arguments(argument_names)
         xdot = self.dynamics(*symbols)
-        slopes = [self._library.jacobian(xdot, symbols[given.index(name)]) for name in ("x", "u")]
+        slopes = [
+            self._library.jacobian(xdot, symbols[argument_names.index(name)]) for name in ("x", "u")
+        ]
         return self._library.Function(
-            "linear", symbols, [xdot, *slopes], [*given], ["xdot", "A", "B"]
+            "linear", symbols, [xdot, *slopes], [*argument_names], ["xdot", "A", "B"]
         )
 
     @cached_property
@@ -298,20 +318,20 @@ class CasadiModel(DifferentiableModel):
         """
         size = len(self.coordinates)
         xdot = self._sort_by_engine("xdot")
-        found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
-        f = found.f.cells
+        workspace = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
+        f = workspace.f.cells
         # Rows of values and auxiliary states: given rate less computed rate. Those of speeds are
         # forces, which replace them below.
-        rows = [given - own for given, own in zip(xdot, f, strict=True)]
+        rows = [given - computed_rate for given, computed_rate in zip(xdot, f, strict=True)]
         rows[size : 2 * size] = f[size : 2 * size]
         if self.constraint_count:
-            push = self._constraint_errors["jacobian"].T @ self._symbols["multipliers"]
+            constraint_forces = self._constraint_errors["jacobian"].T @ self._symbols["multipliers"]
             rows[size : 2 * size] = [
-                rows[size + k] + push[self._find_coordinate(k)] for k in range(size)
+                rows[size + k] + constraint_forces[self._find_coordinate(k)] for k in range(size)
             ]
         given = "t", "x", "xdot", "u", "p", "multipliers"
         return self._make_function(
-            "residual", given, {"residual": found.mask_failures(self._sort_by_model(rows))}
+            "residual", given, {"residual": workspace.mask_failures(self._sort_by_model(rows))}
         )
 
     def _find_coordinate(self, k: int) -> int:
@@ -330,12 +350,12 @@ class CasadiModel(DifferentiableModel):
         """
         size = len(self.coordinates)
         xdot = self._sort_by_engine("xdot")
-        found = self._evaluator.compute_missing_forces(xdot[size : 2 * size], pushing)
-        forces = self._sort_by_model(found.f.cells)[size : 2 * size]
+        workspace = self._evaluator.compute_missing_forces(xdot[size : 2 * size], pushing)
+        forces = self._sort_by_model(workspace.f.cells)[size : 2 * size]
         return self._make_function(
             "generalized_forces",
             ("t", "x", "xdot", "u", "p"),
-            {"missing": found.mask_failures(forces)},
+            {"missing": workspace.mask_failures(forces)},
         )
 
     def joint_load(self, path: str, side: str) -> Any:
@@ -361,22 +381,25 @@ class CasadiModel(DifferentiableModel):
         if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
             # A joint without motion is merged away, so a model with separate links computes its
             # load.
-            own = CasadiModel(
+            separate_model = CasadiModel(
                 self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads)
             )
-            return own.joint_load(path, side)
+            return separate_model.joint_load(path, side)
         # The missing wrench acts on the body that the joint carries in the tree, and its opposite on
         # the other one.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
         size = len(self.coordinates)
         xdot = self._sort_by_engine("xdot")
-        found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
-        pushes = []
+        workspace = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
+        constraint_wrenches = []
         if self.constraint_count:
             multipliers = self._list_symbols("multipliers")
-            pushes = [
-                (of, multipliers[row], unit)
-                for (row, of), unit in self._evaluator.evaluate_constraints().result.items()
+            constraint_wrenches = [
+                (constrained_link, multipliers[row], unit)
+                for (
+                    row,
+                    constrained_link,
+                ), unit in self._evaluator.evaluate_constraints().result.items()
             ]
         joint: Any = self._model.find(path)
         frame = (
@@ -384,12 +407,17 @@ class CasadiModel(DifferentiableModel):
             .target(joint, f"socket_{side}_frame", getattr(joint, f"socket_{side}_frame"))
             .path
         )
-        places = locate_frames(self.mechanism, self._packed)
-        number = [*places].index(frame)
-        origin = places[frame][0], self._fixed_numbers[1][12 * number + 9 : 12 * number + 12]
-        given = "t", "x", "xdot", "u", "p", "multipliers"
+        frame_locations = locate_frames(self.mechanism, self._packed)
+        number = [*frame_locations].index(frame)
+        origin = (
+            frame_locations[frame][0],
+            self._fixed_numbers[1][12 * number + 9 : 12 * number + 12],
+        )
+        argument_names = "t", "x", "xdot", "u", "p", "multipliers"
         return self._make_function(
-            "joint_load", given, compute_joint_load_columns(found, link, origin, sign, pushes)
+            "joint_load",
+            argument_names,
+            compute_joint_load_columns(workspace, link, origin, sign, constraint_wrenches),
         )
 
     @cached_property
@@ -415,25 +443,25 @@ class CasadiModel(DifferentiableModel):
         count = self.constraint_count
         column = self._library.vertcat
         if not count:
-            nothing = self._library.SX(0, 1)
-            empty = self._library.SX(0, size)
+            empty_column = self._library.SX(0, 1)
+            empty_matrix = self._library.SX(0, size)
             return {
-                "position": nothing,
-                "velocity": nothing,
-                "acceleration": nothing,
-                "jacobian": empty,
+                "position": empty_column,
+                "velocity": empty_column,
+                "acceleration": empty_column,
+                "jacobian": empty_matrix,
             }
-        found = self._evaluator.evaluate_constraints()
+        workspace = self._evaluator.evaluate_constraints()
         structure = self._evaluator.structure
         h = structure[structure[MODEL.CONSTRAINED] :]
-        data = found.data
+        data = workspace.data
         order = [self.state_indices.index(k) for k in range(size)]
         rows = []
         for number in range(count):
-            first = h[CONSTRAINED.WORK_ROWS] + size * number
+            first_offset = h[CONSTRAINED.WORK_ROWS] + size * number
             row = [0.0] * size
             for k, place in enumerate(order):
-                row[place] = data[first + k]
+                row[place] = data[first_offset + k]
             rows.append(self._library.horzcat(*row))
         jacobian = self._library.sparsify(self._library.SX(column(*rows)))
         u = self._symbols["x"][size : 2 * size]
@@ -489,11 +517,11 @@ class CasadiModel(DifferentiableModel):
         """
         from osimlite.derivatives.outputs import compute_output_columns
 
-        found = self._evaluation
+        workspace = self._evaluation
         if any(isinstance(element, DeclaredProbe) for element in self.forces.elements):
-            found = self._evaluator.evaluate_probes()
+            workspace = self._evaluator.evaluate_probes()
         return compute_output_columns(
-            self.mechanism, self._packed, self.forces, found, self._fixed_numbers[0]
+            self.mechanism, self._packed, self.forces, workspace, self._fixed_numbers[0]
         )
 
     @cached_property
@@ -504,14 +532,15 @@ class CasadiModel(DifferentiableModel):
             Points (3 k,), and axes and origins (12 m,).
         """
         stations, frames = (
-            part.tolist() for part in _list_fixed_numbers(self.mechanism, self._packed)
+            numbers_of_group.tolist()
+            for numbers_of_group in _list_fixed_numbers(self.mechanism, self._packed)
         )
         if self._parameters:
-            first = len(self._packed.numbers)
-            second = first + len(stations)
+            first_station = len(self._packed.numbers)
+            first_frame = first_station + len(stations)
             numbers = [*self._evaluator.numbers]
-            stations = numbers[first:second]
-            frames = numbers[second : second + len(frames)]
+            stations = numbers[first_station:first_frame]
+            frames = numbers[first_frame : first_frame + len(frames)]
         return stations, frames
 
     def frames(self, paths: Iterable[str]) -> Any:
@@ -529,20 +558,24 @@ class CasadiModel(DifferentiableModel):
         """
         from osimlite.derivatives.outputs import compute_frame_columns, locate_frames
 
-        places = locate_frames(self.mechanism, self._packed)
-        chosen = []
+        frame_locations = locate_frames(self.mechanism, self._packed)
+        selected_frames = []
         numbers = {
             path: self._fixed_numbers[1][12 * number : 12 * number + 12]
-            for number, path in enumerate(places)
+            for number, path in enumerate(frame_locations)
         }
         for path in paths:
-            if path not in places:
-                raise SettingError(f"the model has no frame '{path}'{suggest_name(path, places)}")
-            chosen.append((places[path][0], numbers[path]))
-        given = "t", "x", "p"
-        symbols = [self._symbols[name] for name in given]
-        results = compute_frame_columns(self._velocity_evaluation, chosen)
-        return self._library.Function("frames", symbols, [*results.values()], [*given], [*results])
+            if path not in frame_locations:
+                raise SettingError(
+                    f"the model has no frame '{path}'{suggest_name(path, frame_locations)}"
+                )
+            selected_frames.append((frame_locations[path][0], numbers[path]))
+        argument_names = "t", "x", "p"
+        symbols = [self._symbols[name] for name in argument_names]
+        results = compute_frame_columns(self._velocity_evaluation, selected_frames)
+        return self._library.Function(
+            "frames", symbols, [*results.values()], [*argument_names], [*results]
+        )
 
     @cached_property
     def _velocity_evaluation(self) -> SymbolicWorkspace:
@@ -615,12 +648,12 @@ class CasadiModel(DifferentiableModel):
                 "polynomials first (osimlite modify --replace paths=polynomial)"
             )
         make_folder(folder)
-        written = []
+        paths = []
         generator = self._library.CodeGenerator("model.c", {"with_header": True})
         for name in names:
             function = getattr(self, name)
-            written.append(folder / f"{name}.casadi")
-            function.save(str(written[-1]))
+            paths.append(folder / f"{name}.casadi")
+            function.save(str(paths[-1]))
             generator.add(function)
         # CasADi's generator prepends the folder to the file name.
         generator.generate(f"{folder}/")
@@ -634,7 +667,7 @@ class CasadiModel(DifferentiableModel):
             "functions": {name: str(getattr(self, name)) for name in names},
         }
         write_into(folder, "model.json", json.dumps(facts, indent=1) + "\n")
-        return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
+        return [*paths, folder / "model.c", folder / "model.h", folder / "model.json"]
 
 
 def _list_fixed_numbers(mechanism: Mechanism, packed: PackedModel) -> tuple[Array, Array]:

@@ -57,12 +57,12 @@ class Linearization:
     D: Array
 
     def __repr__(self) -> str:
-        parts = [
+        counts = [
             format_count(len(self.states), "state"),
             format_count(len(self.controls), "control"),
             format_count(len(self.outputs), "output"),
         ]
-        return f"Linearization at {self.time:g} s: {', '.join(parts)}"
+        return f"Linearization at {self.time:g} s: {', '.join(counts)}"
 
 
 def linearize(
@@ -110,19 +110,19 @@ def linearize(
         raise SimulationError(
             "the model has no accelerations in this state; simulate from it to see the reason"
         )
-    chosen = _find_outputs(model.output_names if outputs else {}, outputs)
+    output_indices = _find_outputs(model.output_names if outputs else {}, outputs)
     if not (np.isfinite(xdot).all() and np.isfinite(a).all() and np.isfinite(b).all()):
         raise SimulationError(_describe_invalid_entry(model.states, model.controls, xdot, a, b))
     y, c, d = (
-        model.compute_outputs(time, x, u, chosen)
+        model.compute_outputs(time, x, u, output_indices)
         if outputs
         else (np.zeros((0, size)) for size in (1, len(x), len(u)))
     )
-    if not all(np.isfinite(part).all() for part in (y, c, d)):
+    if not all(np.isfinite(matrix).all() for matrix in (y, c, d)):
         raise SimulationError(
             "an output of the model or its derivative is not finite in this state"
         )
-    names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
+    names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in output_indices)
     return Linearization(
         model.states, model.controls, time, x, u, xdot, a, b, names, y.ravel(), c, d
     )
@@ -141,12 +141,17 @@ def _describe_invalid_entry(
         b: derivatives by the controls (x, u).
     """
     columns = [("", xdot.reshape(-1, 1), [""]), (" by ", a, states), (" by ", b, controls)]
-    for words, matrix, names in columns:
-        odd = np.argwhere(~np.isfinite(matrix))
-        if len(odd):
-            row, column = odd[0]
-            place = f"the rate of '{states[row]}'" + (f"{words}'{names[column]}'" if words else "")
-            return f"{place} is {matrix[row, column]:g}; look for a number in the model that is far too large or small"
+    for preposition, matrix, names in columns:
+        invalid_entries = np.argwhere(~np.isfinite(matrix))
+        if len(invalid_entries):
+            row, column = invalid_entries[0]
+            entry_description = f"the rate of '{states[row]}'" + (
+                f"{preposition}'{names[column]}'" if preposition else ""
+            )
+            return (
+                f"{entry_description} is {matrix[row, column]:g}; look for a number in the model "
+                "that is far too large or small"
+            )
     return "a derivative is not finite"
 
 
@@ -165,40 +170,42 @@ def _find_outputs(
     groups = {
         group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()
     }
-    single = {
+    entries = {
         f"{group}:{label}": [(group, k)]
         for group, labels in output_names.items()
         for k, label in enumerate(labels)
     }
-    known = {**groups, **single}
+    outputs_by_name = {**groups, **entries}
     result = list[tuple[str, int]]()
     for name in names:
-        if name not in known:
-            raise SettingError(f"the model has no output '{name}'{suggest_name(name, known)}")
-        result += known[name]
+        if name not in outputs_by_name:
+            raise SettingError(
+                f"the model has no output '{name}'{suggest_name(name, outputs_by_name)}"
+            )
+        result += outputs_by_name[name]
     return result
 
 
-def _fill_vector(what: str, names: Sequence[str], default: Array, given: Any) -> Array:
+def _fill_vector(noun: str, names: Sequence[str], default: Array, user_values: Any) -> Array:
     """Return the default values with some of them replaced.
 
     Args:
-        what: "state" or "control", for messages.
+        noun: "state" or "control", for messages.
         names: names of the entries.
         default: default values.
-        given: values by name, or all values in their order; None for the defaults.
+        user_values: values by name, or all values in their order; None for the defaults.
 
     Raises:
         SettingError: a name does not exist, or there are more or fewer values.
     """
     result = default.copy()
-    if isinstance(given, Mapping):
-        for name, value in given.items():
+    if isinstance(user_values, Mapping):
+        for name, value in user_values.items():
             if name not in names:
-                raise SettingError(f"the model has no {what} '{name}'{suggest_path(name, names)}")
+                raise SettingError(f"the model has no {noun} '{name}'{suggest_path(name, names)}")
             result[names.index(name)] = value
-    elif given is not None:
-        if len(given) != len(names):
-            raise SettingError(f"the model has {len(names)} {what}s, not {len(given)}")
-        result[:] = given
+    elif user_values is not None:
+        if len(user_values) != len(names):
+            raise SettingError(f"the model has {len(names)} {noun}s, not {len(user_values)}")
+        result[:] = user_values
     return result

@@ -52,9 +52,9 @@ def locate_stations(
     Returns:
         Path, link and point in the link (3,), m, of each station.
     """
-    places = Places(mechanism, {}, packed.placements)
+    link_placements = Places(mechanism, {}, packed.placements)
     return [
-        (path, *places.station(body, point.tolist()))
+        (path, *link_placements.station(body, point.tolist()))
         for path, (body, point) in mechanism.stations.items()
     ]
 
@@ -69,10 +69,10 @@ def locate_frames(mechanism: Mechanism, packed: PackedModel) -> dict[str, tuple[
     Returns:
         Link, and axes and origin in the link (12,), of each frame by its path.
     """
-    places = Places(mechanism, {}, packed.placements)
+    link_placements = Places(mechanism, {}, packed.placements)
     return {
-        path: places.frame(placed.body, placed.transform)
-        for path, placed in mechanism.frames.items()
+        path: link_placements.frame(frame_placement.body, frame_placement.transform)
+        for path, frame_placement in mechanism.frames.items()
     }
 
 
@@ -87,9 +87,9 @@ def list_probe_items(packed: PackedModel, elements: Sequence[Any]) -> list[int]:
         Offsets in the structure.
     """
     return [
-        place
-        for place, owner in packed.owners.items()
-        if isinstance(elements[owner], DeclaredProbe)
+        offset
+        for offset, element_index in packed.owners.items()
+        if isinstance(elements[element_index], DeclaredProbe)
     ]
 
 
@@ -148,41 +148,41 @@ def compute_output_columns(
     at_station = workspace.wrap(station)
     speed_of = workspace.wrap(velocity)
     labels: list[str] = []
-    places: list[Any] = []
+    positions: list[Any] = []
     speeds: list[Any] = []
     for number, (path, link, _) in enumerate(locate_stations(mechanism, packed)):
         labels += [f"{path}|{axis}" for axis in AXES]
         point = at_station(
             workspace.model, workspace.data, link, tuple(points[3 * number : 3 * number + 3])
         )
-        places += point
+        positions += point
         speeds += speed_of(workspace.model, workspace.data, link, point)
     center, rate = _compute_mass_center(mechanism, packed, workspace)
-    pushed = _list_contact_values(packed, forces, workspace)
-    known = [
-        (f"{element.path}|{name}", workspace.data[items[-1][0] + place])
-        for element, items in zip(forces.elements, packed.items, strict=True)
-        if isinstance(element, DeclaredForce) and items
-        for name, place in element.force_type.record_offsets.items()
+    contact_values = _list_contact_values(packed, forces, workspace)
+    force_values = [
+        (f"{element.path}|{name}", workspace.data[element_items[-1][0] + offset])
+        for element, element_items in zip(forces.elements, packed.items, strict=True)
+        if isinstance(element, DeclaredForce) and element_items
+        for name, offset in element.force_type.record_offsets.items()
     ]
     probed = [
-        (f"{probe.path}|{label}", probe.gain * workspace.data[items[-1][0] + place])
-        for probe, items in zip(forces.elements, packed.items, strict=True)
+        (f"{probe.path}|{label}", probe.gain * workspace.data[element_items[-1][0] + offset])
+        for probe, element_items in zip(forces.elements, packed.items, strict=True)
         if isinstance(probe, DeclaredProbe)
-        for place, label in enumerate(probe.reading.labels)
+        for offset, label in enumerate(probe.reading.labels)
     ]
     return {
-        "stations": (labels, workspace.mask_failures(places)),
+        "stations": (labels, workspace.mask_failures(positions)),
         "station_velocities": (labels, workspace.mask_failures(speeds)),
         "mass_center": ([*AXES], workspace.mask_failures(center)),
         "mass_center_velocity": ([*AXES], workspace.mask_failures(rate)),
         "contact_forces": (
-            [name for name, _ in pushed],
-            workspace.mask_failures([value for _, value in pushed]),
+            [name for name, _ in contact_values],
+            workspace.mask_failures([value for _, value in contact_values]),
         ),
         "forces": (
-            [name for name, _ in known],
-            workspace.mask_failures([value for _, value in known]),
+            [name for name, _ in force_values],
+            workspace.mask_failures([value for _, value in force_values]),
         ),
         "probes": (
             [name for name, _ in probed],
@@ -204,34 +204,42 @@ def _compute_mass_center(
     Returns:
         Position (3,), m, and velocity (3,), m/s; NaN for a model without mass.
     """
-    parts = []
+    mass_points = []
     for link in range(int(packed.structure[MODEL.LINKS])):
         # Read from the numbers, which may be symbols or dual numbers: masses may be parameters.
-        first = REALS.INERTIA + INERTIA.SIZE * link
-        parts.append(
+        inertia_offset = REALS.INERTIA + INERTIA.SIZE * link
+        mass_points.append(
             (
-                workspace.reals[first],
+                workspace.reals[inertia_offset],
                 link,
-                tuple(workspace.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS]),
+                tuple(
+                    workspace.reals[
+                        inertia_offset + INERTIA.CENTER : inertia_offset + INERTIA.MOMENTS
+                    ]
+                ),
             )
         )
     # Bodies that are fixed to ground have no link, but mass.
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
         if placement.link == GROUND:
-            own = body.mass_properties
+            mass_properties = body.mass_properties
             frame = placement.frame
-            parts.append(
-                (own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist()))
+            mass_points.append(
+                (
+                    mass_properties.mass,
+                    GROUND,
+                    tuple((frame[:3, :3] @ mass_properties.center + frame[:3, 3]).tolist()),
+                )
             )
     total = 0.0
     center = [0.0] * 3
     rate = [0.0] * 3
-    for mass, link, point in parts:
-        place = workspace.wrap(station)(workspace.model, workspace.data, link, point)
-        moves = workspace.wrap(velocity)(workspace.model, workspace.data, link, place)
+    for mass, link, point in mass_points:
+        position = workspace.wrap(station)(workspace.model, workspace.data, link, point)
+        point_velocity = workspace.wrap(velocity)(workspace.model, workspace.data, link, position)
         total = total + mass
-        center = [a + mass * b for a, b in zip(center, place, strict=True)]
-        rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
+        center = [a + mass * b for a, b in zip(center, position, strict=True)]
+        rate = [a + mass * b for a, b in zip(rate, point_velocity, strict=True)]
     # A symbolic mass is neither a float nor a dual number.
     if isinstance(total, (float, DualNumber)) and float(total) == 0.0:
         total = nan
@@ -251,25 +259,27 @@ def _list_contact_values(
     Returns:
         Labels and values.
     """
-    pairs: list[tuple[str, int]] = []
-    for element, items in zip(forces.elements, packed.items, strict=True):
+    record_offsets: list[tuple[str, int]] = []
+    for element, element_items in zip(forces.elements, packed.items, strict=True):
         if isinstance(element, PairContact):
             folder = element.path.rpartition("/")[0]
-            pairs += [
-                (f"{folder}/{element.pair_name(k)}", place)
-                for k, (place, _) in enumerate(items[: len(element.pairs)])
+            record_offsets += [
+                (f"{folder}/{element.pair_name(k)}", offset)
+                for k, (offset, _) in enumerate(element_items[: len(element.pairs)])
             ]
         elif (
             isinstance(element, DeclaredForce)
             and element.force_type.geometry is SPHERE_ON_PLANE
-            and items
+            and element_items
         ):
             # The geometry's part of a record follows the results of the law: force, then point.
-            pairs.append((element.path, items[-1][0] + len(element.force_type.record_offsets)))
+            record_offsets.append(
+                (element.path, element_items[-1][0] + len(element.force_type.record_offsets))
+            )
     return [
-        (f"{name}|{what}_{axis}", workspace.data[place + 3 * part + k])
-        for name, place in pairs
-        for part, what in enumerate(("force", "point"))
+        (f"{name}|{vector_name}_{axis}", workspace.data[offset + 3 * vector_number + k])
+        for name, offset in record_offsets
+        for vector_number, vector_name in enumerate(("force", "point"))
         for k, axis in enumerate(AXES)
     ]
 
@@ -290,13 +300,13 @@ def compute_path_columns(
     names = list[str]()
     lengths = list[Any]()
     speeds = list[Any]()
-    for element, items in zip(forces.elements, packed.items, strict=True):
+    for element, element_items in zip(forces.elements, packed.items, strict=True):
         if (
             isinstance(element, DeclaredForce)
             and element.force_type.geometry is PATH
-            and len(items) > 1
+            and len(element_items) > 1
         ):
-            record = items[-2][0]
+            record = element_items[-2][0]
             names.append(element.path)
             lengths.append(workspace.data[record + PATH_WORK.LENGTH])
             speeds.append(workspace.data[record + PATH_WORK.SPEED])
@@ -308,7 +318,7 @@ def compute_joint_load_columns(
     link: int,
     origin: tuple[int, Sequence[Any]],
     sign: float,
-    pushes: Sequence[tuple[int, Any, Sequence[Any]]],
+    constraint_wrenches: Sequence[tuple[int, Any, Sequence[Any]]],
 ) -> dict[str, Any]:
     """Compute the results of `CasadiModel.joint_load`.
 
@@ -317,7 +327,7 @@ def compute_joint_load_columns(
         link: link that the joint carries.
         origin: link of the frame at whose origin the load acts, and the point in the link (3,).
         sign: 1 for the load on the carried body, -1 for the load on the carrying body.
-        pushes: link on which a constraint acts, its multiplier, and the wrench of a unit
+        constraint_wrenches: link on which a constraint acts, its multiplier, and the wrench of a unit
             multiplier.
 
     Returns:
@@ -326,21 +336,25 @@ def compute_joint_load_columns(
     from osimlite.derivatives.symbols import casadi
 
     # The wrench of a link includes all links that it carries, so constraints on any of them count.
-    beyond = {link}
-    for later in range(link + 1, workspace.model[MODEL.LINKS]):
-        if workspace.wrap(link_ints)(workspace.model, later)[LINK.PARENT] in beyond:
-            beyond.add(later)
-    first = workspace.model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
+    carried_links = {link}
+    for outer_link in range(link + 1, workspace.model[MODEL.LINKS]):
+        if workspace.wrap(link_ints)(workspace.model, outer_link)[LINK.PARENT] in carried_links:
+            carried_links.add(outer_link)
+    link_offset = workspace.model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
     wrench = casadi.vertcat(
-        *workspace.data[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6]
+        *workspace.data[link_offset + LINK_WORK.WRENCH : link_offset + LINK_WORK.WRENCH + 6]
     )
-    for of, multiplier, unit in pushes:
-        if of in beyond:
+    for constrained_link, multiplier, unit in constraint_wrenches:
+        if constrained_link in carried_links:
             wrench -= multiplier * casadi.vertcat(*unit)
     wrench *= -sign
-    place = workspace.wrap(station)(workspace.model, workspace.data, origin[0], tuple(origin[1]))
-    start = workspace.data[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
-    arm = casadi.vertcat(*place) - casadi.vertcat(*start)
+    joint_origin = workspace.wrap(station)(
+        workspace.model, workspace.data, origin[0], tuple(origin[1])
+    )
+    link_origin = workspace.data[
+        link_offset + LINK_WORK.ORIGIN : link_offset + LINK_WORK.ORIGIN + 3
+    ]
+    arm = casadi.vertcat(*joint_origin) - casadi.vertcat(*link_origin)
     # Spatial forces are about the link's ORIGIN; the load is about the origin of the joint's frame.
     moment = wrench[:3] - casadi.cross(arm, wrench[3:])
     return {

@@ -49,10 +49,10 @@ class Parameters:
     ) -> None:
         self.names = tuple(names)
         self._setters = [_find_setters(model, name) for name in names]
-        given = [
+        initial_values = [
             _read_value(name, setters) for name, setters in zip(names, self._setters, strict=True)
         ]
-        self.values = np.array(given)
+        self.values = np.array(initial_values)
         base = numbers_of(model)
         self.slopes: dict[int, list[tuple[int, float]]] = {}
 
@@ -70,52 +70,54 @@ class Parameters:
                 )
             return result
 
-        columns = np.zeros((len(base), len(given)))
-        for k, name in enumerate(names):
+        columns = np.zeros((len(base), len(initial_values)))
+        for index, name in enumerate(names):
             # The first change gives the slope, the second one tests it.
-            one, two = (self._change_values(number, [k]) for number in range(2))
-            columns[:, k] = _subtract_base(numbers_at(one, f"'{name}'"), base) / (one[k] - given[k])
+            first_change, second_change = (
+                self._change_values(number, [index]) for number in range(2)
+            )
+            columns[:, index] = _subtract_base(numbers_at(first_change, f"'{name}'"), base) / (
+                first_change[index] - initial_values[index]
+            )
             _check_linear(
-                numbers_at(two, f"'{name}'"),
+                numbers_at(second_change, f"'{name}'"),
                 base,
-                columns[:, [k]],
-                (two - self.values)[[k]],
+                columns[:, [index]],
+                (second_change - self.values)[[index]],
                 f"'{name}'",
             )
-        if len(given) > 1:
-            every = (
+        if len(initial_values) > 1:
+            names_text = (
                 " and ".join(f"'{name}'" for name in names)
                 if len(names) < 4
                 else "these parameters"
             )
             # Products of parameters are linear in each but not in all together.
             for number in range(2):
-                values = self._change_values(number, range(len(given)))
-                what = f"{every} together"
+                values = self._change_values(number, range(len(initial_values)))
+                what = f"{names_text} together"
                 _check_linear(numbers_at(values, what), base, columns, values - self.values, what)
-        self.base = base - columns @ self.values if len(given) else base
-        for place, number in zip(*np.nonzero(columns), strict=True):
-            self.slopes.setdefault(int(place), []).append(
-                (int(number), float(columns[place, number]))
-            )
+        self.base = base - columns @ self.values if len(initial_values) else base
+        for row, number in zip(*np.nonzero(columns), strict=True):
+            self.slopes.setdefault(int(row), []).append((int(number), float(columns[row, number])))
 
-    def _change_values(self, number: int, which: Sequence[int] | range) -> Array:
+    def _change_values(self, number: int, indices: Sequence[int] | range) -> Array:
         """Return the values with some of them changed.
 
         Args:
             number: 0 or 1, which of two changes.
-            which: indices of the parameters to change.
+            indices: indices of the parameters to change.
 
         Returns:
             Values (p,). Each is changed by another factor.
         """
         values = self.values.copy()
-        for k in which:
+        for index in indices:
             # Different factors, as the same factor would cancel in quotients of parameters.
-            values[k] = (
-                values[k] * (TRIAL_FACTORS[number] + k / 64.0)
-                if values[k]
-                else TRIAL_SHIFTS[number] * (1.0 + k / 8.0)
+            values[index] = (
+                values[index] * (TRIAL_FACTORS[number] + index / 64.0)
+                if values[index]
+                else TRIAL_SHIFTS[number] * (1.0 + index / 8.0)
             )
         return values
 
@@ -152,7 +154,9 @@ def _find_setters(model: Model, name: str) -> list[PropertySetter]:
     Raises:
         SettingError: the path leads to no number.
     """
-    setters = [place.make_setter(model) for place in find_properties(model, name)]
+    setters = [
+        property_location.make_setter(model) for property_location in find_properties(model, name)
+    ]
     if not setters:
         raise SettingError(
             f"the model has no number '{name}'{suggest_name(name, list_property_paths(model))}"
@@ -172,37 +176,40 @@ def _read_value(name: str, setters: Sequence[PropertySetter]) -> float:
     return values.pop()
 
 
-def _subtract_base(found: Array, base: Array) -> Array:
+def _subtract_base(changed: Array, base: Array) -> Array:
     """Return the changes of numbers; an unchanged infinite number has not changed.
 
     Args:
-        found: numbers after a change (k,).
+        changed: numbers after a change (k,).
         base: numbers before it (k,).
     """
-    same = found == base
-    return np.where(same, 0.0, found - np.where(same, 0.0, base))
+    is_equal = changed == base
+    return np.where(is_equal, 0.0, changed - np.where(is_equal, 0.0, base))
 
 
-def _check_linear(found: Array, base: Array, columns: Array, change: Array, what: str) -> None:
+def _check_linear(
+    changed: Array, base: Array, columns: Array, change: Array, description: str
+) -> None:
     """Check that changes of numbers lie on the linear functions.
 
     Args:
-        found: numbers after a change (k,).
+        changed: numbers after a change (k,).
         base: numbers before it (k,).
         columns: slopes by each changed parameter (k, m).
         change: changes of the parameters (m,).
-        what: the parameters, for messages.
+        description: the parameters, for messages.
 
     Raises:
         UnsupportedError: a number deviates.
     """
-    parts = columns * change
-    size = np.abs(base) + np.abs(parts).sum(axis=1)
+    linear_changes = columns * change
+    size = np.abs(base) + np.abs(linear_changes).sum(axis=1)
     if not np.all(
-        np.abs(_subtract_base(found, base) - parts.sum(axis=1)) <= LINEARITY_TOLERANCE * size
+        np.abs(_subtract_base(changed, base) - linear_changes.sum(axis=1))
+        <= LINEARITY_TOLERANCE * size
     ):
         raise UnsupportedError(
-            f"{what} cannot stay a symbol: the numbers of the equations are no linear function of it; "
+            f"{description} cannot stay a symbol: the numbers of the equations are no linear function of it; "
             "change it in the model and create the functions again"
         )
 
@@ -221,7 +228,7 @@ def insert_parameters(
         Numbers, some of them expressions.
     """
     result: list[Any] = list(numbers)
-    for place, parts in slopes.items():
-        for number, factor in parts:
-            result[place] = result[place] + (p[number] if factor == 1.0 else factor * p[number])
+    for index, terms in slopes.items():
+        for number, factor in terms:
+            result[index] = result[index] + (p[number] if factor == 1.0 else factor * p[number])
     return result

@@ -87,11 +87,11 @@ class Sensitivity(Tabular):
         Raises:
             SettingError: the state or the number does not exist.
         """
-        at = [
+        indices = [
             _find_index(*names)
             for names in (("state", self.states, state), ("number", self.numbers, number))
         ]
-        result: Array = self.derivatives[:, at[0], at[1]]
+        result: Array = self.derivatives[:, indices[0], indices[1]]
         return result
 
     @property
@@ -115,7 +115,7 @@ def sensitivity(
     to: float = 2.0,
     *,
     states: Iterable[str] = (),
-    **choices: Any,
+    **options: Any,
 ) -> Sensitivity:
     """Compute the derivatives of all states along a simulated motion by numbers and initial states.
 
@@ -132,7 +132,7 @@ def sensitivity(
         to: end of the motion, s.
         states: names of states (``/jointset/knee/flexion/value``) whose initial values count as
             numbers too.
-        choices: `accuracy`, `report_interval`, `initial`, `initial_speeds`, `equilibrate`,
+        options: `accuracy`, `report_interval`, `initial`, `initial_speeds`, `equilibrate`,
             `controls`, `progress` and `folder` of :class:`osimlite.simulation.Options`. The default
             accuracy of 1e-6 gives derivatives of a second of muscles with tendons to 1e-3 of the
             largest, and of smooth motions to 1e-5.
@@ -149,14 +149,14 @@ def sensitivity(
     Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
     """
     check_is_model(model)
-    for name in choices:
+    for name in options:
         if name not in OPTIONS:
             raise SettingError(
                 f"'{name}' is not an option of sensitivities, which follow Merson's steps of the model; "
                 f"leave it out ({', '.join(sorted(OPTIONS))} can be chosen)"
             )
-    accuracy = choices["accuracy"] = choices.get("accuracy") or DEFAULT_ACCURACY
-    folder = Path(choices.get("folder") or ".")
+    accuracy = options["accuracy"] = options.get("accuracy") or DEFAULT_ACCURACY
+    folder = Path(options.get("folder") or ".")
     with Simulation(model, "compiled", folder=folder) as simulation:
         if isinstance(parameters, TangentModel):
             tangent_model = parameters
@@ -175,14 +175,14 @@ def sensitivity(
             np.array([read_parameter(model, name) for name in tangent_model.parameters])
         )
         trajectory = simulation.run(
-            to, **{name: choices[name] for name in choices if name != "folder"}
+            to, **{name: options[name] for name in options if name != "folder"}
         )
-        _, _, held = resolve_initial_values(
+        _, _, fixed_coordinates = resolve_initial_values(
             simulation.mechanism,
-            _select_coordinate_values(simulation, choices),
-            choices.get("initial_speeds") or {},
+            _select_coordinate_values(simulation, options),
+            options.get("initial_speeds") or {},
         )
-        motion = _SensitivityRun(tangent_model, simulation, initial, held)
+        motion = _SensitivityRun(tangent_model, simulation, initial, fixed_coordinates)
         rows = motion.compute_rows(trajectory, accuracy)
     names = *tangent_model.parameters, *(tangent_model.states[k] for k in initial)
     return Sensitivity(
@@ -211,27 +211,29 @@ class _SensitivityRun:
         tangent_model: TangentModel,
         simulation: Simulation,
         initial: Sequence[int],
-        held: Sequence[Sequence[int]],
+        fixed_coordinates: Sequence[Sequence[int]],
     ) -> None:
         self._tangent_model = tangent_model
         self._simulation = simulation
         self._initial = initial
-        self._prescribed = held
+        self._prescribed = fixed_coordinates
         engine: Any = simulation.engine
         self._engine = engine
         infos = simulation.mechanism.coordinates
         order = self._engine.order
-        moving = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order]
-        known = [
-            *moving,
+        coordinate_states = [
+            f"{infos[index].path}/{quantity}" for quantity in ("value", "speed") for index in order
+        ]
+        named_states = [
+            *coordinate_states,
             *(variable.path for variable in simulation.state.variables if variable.is_named),
         ]
-        if {*known} != {
+        if {*named_states} != {
             *tangent_model.states
         } or tangent_model.controls != simulation.forces.controls.names:
             raise SettingError("the tangents are of another model; create them from this one")
-        own = [*moving, *simulation.state.paths]
-        self._places = [own.index(name) for name in tangent_model.states]
+        engine_states = [*coordinate_states, *simulation.state.paths]
+        self._places = [engine_states.index(name) for name in tangent_model.states]
         count = len(tangent_model.parameters)
         self._steps = tangent_model.steps(
             engine.current_controls, np.eye(count, count + len(initial))
@@ -267,17 +269,17 @@ class _SensitivityRun:
             SimulationError: a derivative is not finite.
         """
         start = self._pack_rows(trajectory)[0].tolist()
-        wanted = trajectory.times.tolist()
+        row_times = trajectory.times.tolist()
         # The trajectory has rows, but the derivative needs the steps; repeating the motion is
         # cheaper than storing all steps of every simulation.
-        times, states, ended = self._simulation.record_every_step(
-            0.0, start, wanted[-1], EngineSettings(accuracy=accuracy)
+        times, states, failure = self._simulation.record_every_step(
+            0.0, start, row_times[-1], EngineSettings(accuracy=accuracy)
         )
-        if ended is not None:
-            raise ended
+        if failure is not None:
+            raise failure
         # Three states suffice to notice tangents of another model.
-        for place in (0, len(times) // 2, -1):
-            self._check_same_rates(times[place], states[place])
+        for step in (0, len(times) // 2, -1):
+            self._check_same_rates(times[step], states[step])
         count = len(self._tangent_model.parameters)
         initial = self._initial
         slopes = np.zeros((len(self._places), count + len(initial)))
@@ -286,7 +288,7 @@ class _SensitivityRun:
         if self._simulation.constraints:
             self._project_start(rows[0], slopes)
         return integrate_sensitivities(
-            self._steps, times, rows, slopes, wanted, accuracy, self._tangent_model.states
+            self._steps, times, rows, slopes, row_times, accuracy, self._tangent_model.states
         )
 
     def _project_start(self, x: Array, slopes: Array) -> None:
@@ -303,26 +305,28 @@ class _SensitivityRun:
         size = len(self._tangent_model.coordinates)
         infos = {info.path: info for info in tangent_model.mechanism.coordinates}
         # As the simulation projects its start: values weigh equally, speeds by their size.
-        eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
-        eases[0][[infos[path].yielding for path in tangent_model.coordinates]] = YIELDING_FACTOR
+        mobilities = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
+        mobilities[0][[infos[path].yielding for path in tangent_model.coordinates]] = (
+            YIELDING_FACTOR
+        )
         by_numbers = np.eye(len(tangent_model.parameters), slopes.shape[1])
-        for part, (held, ease, equations) in enumerate(
+        for level, (fixed_indices, level_mobility, equations) in enumerate(
             zip(
                 self._prescribed,
-                eases,
+                mobilities,
                 tangent_model.compute_constraint_slopes(0.0, x),
                 strict=True,
             )
         ):
-            places = slice(part * size, (part + 1) * size)
-            paths = [tangent_model.mechanism.coordinates[place].path for place in held]
+            level_slice = slice(level * size, (level + 1) * size)
+            paths = [tangent_model.mechanism.coordinates[index].path for index in fixed_indices]
             # A scale of 0 keeps coordinates that the caller has set.
-            scales = np.where(np.isin(tangent_model.coordinates, paths), 0.0, ease)
+            scales = np.where(np.isin(tangent_model.coordinates, paths), 0.0, level_mobility)
             missing = equations @ np.vstack((slopes, by_numbers))
-            change = np.linalg.lstsq(equations[:, places] * scales, missing, rcond=RANK_TOLERANCE)[
-                0
-            ]
-            slopes[places] -= scales[:, None] * change
+            change = np.linalg.lstsq(
+                equations[:, level_slice] * scales, missing, rcond=RANK_TOLERANCE
+            )[0]
+            slopes[level_slice] -= scales[:, None] * change
 
     def _check_same_rates(self, t: float, y: Sequence[float]) -> None:
         """Check that the tangents have the same rates as the simulation.
@@ -334,18 +338,20 @@ class _SensitivityRun:
         Raises:
             SettingError: they differ.
         """
-        wanted = np.array(self._engine.compute_derivative(t, y))[self._places]
+        expected_rates = np.array(self._engine.compute_derivative(t, y))[self._places]
         state = np.asarray(y)[self._places]
-        found, _ = self._tangent_model.along(
+        tangent_rates, _ = self._tangent_model.along(
             t, state, self._engine.read_controls(), np.zeros((len(state), 0))
         )
-        off = np.abs(found - wanted)
-        if not np.all(off <= RATE_TOLERANCE * max(1.0, np.abs(wanted).max(initial=0.0))):
-            worst = self._tangent_model.states[
-                int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
+        differences = np.abs(tangent_rates - expected_rates)
+        if not np.all(
+            differences <= RATE_TOLERANCE * max(1.0, np.abs(expected_rates).max(initial=0.0))
+        ):
+            worst_state = self._tangent_model.states[
+                int(np.argmax(np.where(np.isfinite(differences), differences, np.inf)))
             ]
             raise SettingError(
-                f"at {t:g} s the tangents have another derivative of '{worst}' than the motion; create them from this "
+                f"at {t:g} s the tangents have another derivative of '{worst_state}' than the motion; create them from this "
                 "model"
             )
 
@@ -355,7 +361,7 @@ def integrate_sensitivities(
     times: Sequence[float],
     states: Array,
     slopes: Array,
-    wanted: Sequence[float],
+    output_times: Sequence[float],
     accuracy: float,
     names: Sequence[str],
 ) -> Array:
@@ -366,7 +372,7 @@ def integrate_sensitivities(
         times: times of the ends of all steps, s.
         states: states at these times (s, x).
         slopes: derivatives of the initial state along the directions (x, m).
-        wanted: times of the result (n,), from the start on, s.
+        output_times: times of the result (n,), from the start on, s.
         accuracy: accuracy of the motion.
         names: names of the states, for messages.
 
@@ -395,22 +401,22 @@ def integrate_sensitivities(
         y, error = steps.step(t0, t1, y0)
         size = np.abs(y)
         if not np.isfinite(size.sum()):
-            worst = names[int(np.nonzero(~np.isfinite(steps.slopes(y)).all(axis=1))[0][0])]
+            worst_state = names[int(np.nonzero(~np.isfinite(steps.slopes(y)).all(axis=1))[0][0])]
             raise SimulationError(
-                f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are not finite"
+                f"between {t0:g} and {t1:g} s the derivatives of '{worst_state}' are not finite"
             )
         # Weights are those of the integrator; errors are relative to the largest derivative by each number.
-        before = np.abs(y0)
-        weights = 1.0 / np.maximum(1.0, before[:, :, :1])
-        sizes = (np.maximum(before, size) * weights).max(axis=1)
+        start_size = np.abs(y0)
+        weights = 1.0 / np.maximum(1.0, start_size[:, :, :1])
+        sizes = (np.maximum(start_size, size) * weights).max(axis=1)
         errors = (np.abs(error) * weights).max(axis=1)
         if h > MIN_STEP_S and (errors > DERIVATIVE_ERROR_FACTOR * accuracy * sizes)[:, 1:].any():
             # The motion keeps its steps; only the derivatives are integrated with half of them.
-            middle = t0 + h / 2.0
-            return integrate_step(middle, t1, integrate_step(t0, middle, y0))
+            middle_time = t0 + h / 2.0
+            return integrate_step(middle_time, t1, integrate_step(t0, middle_time, y0))
         return y
 
-    result = np.empty((len(wanted), *slopes.shape))
+    result = np.empty((len(output_times), *slopes.shape))
     row = 1
     result[0] = slopes
     y = steps.blocks(states[0], slopes)
@@ -418,9 +424,9 @@ def integrate_sensitivities(
     values = [steps.blocks(state, slopes)[0, :, 0] for state in states]
     for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
         y[:, :, 0] = state
-        while row < len(wanted) and wanted[row] <= end:
-            y = integrate_step(t, wanted[row], y)
-            t = wanted[row]
+        while row < len(output_times) and output_times[row] <= end:
+            y = integrate_step(t, output_times[row], y)
+            t = output_times[row]
             result[row] = steps.slopes(y)
             row = row + 1
         if t < end:
@@ -439,32 +445,34 @@ def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> 
     Raises:
         SettingError: it is one.
     """
-    for place in find_properties(model, name):
-        what = str(place.steps[0])
-        state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
-        if what.startswith("default_") and state in tangent_model.states:
+    for location in find_properties(model, name):
+        property_name = str(location.steps[0])
+        state = (
+            f"{location.component}/{property_name.removeprefix('default_').removesuffix('_value')}"
+        )
+        if property_name.startswith("default_") and state in tangent_model.states:
             raise SettingError(
                 f"'{name}' is an initial value, which is fixed; pass '{state}' in `states`"
             )
 
 
 def _select_coordinate_values(
-    simulation: Simulation, choices: Mapping[str, Any]
+    simulation: Simulation, options: Mapping[str, Any]
 ) -> dict[str, float]:
     """Return the prescribed initial values of coordinates, without those of auxiliary states."""
     auxiliary = simulation.state.paths
     return {
         name: value
-        for name, value in (choices.get("initial") or {}).items()
+        for name, value in (options.get("initial") or {}).items()
         if name not in auxiliary
     }
 
 
-def _find_index(what: str, names: Sequence[str], name: str) -> int:
+def _find_index(noun: str, names: Sequence[str], name: str) -> int:
     """Return the index of a name.
 
     Args:
-        what: what is named, for messages.
+        noun: what is named, for messages.
         names: all names.
         name: the name.
 
@@ -472,5 +480,5 @@ def _find_index(what: str, names: Sequence[str], name: str) -> int:
         SettingError: the name does not exist.
     """
     if name not in names:
-        raise SettingError(f"there is no {what} '{name}'{suggest_path(name, names)}")
+        raise SettingError(f"there is no {noun} '{name}'{suggest_path(name, names)}")
     return names.index(name)

@@ -63,17 +63,17 @@ OPERATOR_HELPERS: dict[type, str] = {
 """Helper function of each arithmetic operator."""
 
 
-def _slice_vector(vector: Any, place: int) -> Any:
+def _slice_vector(vector: Any, start: int) -> Any:
     """Return the part of a vector that begins at an index."""
-    return vector.rest(place) if isinstance(vector, RecordedVector) else vector[place:]
+    return vector.rest(start) if isinstance(vector, RecordedVector) else vector[start:]
 
 
-def _call_law(address: int, *given: Any) -> int:
+def _call_law(address: int, *arguments: Any) -> int:
     """Run the law at an address on symbols.
 
     Args:
         address: number of the law.
-        given: its arguments; the last one is the offset of the item.
+        arguments: its arguments; the last one is the offset of the item.
 
     Returns:
         Outcome of the law.
@@ -84,11 +84,11 @@ def _call_law(address: int, *given: Any) -> int:
     law = pointers.laws[address]
     try:
         result: int = branches.run_all_branches(
-            f"the law {name_of(law)}", make_symbolic(law), *given
+            f"the law {name_of(law)}", make_symbolic(law), *arguments
         )
     except NoFormula as error:
         # The last argument is the item of the force, from which the message finds its name.
-        error.items.append(given[-1])
+        error.items.append(arguments[-1])
         raise
     return result
 
@@ -116,25 +116,25 @@ def make_symbolic(function: Any) -> Any:
     """
     if function not in _counterparts:
         writer = _KernelRewriter(function, "formula")
-        made = writer.compile_function()
-        _counterparts[function] = made
+        rewritten = writer.compile_function()
+        _counterparts[function] = rewritten
     return _counterparts[function]
 
 
 @contextmanager
-def replace_kernel(function: Any, twin: Any) -> Iterator[None]:
+def replace_kernel(function: Any, replacement: Any) -> Iterator[None]:
     """Call another function instead of a kernel on symbols within a block.
 
     Args:
         function: the kernel.
-        twin: the function that replaces it.
+        replacement: the function that replaces it.
     """
-    before = make_symbolic(function)
-    _counterparts[function] = twin
+    original = make_symbolic(function)
+    _counterparts[function] = replacement
     try:
         yield
     finally:
-        _counterparts[function] = before
+        _counterparts[function] = original
 
 
 def register_symbolic(function: Any) -> Any:
@@ -168,8 +168,8 @@ class _LazyFunction:
     def __init__(self, function: Any) -> None:
         self.function = function
 
-    def __call__(self, *given: Any) -> Any:
-        return make_symbolic(self.function)(*given)
+    def __call__(self, *arguments: Any) -> Any:
+        return make_symbolic(self.function)(*arguments)
 
 
 def _is_own_function(value: Any) -> bool:
@@ -198,7 +198,11 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
     def compile_function(self) -> Any:
         """Return the rewritten function, compiled."""
         tree = self.tree
-        body = [part for item in self.body for part in self._wrap_list(self.visit(item))]
+        body = [
+            rewritten_statement
+            for statement in self.body
+            for rewritten_statement in self._wrap_list(self.visit(statement))
+        ]
         # A variable that only one side assigns must exist on the other side, too.
         clear = [
             ast.Assign([_store_name(name)], _load_name("unset_"))
@@ -214,11 +218,11 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         )
         scope = _KernelScope(self.function)
         exec(code, scope)
-        made = scope[tree.name]
+        rewritten = scope[tree.name]
         return (
-            (lambda *given: branches.run_all_branches(self.name, made, *given))
+            (lambda *arguments: branches.run_all_branches(self.name, rewritten, *arguments))
             if self.returns_early
-            else made
+            else rewritten
         )
 
     @staticmethod
@@ -252,9 +256,11 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         # `a < b < c` becomes `a < b and b < c`, since the first test may be a symbol.
         if len(node.ops) == 1:
             return node
-        sides = [node.left, *node.comparators]
-        pairs = zip(sides, node.ops, sides[1:], strict=False)
-        return _make_call("both_", *(_wrap_lambda(ast.Compare(a, [op], [b])) for a, op, b in pairs))
+        operands = [node.left, *node.comparators]
+        comparisons = zip(operands, node.ops, operands[1:], strict=False)
+        return _make_call(
+            "both_", *(_wrap_lambda(ast.Compare(a, [op], [b])) for a, op, b in comparisons)
+        )
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         self.generic_visit(node)
@@ -272,10 +278,11 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         if sign is None:
             self.generic_visit(node)
             return node
-        before: Any = copy_tree(node.target)
-        before.ctx = ast.Load()
+        old_value: Any = copy_tree(node.target)
+        old_value.ctx = ast.Load()
         return ast.Assign(
-            [self.visit(node.target)], _make_call(sign, self.visit(before), self.visit(node.value))
+            [self.visit(node.target)],
+            _make_call(sign, self.visit(old_value), self.visit(node.value)),
         )
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
@@ -284,50 +291,54 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
 
     def visit_While(self, node: ast.While) -> ast.stmt:
         self.returns_early = True
-        part = self._number_part(node)
+        code_part = self._number_part(node)
         self.generic_visit(node)
         # A loop on symbols has no end that is known beforehand: each pass is a branch.
-        node.test = _make_call("decide_", part, node.test)
+        node.test = _make_call("decide_", code_part, node.test)
         return node
 
     def visit_If(self, node: ast.If) -> Any:
-        part = self._number_part(node)
+        code_part = self._number_part(node)
         is_failure = self._is_failure(node)
-        leaves = any(map(_exits_block, (*node.body, *node.orelse)))
+        exits_early = any(map(_exits_block, (*node.body, *node.orelse)))
         names = list_assigned_names(*node.body, *node.orelse)
         self.generic_visit(node)
         if is_failure:
             # A failure needs no other side: results where it is true become NaN.
             node.test = _make_call("fails_", node.test)
             return node
-        if leaves:
+        if exits_early:
             self.returns_early = True
-            node.test = _make_call("decide_", part, node.test)
+            node.test = _make_call("decide_", code_part, node.test)
             return node
         # The branch becomes a loop over its sides:
         # for side in branch.sides():
         #     restore the variables; if side: ... else: ...; branch.ends.append(variables)
         self.branch_variables.update(names)
-        branch, side, before = (f"{name}{self.number}_" for name in ("branch", "side", "before"))
+        branch_name, side_name, saved_name = (
+            f"{name}{self.number}_" for name in ("branch", "side", "before")
+        )
         self.number += 1
         test = node.test
-        node.test = _load_name(side)
+        node.test = _load_name(side_name)
         append = ast.Attribute(
-            ast.Attribute(_load_name(branch), "ends", ast.Load()), "append", ast.Load()
+            ast.Attribute(_load_name(branch_name), "ends", ast.Load()), "append", ast.Load()
         )
-        sides = ast.Call(ast.Attribute(_load_name(branch), "sides", ast.Load()), [], [])
-        back: list[ast.stmt] = [_assign_names(names, _load_name(before))] if names else []
-        after: list[ast.stmt] = (
-            [_assign_names(names, ast.Attribute(_load_name(branch), "end", ast.Load()))]
+        side_iterator = ast.Call(
+            ast.Attribute(_load_name(branch_name), "sides", ast.Load()), [], []
+        )
+        restoring: list[ast.stmt] = [_assign_names(names, _load_name(saved_name))] if names else []
+        assigning: list[ast.stmt] = (
+            [_assign_names(names, ast.Attribute(_load_name(branch_name), "end", ast.Load()))]
             if names
             else []
         )
-        kept = ast.Expr(ast.Call(append, [_load_tuple(names)], []))
+        recording = ast.Expr(ast.Call(append, [_load_tuple(names)], []))
         return [
-            ast.Assign([_store_name(branch)], _make_call("branch_", part, test)),
-            ast.Assign([_store_name(before)], _load_tuple(names)),
-            ast.For(_store_name(side), sides, [*back, node, kept], []),
-            *after,
+            ast.Assign([_store_name(branch_name)], _make_call("branch_", code_part, test)),
+            ast.Assign([_store_name(saved_name)], _load_tuple(names)),
+            ast.For(_store_name(side_name), side_iterator, [*restoring, node, recording], []),
+            *assigning,
         ]
 
     def _is_failure(self, node: ast.If) -> bool:
@@ -342,12 +353,12 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         match node:
             case ast.If(body=[ast.Return(value=ast.expr() as value)], orelse=[]):
                 returns = self.tree.returns
-                kind = (
+                return_type = (
                     returns.value
                     if isinstance(returns, ast.Constant)
                     else getattr(returns, "id", "")
                 )
-                return kind == "int" and ast.unparse(value) != "OUTCOME.OK"
+                return return_type == "int" and ast.unparse(value) != "OUTCOME.OK"
         return False
 
 
@@ -357,7 +368,7 @@ def _exits_block(node: ast.AST) -> bool:
         return True
     if isinstance(node, ast.For | ast.While):
         # A `break` in an inner loop leaves only that loop.
-        return any(isinstance(part, ast.Return) for part in ast.walk(node))
+        return any(isinstance(child, ast.Return) for child in ast.walk(node))
     return any(map(_exits_block, ast.iter_child_nodes(node)))
 
 
@@ -386,6 +397,6 @@ def _wrap_lambda(node: ast.expr) -> ast.Lambda:
     return ast.Lambda(ast.arguments([], [], None, [], [], None, []), node)
 
 
-def _make_call(function: str, *given: ast.expr) -> ast.Call:
+def _make_call(function: str, *arguments: ast.expr) -> ast.Call:
     """Return a call of a helper function."""
-    return ast.Call(_load_name(function), list(given), [])
+    return ast.Call(_load_name(function), list(arguments), [])

@@ -81,12 +81,12 @@ class SymbolicEvaluator:
         self._t = t
         self._y = y
         self._controls = controls
-        given: dict[int, int] = {}
-        for place, kernel in packed.kernels.items():
+        registered_laws: dict[int, int] = {}
+        for offset, kernel in packed.kernels.items():
             if not isinstance(kernel, str) and hasattr(kernel, "takes_symbols"):
-                given[place] = register_law(kernel)  # type: ignore[arg-type]
+                registered_laws[offset] = register_law(kernel)  # type: ignore[arg-type]
                 continue
-            if place in packed.owners and (
+            if offset in packed.owners and (
                 not isinstance(kernel, str) or kernel in UNSUPPORTED_KERNELS
             ):
                 reason = (
@@ -94,10 +94,12 @@ class SymbolicEvaluator:
                     if isinstance(kernel, str)
                     else "it is computed in Python"
                 )
-                raise UnsupportedError(f"'{self._path(place)}' has no formula for CasADi: {reason}")
+                raise UnsupportedError(
+                    f"'{self._path(offset)}' has no formula for CasADi: {reason}"
+                )
         self.structure: list[int] = Program(packed, PYTHON_CODE).ints.tolist()
-        for place, law_address in given.items():
-            self.structure[place + ITEM.LAW] = law_address
+        for offset, law_address in registered_laws.items():
+            self.structure[offset + ITEM.LAW] = law_address
         # The controls are arguments, so that the model's controllers are switched off.
         self.structure[MODEL.CONTROLS] = 0
         if self.structure[MODEL.CONSTRAINED]:
@@ -131,7 +133,7 @@ class SymbolicEvaluator:
         Returns:
             Workspace with the formulas of accelerations and probes.
         """
-        places = list_probe_items(self._packed, self._elements)
+        probe_offsets = list_probe_items(self._packed, self._elements)
 
         def law(
             model: RecordedVector,
@@ -141,8 +143,8 @@ class SymbolicEvaluator:
             f: RecordedVector,
         ) -> None:
             make_symbolic(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
-            for place in places:
-                make_symbolic(call)(model[place + ITEM.LAW], model, reals, data, y, f, place)
+            for offset in probe_offsets:
+                make_symbolic(call)(model[offset + ITEM.LAW], model, reals, data, y, f, offset)
 
         return self.run(law)
 
@@ -162,18 +164,20 @@ class SymbolicEvaluator:
         # A copy, as the items that act are rewritten for this call only.
         structure = [*self.structure]
         if pushing is not None:
-            first = structure[MODEL.ITEM_AT]
+            first_item = structure[MODEL.ITEM_AT]
             count = structure[MODEL.ITEMS]
-            items = [
-                item for item in structure[first : first + count] if self._path(item) in pushing
+            acting_items = [
+                item
+                for item in structure[first_item : first_item + count]
+                if self._path(item) in pushing
             ]
-            structure[MODEL.ITEMS] = len(items)
-            structure[first : first + len(items)] = items
+            structure[MODEL.ITEMS] = len(acting_items)
+            structure[first_item : first_item + len(acting_items)] = acting_items
             # One run without a batched kernel covers the items that are left.
-            run = structure[MODEL.RUN_AT]
-            structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
-            structure[run + RUN.FIRST] = 0
-            structure[run + RUN.END] = len(items)
+            run_offset = structure[MODEL.RUN_AT]
+            structure[MODEL.RUNS], structure[run_offset + RUN.LAW] = 1, 0
+            structure[run_offset + RUN.FIRST] = 0
+            structure[run_offset + RUN.END] = len(acting_items)
 
         def law(
             model: RecordedVector,
@@ -196,7 +200,7 @@ class SymbolicEvaluator:
             and the
                 link on which it acts.
         """
-        first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
+        rows_offset = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
 
         def law(
@@ -218,10 +222,11 @@ class SymbolicEvaluator:
                 row: RecordedVector,
             ) -> None:
                 # The place of the row in the work vector tells the equation.
-                key = (row.first - first) // size, link
-                before = wrenches.get(key, [0.0] * 6)
+                key = (row.first - rows_offset) // size, link
+                present_wrench = wrenches.get(key, [0.0] * 6)
                 wrenches[key] = [
-                    old + new for old, new in zip(before, (*torque, *force), strict=True)
+                    present + added
+                    for present, added in zip(present_wrench, (*torque, *force), strict=True)
                 ]
                 kernel(model, data, link, torque, force, row)
 
@@ -270,33 +275,35 @@ class SymbolicEvaluator:
         try:
             return branches.run_until_mergeable(run_once)
         except branches.NoFormula as error:
-            named = next(
+            path = next(
                 (self._path(item) for item in error.items if item in self._packed.owners), ""
             )
-            whose = f"'{named}'" if named else "the model"
+            subject = f"'{path}'" if path else "the model"
             raise UnsupportedError(
-                f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or use another class"
+                f"{subject} has no formula for CasADi: {error}; set its appliesForce to false, or use another class"
             ) from error
 
     def _find_load(
-        self, g: RecordedVector, gp: RecordedVector, room: RecordedVector, t: Any
+        self, g: RecordedVector, gp: RecordedVector, values: RecordedVector, t: Any
     ) -> None:
         """Write the values of loads into the work vector, instead of the kernel :func:`evaluate_load`.
 
         Args:
             g: integers of the load.
             gp: its numbers.
-            room: receives force, point and torque (9,).
+            values: receives force, point and torque (9,).
             t: time, s.
         """
         # The load's record is the last one that begins before its own integers.
-        owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
-        element: Any = self._elements[owner]
-        first = len(list_load_functions(self._elements[:owner]))
+        element_index = self._packed.owners[
+            max(item for item in self._packed.owners if item <= g.first)
+        ]
+        element: Any = self._elements[element_index]
+        first_load = len(list_load_functions(self._elements[:element_index]))
         for group, functions in enumerate(element.location.groups):
             for k in range(len(functions)):
-                room[3 * group + k] = self._loads[first + k]
-            first += len(functions)
+                values[3 * group + k] = self._loads[first_load + k]
+            first_load += len(functions)
 
 
 def list_load_functions(elements: Sequence[Any]) -> list[SmoothFunction]:

@@ -57,9 +57,9 @@ class BranchWideningSignal(Exception):
         part: part of the code that merged the value.
     """
 
-    def __init__(self, part: Any) -> None:
-        super().__init__(str(part))
-        self.part = part
+    def __init__(self, code_part: Any) -> None:
+        super().__init__(str(code_part))
+        self.part = code_part
 
 
 class UnmergeableValue:
@@ -71,8 +71,8 @@ class UnmergeableValue:
         part: part of the code that merged the value.
     """
 
-    def __init__(self, part: Any) -> None:
-        self.part = part
+    def __init__(self, code_part: Any) -> None:
+        self.part = code_part
 
     def _require_wider(self, *_: Any) -> Any:
         raise BranchWideningSignal(self.part)
@@ -100,23 +100,23 @@ class RecordedVector:
         self.cells = cells
         self.first = first
 
-    def __getitem__(self, place: Any) -> Number:
-        if type(place) is slice:
-            return self.cells[self.first + place.start : self.first + place.stop]
-        place = self.first + place
-        if place < 0:
+    def __getitem__(self, index: Any) -> Number:
+        if type(index) is slice:
+            return self.cells[self.first + index.start : self.first + index.stop]
+        index = self.first + index
+        if index < 0:
             raise IndexError("a kernel reads before the beginning of a vector")
-        return self.cells[place]
+        return self.cells[index]
 
-    def __setitem__(self, place: int, value: Number) -> None:
-        place = self.first + place
-        if place < 0:
+    def __setitem__(self, index: int, value: Number) -> None:
+        index = self.first + index
+        if index < 0:
             raise IndexError("a kernel writes before the beginning of a vector")
         if self.journals:
             self.journals[-1].setdefault(
-                (id(self.cells), place), (self.cells, place, self.cells[place])
+                (id(self.cells), index), (self.cells, index, self.cells[index])
             )
-        self.cells[place] = value
+        self.cells[index] = value
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -127,9 +127,9 @@ class RecordedVector:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def rest(self, place: int) -> RecordedVector:
+    def rest(self, start: int) -> RecordedVector:
         """Return the vector from an index on."""
-        return RecordedVector(self.cells, self.first + place)
+        return RecordedVector(self.cells, self.first + start)
 
 
 class _ActiveCondition:
@@ -155,12 +155,12 @@ def simplify_number(value: Any) -> Any:
 @contextmanager
 def restrict_condition(test: Any) -> Iterator[None]:
     """Restrict the active condition by a test within a block."""
-    before = where.condition
+    outer_condition = where.condition
     where.condition = combine_condition(test)
     try:
         yield
     finally:
-        where.condition = before
+        where.condition = outer_condition
 
 
 def combine_condition(test: Any) -> Any:
@@ -182,14 +182,14 @@ def guard_value(value: Any, instead: float = 1.0) -> Any:
     return value if where.condition is None else casadi.if_else(where.condition, value, instead)
 
 
-def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
+def merge_values(test: Any, a: Any, b: Any, code_part: Any) -> Any:
     """Return `a` where a test holds, else `b`.
 
     Args:
         test: symbol.
         a: number, tuple of numbers, or a value that is equal in both.
         b: value of the same kind.
-        part: part of the code, which is run for both sides if an unmergeable value is used.
+        code_part: part of the code, which is run for both sides if an unmergeable value is used.
 
     Returns:
         A selection of CasADi; the value itself if both are equal, or one is unset.
@@ -199,14 +199,14 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
     if isinstance(a, UnsetVariable):
         return b
     if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
-        parts = [merge_values(test, x, y, part) for x, y in zip(a, b, strict=True)]
-        return type(a)(*parts) if hasattr(a, "_fields") else tuple(parts)
+        merged = [merge_values(test, x, y, code_part) for x, y in zip(a, b, strict=True)]
+        return type(a)(*merged) if hasattr(a, "_fields") else tuple(merged)
     a = simplify_number(a)
     b = simplify_number(b)
     if isinstance(a, bool) and isinstance(b, bool):
         return a if a == b else (test if a else casadi.logic_not(test))
     if isinstance(a, UnmergeableValue) or isinstance(b, UnmergeableValue):
-        return UnmergeableValue(part)
+        return UnmergeableValue(code_part)
     if isinstance(a, SX) or isinstance(b, SX):
         # Equal expressions need no selection, which keeps the formulas small.
         if isinstance(a, SX) and isinstance(b, SX) and casadi.is_equal(a, b, 1):
@@ -216,7 +216,7 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
         return a
     if isinstance(a, float) or isinstance(b, float):
         return casadi.if_else(test, a, b)
-    return UnmergeableValue(part)
+    return UnmergeableValue(code_part)
 
 
 # ------------------------------------------------------------------------------------------ instead of Python's own
@@ -283,44 +283,44 @@ def power(a: Any, b: Any) -> Any:
     return (guard_value(a) if isinstance(a, SX) else a) ** b
 
 
-def logical_and(*parts: Callable[[], Any]) -> Any:
+def logical_and(*tests: Callable[[], Any]) -> Any:
     """Return the conjunction of lazily evaluated parts."""
-    return _evaluate_logical(parts, stop=False)
+    return _evaluate_logical(tests, stop=False)
 
 
-def logical_or(*parts: Callable[[], Any]) -> Any:
+def logical_or(*tests: Callable[[], Any]) -> Any:
     """Return the disjunction of lazily evaluated parts."""
-    return _evaluate_logical(parts, stop=True)
+    return _evaluate_logical(tests, stop=True)
 
 
-def _evaluate_logical(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
+def _evaluate_logical(tests: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
     """Evaluate parts in turn, each under the condition that the ones before did not decide.
 
     Args:
-        parts: functions that return tests.
+        tests: functions that return tests.
         stop: value that decides: False for a conjunction, True for a disjunction.
 
     Returns:
         The combined test.
     """
-    known: Any = None
-    before = where.condition
+    combined: Any = None
+    outer_condition = where.condition
     try:
-        for part in parts:
-            value = simplify_number(part())
+        for compute_test in tests:
+            value = simplify_number(compute_test())
             if not is_symbol(value):
                 if bool(value) is stop:
                     return stop
                 continue
-            known = (
+            combined = (
                 value
-                if known is None
-                else (casadi.logic_or if stop else casadi.logic_and)(known, value)
+                if combined is None
+                else (casadi.logic_or if stop else casadi.logic_and)(combined, value)
             )
             where.condition = combine_condition(casadi.logic_not(value) if stop else value)
     finally:
-        where.condition = before
-    return (not stop) if known is None else known
+        where.condition = outer_condition
+    return (not stop) if combined is None else combined
 
 
 def logical_not(value: Any) -> Any:
@@ -328,22 +328,22 @@ def logical_not(value: Any) -> Any:
     return casadi.logic_not(value) if is_symbol(value) else not simplify_number(value)
 
 
-def select_value(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: Any) -> Any:
+def select_value(test: Any, a: Callable[[], Any], b: Callable[[], Any], code_part: Any) -> Any:
     """Return ``a() if test else b()``.
 
     Args:
         test: condition.
         a: function for the value if the test holds.
         b: function for the value otherwise.
-        part: part of the code, for messages and identity.
+        code_part: part of the code, for messages and identity.
     """
     if not is_symbol(test):
         return a() if simplify_number(test) else b()
     with restrict_condition(test):
-        one = a()
+        true_value = a()
     with restrict_condition(casadi.logic_not(test)):
-        other = b()
-    return merge_values(test, one, other, part)
+        false_value = b()
+    return merge_values(test, true_value, false_value, code_part)
 
 
 def is_zero(value: Any) -> bool:
@@ -367,10 +367,10 @@ def _reduce_values(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
     Returns:
         A symbol if one of the values is a symbol, else a number.
     """
-    result, *rest = map(simplify_number, values)
-    for value in rest:
-        take = symbolic if isinstance(result, SX) or isinstance(value, SX) else numeric
-        result = take(result, value)
+    result, *other_values = map(simplify_number, values)
+    for value in other_values:
+        operation = symbolic if isinstance(result, SX) or isinstance(value, SX) else numeric
+        result = operation(result, value)
     return result
 
 

@@ -84,9 +84,9 @@ class DualMachine:
     def __init__(
         self, packed: PackedModel, forces: Forces, entries: Sequence[str], extra_size: int = 0
     ) -> None:
-        for place, kernel in packed.kernels.items():
-            if place in packed.owners and not isinstance(kernel, str):
-                path = forces.elements[packed.owners[place]].path
+        for offset, kernel in packed.kernels.items():
+            if offset in packed.owners and not isinstance(kernel, str):
+                path = forces.elements[packed.owners[offset]].path
                 raise UnsupportedError(
                     f"'{path}' is computed in Python, which has no derivatives; set its appliesForce to false"
                 )
@@ -138,14 +138,14 @@ class TangentModel(DifferentiableModel):
         slopes = self._parameters.slopes if self._parameters else {}
         self._parameter_rows = [*slopes]
         self._slopes = np.zeros((len(slopes), len(self.parameters)))
-        for row, parts in zip(self._slopes, slopes.values(), strict=True):
-            for number, factor in parts:
+        for row, terms in zip(self._slopes, slopes.values(), strict=True):
+            for number, factor in terms:
                 row[number] = factor
         self._machine = machine = DualMachine(packed, self.forces, ("evaluate",))
         # The controls are arguments, so that the model's controllers are switched off.
         machine.program.ints[MODEL.CONTROLS] = 0
-        first = int(packed.structure[MODEL.WORK_CONTROL])
-        self._control_rows = machine.w[first : first + len(self.controls)]
+        first_control = int(packed.structure[MODEL.WORK_CONTROL])
+        self._control_rows = machine.w[first_control : first_control + len(self.controls)]
         self._y, self._f = (np.zeros((len(self.states), 1 + DIRECTIONS)) for _ in range(2))
         self._evaluate = machine.bind_kernel("evaluate", self._y, self._f)
 
@@ -187,7 +187,7 @@ class TangentModel(DifferentiableModel):
         dx: Array,
         du: Array | None = None,
         dp: Array | None = None,
-        look: Callable[[slice, slice], None] | None = None,
+        after_evaluation: Callable[[slice, slice], None] | None = None,
     ) -> tuple[Array, Array]:
         """Compute the rates and their derivatives along m directions.
 
@@ -198,7 +198,7 @@ class TangentModel(DifferentiableModel):
             dx: directions of the state (x, m).
             du: directions of the controls (u, m); 0 if None.
             dp: directions of the parameters (p, m); 0 if None.
-            look: function that is called after each evaluation, with the slice of its directions
+            after_evaluation: function that is called after each evaluation, with the slice of its directions
                 and their columns in a row of dual numbers.
 
         Returns:
@@ -214,18 +214,18 @@ class TangentModel(DifferentiableModel):
         result = np.full(dx.shape, np.nan)
         # Machine code computes DIRECTIONS derivatives at once; more directions take more
         # evaluations.
-        for part, own in split_directions(dx.shape[1]):
+        for direction_slice, column_slice in split_directions(dx.shape[1]):
             machine.begin(t)
-            y[self.state_indices, own] = dx[:, part]
+            y[self.state_indices, column_slice] = dx[:, direction_slice]
             if du is not None:
-                self._control_rows[:, own] = du[:, part]
+                self._control_rows[:, column_slice] = du[:, direction_slice]
             if dp is not None:
-                self.fill_derivatives(dp[:, part], machine.x[:, own])
+                self.fill_derivatives(dp[:, direction_slice], machine.x[:, column_slice])
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
                 rates = f[self.state_indices, 0]
-                result[:, part] = f[self.state_indices, own]
-                if look is not None:
-                    look(part, own)
+                result[:, direction_slice] = f[self.state_indices, column_slice]
+                if after_evaluation is not None:
+                    after_evaluation(direction_slice, column_slice)
         if dp is not None:
             # The derivatives of the numbers must not remain for calls without directions of
             # parameters.
@@ -242,7 +242,7 @@ class TangentModel(DifferentiableModel):
         return {group: tuple(labels) for group, (labels, _) in self._compute_outputs().items()}
 
     def compute_outputs(
-        self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]
+        self, t: float, x: Array, u: Array, output_indices: Sequence[tuple[str, int]]
     ) -> tuple[Array, Array, Array]:
         """Compute outputs and their derivatives.
 
@@ -250,30 +250,32 @@ class TangentModel(DifferentiableModel):
             t: time, s.
             x: state (x,).
             u: controls (u,).
-            chosen: group of each output, and its index among `output_names` of the group.
+            output_indices: group of each output, and its index among `output_names` of the group.
 
         Returns:
             Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
         """
         size = len(x)
         # Unit directions: each state, then each control.
-        both = np.eye(size + len(u))
-        y = np.full(len(chosen), np.nan)
-        slopes = np.full((len(chosen), size + len(u)), np.nan)
+        directions = np.eye(size + len(u))
+        y = np.full(len(output_indices), np.nan)
+        slopes = np.full((len(output_indices), size + len(u)), np.nan)
 
-        def look(part: slice, own: slice) -> None:
-            for place, probe in self._probe_kernels:
-                probe(place)
-            known = self._compute_outputs()
-            for row, (group, k) in enumerate(chosen):
-                number = known[group][1][k]
+        def store_outputs(direction_slice: slice, column_slice: slice) -> None:
+            for offset, probe in self._probe_kernels:
+                probe(offset)
+            output_groups = self._compute_outputs()
+            for row, (group, k) in enumerate(output_indices):
+                number = output_groups[group][1][k]
                 y[row] = number
-                slopes[row, part] = (
+                slopes[row, direction_slice] = (
                     # A number that depends on nothing has no slopes.
-                    number.slopes[: own.stop - 1] if isinstance(number, DualNumber) else 0.0
+                    number.slopes[: column_slice.stop - 1]
+                    if isinstance(number, DualNumber)
+                    else 0.0
                 )
 
-        self.along(t, x, u, both[:size], both[size:], look=look)
+        self.along(t, x, u, directions[:size], directions[size:], after_evaluation=store_outputs)
         return y, slopes[:, :size], slopes[:, size:]
 
     def _compute_outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
@@ -286,17 +288,17 @@ class TangentModel(DifferentiableModel):
             axis for _, _, point in locate_stations(self.mechanism, self._packed) for axis in point
         ]
         machine = self._machine
-        found = DualWorkspace(machine.program.ints, machine.x, machine.w)
-        return compute_output_columns(self.mechanism, self._packed, self.forces, found, points)
+        workspace = DualWorkspace(machine.program.ints, machine.x, machine.w)
+        return compute_output_columns(self.mechanism, self._packed, self.forces, workspace, points)
 
     @cached_property
     def _probe_kernels(self) -> list[tuple[int, Callable[[int], int]]]:
         """Items of the probes with their kernels."""
-        places = list_probe_items(self._packed, self.forces.elements)
+        probe_offsets = list_probe_items(self._packed, self.forces.elements)
         kernels = self._packed.kernels
         return [
-            (place, self._machine.bind_kernel(str(kernels[place + ITEM.LAW]), self._y, self._f))
-            for place in places
+            (offset, self._machine.bind_kernel(str(kernels[offset + ITEM.LAW]), self._y, self._f))
+            for offset in probe_offsets
         ]
 
     def compute_constraint_slopes(self, t: float, x: Array) -> tuple[Array, Array]:
@@ -317,14 +319,14 @@ class TangentModel(DifferentiableModel):
         h = s[s[MODEL.CONSTRAINED] :]
         freedoms = int(s[MODEL.DOFS])
         count = int(h[CONSTRAINED.EQUATIONS])
-        both = np.eye(size + len(self.p))
-        positions = np.zeros((count, len(both)))
-        speeds = np.zeros((count, len(both)))
+        directions = np.eye(size + len(self.p))
+        positions = np.zeros((count, len(directions)))
+        speeds = np.zeros((count, len(directions)))
 
-        def look(part: slice, own: slice) -> None:
+        def store_errors(direction_slice: slice, column_slice: slice) -> None:
             rows, errors, rates = (
-                w[h[at] :][: count * each]
-                for at, each in (
+                w[h[work_offset] :][: count * row_size]
+                for work_offset, row_size in (
                     (CONSTRAINED.WORK_ROWS, freedoms),
                     (CONSTRAINED.WORK_ERRORS, 1),
                     (CONSTRAINED.WORK_RATES, 1),
@@ -332,19 +334,26 @@ class TangentModel(DifferentiableModel):
             )
             rows = rows.reshape(count, freedoms, -1)
             u = y[freedoms : 2 * freedoms]
-            positions[:, part] = errors[:, own]
+            positions[:, direction_slice] = errors[:, column_slice]
             # The errors of the speeds are G u - rates: the product rule gives dG u + G du.
-            moved = np.einsum("ijk,j->ik", rows[:, :, own], u[:, 0]) + rows[:, :, 0] @ u[:, own]
-            speeds[:, part] = moved - rates[:, own]
+            speed_changes = (
+                np.einsum("ijk,j->ik", rows[:, :, column_slice], u[:, 0])
+                + rows[:, :, 0] @ u[:, column_slice]
+            )
+            speeds[:, direction_slice] = speed_changes - rates[:, column_slice]
 
-        self.along(t, x, self.u, both[:size], None, both[size:], look=look)
+        self.along(
+            t, x, self.u, directions[:size], None, directions[size:], after_evaluation=store_errors
+        )
         # Only some equations restrict positions; the others restrict speeds alone.
-        of_places = [
+        position_rows = [
             row
-            for at in s[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
-            for row in range(s[at + CONSTRAINT.FIRST_EQUATION], s[at + CONSTRAINT.END_POSITION])
+            for work_offset in s[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
+            for row in range(
+                s[work_offset + CONSTRAINT.FIRST_EQUATION], s[work_offset + CONSTRAINT.END_POSITION]
+            )
         ]
-        return positions[of_places], speeds
+        return positions[position_rows], speeds
 
     def linear(
         self, t: float, x: Array, u: Array, p: Array | None = None
@@ -361,11 +370,11 @@ class TangentModel(DifferentiableModel):
             Rates (x,), derivatives by the state (x, x), and by the controls (x, u).
         """
         size = len(x)
-        both = np.eye(size + len(u))
+        directions = np.eye(size + len(u))
         if p is not None:
             self.take(p)
-        rates, found = self.along(t, x, u, both[:size], both[size:])
-        return rates, found[:, :size], found[:, size:]
+        rates, slopes = self.along(t, x, u, directions[:size], directions[size:])
+        return rates, slopes[:, :size], slopes[:, size:]
 
     def steps(self, controls: Controls, dp: Array) -> TangentSteps:
         """Return integration steps of a controlled motion, with their derivatives.
@@ -424,18 +433,18 @@ class TangentSteps:
         places: indices of the states in the packed order.
     """
 
-    def __init__(self, packed: PackedModel, forces: Forces, places: Sequence[int]) -> None:
-        size = len(places)
-        self.state_indices = places
+    def __init__(self, packed: PackedModel, forces: Forces, state_indices: Sequence[int]) -> None:
+        size = len(state_indices)
+        self.state_indices = state_indices
         method = int(packed.structure[MODEL.WORK_SIZE])
-        first = int(packed.structure[MODEL.WORK_STATE])
+        first_offset = int(packed.structure[MODEL.WORK_STATE])
         # With constraints no error is small enough, so that the kernel never projects the end of a step.
         self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
         self._machine = machine = DualMachine(
             packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size
         )
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
-        self._errors = machine.w[first + ERRORS * size :][:size]
+        self._errors = machine.w[first_offset + ERRORS * size :][:size]
         self._h = machine.w[method:, 0]
         self._evaluate = machine.bind_kernel("evaluate", self._start, self._start[size:])
         self._step: Callable[[], int] = partial(
@@ -452,11 +461,13 @@ class TangentSteps:
         self._count = changes.shape[1]
         self._number = -1
         self._numbers = [np.zeros(self._machine.x.shape) for _ in split_directions(self._count)]
-        for (part, own), block in zip(split_directions(self._count), self._numbers, strict=True):
+        for (direction_slice, column_slice), block in zip(
+            split_directions(self._count), self._numbers, strict=True
+        ):
             # Each block holds the numbers for DIRECTIONS directions, as parameters differ by
             # direction.
             block[:, 0] = numbers
-            block[:, own] = changes[:, part]
+            block[:, column_slice] = changes[:, direction_slice]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
         """Return the blocks of a state with its derivatives.
@@ -470,8 +481,10 @@ class TangentSteps:
         """
         result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
         result[:, self.state_indices, 0] = y
-        for block, (part, own) in zip(result, split_directions(slopes.shape[1]), strict=True):
-            block[self.state_indices, own] = slopes[:, part]
+        for block, (direction_slice, column_slice) in zip(
+            result, split_directions(slopes.shape[1]), strict=True
+        ):
+            block[self.state_indices, column_slice] = slopes[:, direction_slice]
         return result
 
     def slopes(self, blocks: Array) -> Array:
@@ -483,11 +496,11 @@ class TangentSteps:
         Returns:
             Derivatives (x, m) in the order of the model.
         """
-        parts = [
-            block[self.state_indices, own]
-            for block, (_, own) in zip(blocks, split_directions(self._count), strict=True)
+        columns = [
+            block[self.state_indices, column_slice]
+            for block, (_, column_slice) in zip(blocks, split_directions(self._count), strict=True)
         ]
-        return np.hstack(parts)
+        return np.hstack(columns)
 
     def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:
         """Compute a step; values that do not exist are NaN.
@@ -538,9 +551,9 @@ def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
         directions
             there is one empty slice, so that the values are computed.
     """
-    for first in range(0, max(count, 1), DIRECTIONS):
-        size = min(DIRECTIONS, max(count - first, 0))
-        yield slice(first, first + size), slice(1, 1 + size)
+    for start in range(0, max(count, 1), DIRECTIONS):
+        size = min(DIRECTIONS, max(count - start, 0))
+        yield slice(start, start + size), slice(1, 1 + size)
 
 
 @cache

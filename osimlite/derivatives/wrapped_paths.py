@@ -59,15 +59,15 @@ class SymbolicPath:
         """Number of symbols: the length, and moment arm and speed for each coordinate."""
         return 1 + 2 * len(self.coordinates)
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, link_placements: Places) -> list[ForceRecord]:
         """Return the records of a path that is a function of coordinates.
 
         See :mod:`osimlite.mechanics.kernels.function_paths`.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_placements: placement of the bodies in the links of the tree.
         """
-        freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
+        freedoms = [link_placements.freedom(coordinate) for coordinate in self.coordinates]
         count = len(freedoms)
 
         def write_length(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
@@ -80,26 +80,42 @@ class SymbolicPath:
 
         def write_speed(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
             rates = zip(self.symbols[1 + count :], freedoms, strict=True)
-            first = s[MODEL.DOFS]
+            first_speed = s[MODEL.DOFS]
             w.rest(s[item + ITEM.RECORD])[0] = sum(
-                (by * y[first + place] for by, place in rates if place >= 0), 0.0
+                (
+                    derivative * y[first_speed + freedom]
+                    for derivative, freedom in rates
+                    if freedom >= 0
+                ),
+                0.0,
             )
             return OUTCOME.OK
 
         write_length.takes_symbols = write_speed.takes_symbols = True  # type: ignore[attr-defined]
-        given = ForceRecord(
+        length_record = ForceRecord(
             "",
             record_size=FUNCTION_WORK.DERIVATIVES + count,
             is_part=True,
             python=register_symbolic(write_length),
         )
-        speed = ForceRecord("", record_size=1, is_part=True, python=register_symbolic(write_speed))
+        speed_record = ForceRecord(
+            "", record_size=1, is_part=True, python=register_symbolic(write_speed)
+        )
         # The records of a FunctionBasedPath, in which two kernels are replaced by these functions.
-        before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
-        backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
-        ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
+        part_records = [ForceRecord("pull_coordinates", is_part=True), length_record, speed_record]
+        record_distances = [
+            sum(ITEM.OWN + len(item.ints) for item in part_records[first:]) for first in range(3)
+        ]
+        ints = (
+            record_distances[0],
+            count,
+            record_distances[1],
+            record_distances[2],
+            *freedoms,
+            *[0] * count,
+        )
         return [
-            *before,
+            *part_records,
             ForceRecord(
                 "function_path", ints, record_size=FUNCTION_PATH_WORK.ARMS + count, is_part=True
             ),
@@ -122,31 +138,37 @@ class WrappedPaths:
     """
 
     def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int]) -> None:
-        owners: list[Any] = [item for item in forces.elements if _is_wrapped(item)]
+        wrapped_forces: list[Any] = [item for item in forces.elements if _is_wrapped(item)]
         self.forces = forces
         self.symbolic_paths = list[SymbolicPath]()
         self.names = tuple[str, ...]()
         self.size = 0
-        if not owners:
+        if not wrapped_forces:
             return
         self._order = list(order)
         self._still = np.zeros(len(mechanism.coordinates))
         self._default = np.array([info.default_value for info in mechanism.coordinates])
         self._system = PathSystem(
             mechanism.without_constraints(),
-            Forces(tuple(MeasuredPath(item.path, item.location) for item in owners)),
+            Forces(tuple(MeasuredPath(item.path, item.location) for item in wrapped_forces)),
         )
         poses = self._sample_poses(mechanism)
         arms = np.abs(self._system.compute_pulls(poses)).max(axis=0)
         # A path depends on the coordinates about which it has a moment arm in one of the poses.
-        moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
-        self.symbolic_paths = [SymbolicPath(coordinates) for coordinates in moved]
-        self._groups = _group_coordinates(moved)
-        self.names = tuple(item.path for item in owners)
+        coordinates_of_paths = [[k for k in self._order if row[k] > 0.0] for row in arms]
+        self.symbolic_paths = [SymbolicPath(coordinates) for coordinates in coordinates_of_paths]
+        self._groups = _group_coordinates(coordinates_of_paths)
+        self.names = tuple(item.path for item in wrapped_forces)
         self.size = sum(item.size for item in self.symbolic_paths)
-        others = {item.path: given for item, given in zip(owners, self.symbolic_paths, strict=True)}
+        symbolic_path_by_path = {
+            item.path: symbolic_path
+            for item, symbolic_path in zip(wrapped_forces, self.symbolic_paths, strict=True)
+        }
         elements = (
-            replace(e, location=others[e.path]) if e.path in others else e for e in forces.elements
+            replace(e, location=symbolic_path_by_path[e.path])
+            if e.path in symbolic_path_by_path
+            else e
+            for e in forces.elements
         )
         self.forces = replace(forces, elements=tuple(elements))
 
@@ -161,10 +183,12 @@ class WrappedPaths:
         """
         result = np.zeros((len(self.symbolic_paths), len(pose)))
         for group in self._groups:
-            moving = np.zeros(len(pose))
-            moving[group] = 1.0
+            unit_speeds = np.zeros(len(pose))
+            unit_speeds[group] = 1.0
             # No path depends on two of these coordinates, so that one evaluation serves all.
-            result[:, group] = self._system.measure_paths(pose, moving, PATH_WORK.SPEED)[:, None]
+            result[:, group] = self._system.measure_paths(pose, unit_speeds, PATH_WORK.SPEED)[
+                :, None
+            ]
         return [
             row[[*item.coordinates]] for row, item in zip(result, self.symbolic_paths, strict=True)
         ]
@@ -183,8 +207,8 @@ class WrappedPaths:
         bounds = np.array([info.range for info in mechanism.coordinates]).reshape(-1, 2)
         # Ranges without meaning, such as -99999 to 99999, are replaced by one unit around the
         # default.
-        wide = bounds[:, 1] - bounds[:, 0] > 2.0 * np.pi
-        bounds[wide] = self._default[wide, None] + np.array([-1.0, 1.0])
+        is_too_wide = bounds[:, 1] - bounds[:, 0] > 2.0 * np.pi
+        bounds[is_too_wide] = self._default[is_too_wide, None] + np.array([-1.0, 1.0])
         return bounds[:, 0] + rng.random((SAMPLED_POSES, len(bounds))) * (
             bounds[:, 1] - bounds[:, 0]
         )
@@ -195,10 +219,10 @@ class WrappedPaths:
         Args:
             symbols: symbols (size,).
         """
-        first = 0
-        for item in self.symbolic_paths:
-            item.symbols = [symbols[first + k] for k in range(item.size)]
-            first += len(item.symbols)
+        start = 0
+        for symbolic_path in self.symbolic_paths:
+            symbolic_path.symbols = [symbols[start + k] for k in range(symbolic_path.size)]
+            start += len(symbolic_path.symbols)
 
     def measure_paths(self, q: Array) -> Array:
         """Return lengths, moment arms and speeds of the paths.
@@ -214,11 +238,11 @@ class WrappedPaths:
         lengths = self._system.measure_paths(pose, self._still, PATH_WORK.LENGTH)
         (arms,) = self._system.compute_pulls(pose[None])
         speeds = self._measure_speeds(pose)
-        parts = zip(lengths, arms, speeds, self.symbolic_paths, strict=True)
+        measures = zip(lengths, arms, speeds, self.symbolic_paths, strict=True)
         return np.concatenate(
             [
-                np.concatenate([[length], arm[[*item.coordinates]], speed])
-                for length, arm, speed, item in parts
+                np.concatenate([[length], arm[[*symbolic_path.coordinates]], speed])
+                for length, arm, speed, symbolic_path in measures
             ]
         )
 
@@ -232,36 +256,48 @@ class WrappedPaths:
             Derivatives (size, n).
         """
         result = np.zeros((self.size, len(q)))
-        owners = np.repeat(
-            np.arange(len(self.symbolic_paths)), [item.size for item in self.symbolic_paths]
+        path_of_row = np.repeat(
+            np.arange(len(self.symbolic_paths)),
+            [symbolic_path.size for symbolic_path in self.symbolic_paths],
         )
         for group in self._groups:
-            columns = [self._order.index(place) for place in group]
-            one, two = (
+            columns = [self._order.index(coordinate) for coordinate in group]
+            near_values, far_values = (
                 [self.measure_paths(_shift_coordinates(q, columns, sign * h)) for sign in (1, -1)]
                 for h in (DIFFERENCE_STEP, 2.0 * DIFFERENCE_STEP)
             )
             # Central differences with steps h and 2 h, extrapolated: the error is of fourth order
             # in h.
-            slope = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * DIFFERENCE_STEP)
-            for place, column in zip(group, columns, strict=True):
-                own = np.array([place in item.coordinates for item in self.symbolic_paths])[owners]
-                result[own, column] = slope[own]
+            slope = (8.0 * (near_values[0] - near_values[1]) - (far_values[0] - far_values[1])) / (
+                12.0 * DIFFERENCE_STEP
+            )
+            for coordinate, column in zip(group, columns, strict=True):
+                depends = np.array(
+                    [
+                        coordinate in symbolic_path.coordinates
+                        for symbolic_path in self.symbolic_paths
+                    ]
+                )[path_of_row]
+                result[depends, column] = slope[depends]
         return result
 
     @property
     def pattern(self) -> Any:
         """Sparsity pattern of the derivatives that `compute_slopes` returns."""
-        places = {place: k for k, place in enumerate(self._order)}
+        column_by_coordinate = {
+            coordinate_index: k for k, coordinate_index in enumerate(self._order)
+        }
         rows = list[int]()
         columns = list[int]()
-        first = 0
-        for item in self.symbolic_paths:
-            count = item.size
-            for row in range(first, first + count):
-                rows += [row] * len(item.coordinates)
-                columns += [places[coordinate] for coordinate in item.coordinates]
-            first += count
+        first_row = 0
+        for symbolic_path in self.symbolic_paths:
+            count = symbolic_path.size
+            for row in range(first_row, first_row + count):
+                rows += [row] * len(symbolic_path.coordinates)
+                columns += [
+                    column_by_coordinate[coordinate] for coordinate in symbolic_path.coordinates
+                ]
+            first_row += count
         return casadi.Sparsity.triplet(self.size, len(self._order), rows, columns)
 
     def make_function(self) -> Any:
@@ -281,16 +317,16 @@ class WrappedPaths:
         )
 
 
-def _shift_coordinates(q: Array, places: Sequence[int], by: float) -> Array:
+def _shift_coordinates(q: Array, indices: Sequence[int], amount: float) -> Array:
     """Return values with some of them changed by the same amount.
 
     Args:
         q: values (n,).
-        places: indices of the values to change.
-        by: the amount.
+        indices: indices of the values to change.
+        amount: the amount.
     """
     result = q.copy()
-    result[places] += by
+    result[indices] += amount
     return result
 
 
@@ -307,14 +343,21 @@ def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
         Groups of coordinates.
     """
     groups: list[list[int]] = []
-    for place in dict.fromkeys(place for own in paths for place in own):
+    for coordinate in dict.fromkeys(
+        coordinate for path_coordinates in paths for coordinate in path_coordinates
+    ):
         # Coordinates that share a path with this one cannot be in its group.
-        beside = {other for own in paths if place in own for other in own}
-        group = next((each for each in groups if not beside & {*each}), None)
+        conflicting = {
+            neighbour
+            for path_coordinates in paths
+            if coordinate in path_coordinates
+            for neighbour in path_coordinates
+        }
+        group = next((candidate for candidate in groups if not conflicting & {*candidate}), None)
         if group is None:
-            groups.append([place])
+            groups.append([coordinate])
         else:
-            group.append(place)
+            group.append(coordinate)
     return groups
 
 
@@ -348,13 +391,13 @@ class _NumericCallback(casadi.Callback):  # type: ignore[misc]
         self,
         name: str,
         sizes: Sequence[int],
-        out: Any,
+        output_sparsity: Any,
         function: Callable[..., Array],
         slopes: Any = None,
     ) -> None:
         casadi.Callback.__init__(self)
         self._sizes = sizes
-        self._out = out
+        self._out = output_sparsity
         self._call = function
         self._slopes = slopes
         # CasADi differentiates the slopes by finite differences, which gives the second
@@ -373,9 +416,9 @@ class _NumericCallback(casadi.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, k: int) -> Any:
         return self._out
 
-    def eval(self, given: Sequence[Any]) -> list[Any]:
-        found = self._call(*(np.array(item).reshape(-1) for item in given))
-        return [casadi.DM(found) if found.ndim == 1 else casadi.DM(found)[self._out]]
+    def eval(self, arguments: Sequence[Any]) -> list[Any]:
+        values = self._call(*(np.array(argument).reshape(-1) for argument in arguments))
+        return [casadi.DM(values) if values.ndim == 1 else casadi.DM(values)[self._out]]
 
     def has_jacobian(self) -> bool:
         return self._slopes is not None
