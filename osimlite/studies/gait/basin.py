@@ -65,33 +65,35 @@ class Basin:
 
 
 def sample_perturbed_starts(
-    step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int
+    step_map: StepMap, state: ArrayLike, max_change: float, count: int, seed: int
 ) -> Floats:
     """Draw random initial states (count, y) near a state.
 
-    Each value and speed is multiplied by a uniform random number between 1 - `part` and 1 + `part`,
+    Each value and speed is multiplied by a uniform random number between 1 - `max_change` and 1 + `max_change`,
     except along neutral directions. Then the walker is lifted or lowered until the penetration of
     the stance foot is as before.
 
     Args:
         step_map: step map of the walker.
         state: state (y,), preferably in single support.
-        part: largest relative change, for example 0.05.
+        max_change: largest relative change, for example 0.05.
         count: number of initial states.
         seed: seed of the random numbers.
     """
     # Only the part of the change along `basis` is applied: the rest changes nothing of the motion.
-    here = np.array(state, dtype=float)
-    change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
+    center = np.array(state, dtype=float)
+    change = (
+        np.random.default_rng(seed).uniform(-max_change, max_change, (count, len(center))) * center
+    )
     engine, footing = step_map.engine, step_map.footing
-    _, depths = measure_along_slope(engine, here[None])
+    _, depths = measure_along_slope(engine, center[None])
     # In single support only the stance foot penetrates the ground; its penetration is kept.
     deepest = [
         max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet
     ]
     foot = int(np.argmax(deepest))
     return lift_to_depth(
-        engine, footing, here + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot
+        engine, footing, center + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot
     )
 
 
@@ -118,10 +120,10 @@ def simulate_walks(
         The walk of each walker.
     """
     result: list[WalkerSteps] = []
-    for first in range(0, len(states), WALKERS_PER_REPORT):
+    for first_walker in range(0, len(states), WALKERS_PER_REPORT):
         result += walk_many(
             step_map.engine,
-            states[first : first + WALKERS_PER_REPORT],
+            states[first_walker : first_walker + WALKERS_PER_REPORT],
             1.5 * target_steps * cycle.period,
             footing=step_map.footing,
             accuracy=accuracy,
@@ -165,47 +167,49 @@ def find_basin(
     selected = find_basin_offsets(step_map.engine, x, y)
     defaults = (0, 0) if None not in selected else _find_leg_speeds(step_map)
     # If the user selects the default of one axis for the other one, the axes exchange defaults.
-    free = [
-        other[0] if other[0] not in selected else other[1] for other in (defaults, defaults[::-1])
+    default_offsets = [
+        default_pair[0] if default_pair[0] not in selected else default_pair[1]
+        for default_pair in (defaults, defaults[::-1])
     ]
-    places = [
-        other if place is None else place for place, other in zip(selected, free, strict=True)
+    offsets = [
+        default_pair if offset is None else offset
+        for offset, default_pair in zip(selected, default_offsets, strict=True)
     ]
     axes = [
-        _make_axis(step_map.engine, place, float(cycle.state[place]), reach, grid)
-        for place in places
+        _make_axis(step_map.engine, offset, float(cycle.state[offset]), reach, grid)
+        for offset in offsets
     ]
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
     # Other entries of the state remain those of the cycle.
     states = np.tile(cycle.state, (grid * grid, 1))
-    states[:, places[0]], states[:, places[1]] = columns.ravel(), rows.ravel()
+    states[:, offsets[0]], states[:, offsets[1]] = columns.ravel(), rows.ravel()
     # A changed angle would push the foot into the ground or lift it, so that the height is
     # corrected.
     starts = lift_to_depth(step_map.engine, step_map.footing, states)
     walks = simulate_walks(
         step_map, cycle, starts, target_steps, accuracy=accuracy, progress=progress
     )
-    made = np.array([min(len(walk.steps), target_steps) for walk in walks], dtype=np.int64)
+    step_counts = np.array([min(len(walk.steps), target_steps) for walk in walks], dtype=np.int64)
     return Basin(
         axes[0],
         axes[1],
-        made.reshape(grid, grid),
+        step_counts.reshape(grid, grid),
         target_steps,
-        (float(cycle.state[places[0]]), float(cycle.state[places[1]])),
+        (float(cycle.state[offsets[0]]), float(cycle.state[offsets[1]])),
     )
 
 
 def _find_leg_speeds(step_map: StepMap) -> tuple[int, int]:
     """Return the offsets in the state of the speeds of the first joints of the two legs."""
-    n = len(step_map.engine.order)
+    dof_count = len(step_map.engine.order)
     if step_map.exchange is None:
         raise OsimliteError(
             "the legs are not alike; name what the basin is drawn over with --basin-x and --basin-y"
         )
     # The first coordinate that the exchange moves is the hip: coordinates are ordered from the root
     # outwards.
-    first = next(k for k in range(n) if step_map.exchange[k] != k)
-    return n + first, n + int(step_map.exchange[first])
+    hip = next(k for k in range(dof_count) if step_map.exchange[k] != k)
+    return dof_count + hip, dof_count + int(step_map.exchange[hip])
 
 
 def find_basin_offsets(
@@ -224,26 +228,28 @@ def find_basin_offsets(
     Raises:
         OsimliteError: there is no such coordinate, it is locked, or both are the same.
     """
-    places = _find_index(engine, x) if x else None, _find_index(engine, y) if y else None
-    if places[0] is not None and places[0] == places[1]:
+    offsets = _find_index(engine, x) if x else None, _find_index(engine, y) if y else None
+    if offsets[0] is not None and offsets[0] == offsets[1]:
         raise OsimliteError(f"'{x}' and '{y}' are the same number; a basin is drawn over two")
-    return places
+    return offsets
 
 
 def _find_index(engine: BatchEngine, name: str) -> int:
     """Return the index in the state of a coordinate, or of its speed (`NAME/speed`)."""
-    coordinate, slash, kind = name.rpartition("/")
-    is_speed = bool(slash) and kind == "speed"
-    place = engine.mechanism.coordinate_index(coordinate if is_speed else name)
-    if place not in engine.order:
+    coordinate, slash, quantity = name.rpartition("/")
+    is_speed = bool(slash) and quantity == "speed"
+    coordinate_index = engine.mechanism.coordinate_index(coordinate if is_speed else name)
+    if coordinate_index not in engine.order:
         raise OsimliteError(f"'{name}' is locked; name a coordinate that moves")
-    return engine.order.index(place) + (len(engine.order) if is_speed else 0)
+    return engine.order.index(coordinate_index) + (len(engine.order) if is_speed else 0)
 
 
-def _make_axis(engine: BatchEngine, place: int, value: float, reach: float, grid: int) -> Axis:
-    """Return the axis of a state entry, with values up to `reach` to either side of its own."""
-    n = len(engine.order)
-    info = engine.mechanism.coordinates[engine.order[place % n]]
+def _make_axis(
+    engine: BatchEngine, offset: int, value: float, half_width: float, grid: int
+) -> Axis:
+    """Return the axis of a state entry, with values up to `half_width` to either side of its own."""
+    dof_count = len(engine.order)
+    info = engine.mechanism.coordinates[engine.order[offset % dof_count]]
     unit = "rad" if info.motion_type == "rotational" else "m"
-    label = f"{info.name} ({unit})" if place < n else f"speed of {info.name} ({unit}/s)"
-    return Axis(label, place, value + np.linspace(-reach, reach, grid))
+    label = f"{info.name} ({unit})" if offset < dof_count else f"speed of {info.name} ({unit}/s)"
+    return Axis(label, offset, value + np.linspace(-half_width, half_width, grid))

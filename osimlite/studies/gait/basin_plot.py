@@ -35,10 +35,15 @@ def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
     """Draw the numbers of steps over the initial states, and return the path of the file."""
     figure = make_figure("", (6.4, 5.2))
     axes = figure.subplots()
-    half = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
+    half_pixel = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
     x, y = basin.x.values, basin.y.values
     # Each initial state is the centre of a pixel.
-    extent = (x[0] - half[0], x[-1] + half[0], y[0] - half[1], y[-1] + half[1])
+    extent = (
+        x[0] - half_pixel[0],
+        x[-1] + half_pixel[0],
+        y[0] - half_pixel[1],
+        y[-1] + half_pixel[1],
+    )
     image = axes.imshow(
         basin.steps,
         origin="lower",

@@ -84,8 +84,8 @@ def differentiate_step_map(
     moves = difference * np.eye(len(reduced))
     # All perturbed walkers are simulated in one call.
     images = step_map(step_map.expand(np.concatenate((reduced + moves, reduced - moves)))).states
-    ahead, back = np.split(step_map.reduce(images), 2)
-    return (ahead - back).T / (2.0 * difference)
+    images_ahead, images_behind = np.split(step_map.reduce(images), 2)
+    return (images_ahead - images_behind).T / (2.0 * difference)
 
 
 def find_cycle(
@@ -110,21 +110,21 @@ def find_cycle(
     Raises:
         OsimliteError: the method does not converge from there, or the walker makes no step.
     """
-    here = np.array(step_map.start if state is None else state, dtype=float)
+    present = np.array(step_map.start if state is None else state, dtype=float)
     name = step_map.engine.mechanism.name
     # A stable cycle often attracts walkers from farther away than Newton's method converges.
     for _ in range(warm_up_steps):
-        there = step_map(here[None]).states[0]
-        if np.isnan(there).any():
+        next_state = step_map(present[None]).states[0]
+        if np.isnan(next_state).any():
             break
-        here = there
-    reduced = step_map.reduce(here)
-    miss, size = _compute_residual(step_map, reduced)
-    taken, slope = 0, None
+        present = next_state
+    reduced = step_map.reduce(present)
+    residual, size = _compute_residual(step_map, reduced)
+    step_count, slope = 0, None
     while size > tolerance:
-        if taken == max_steps:
+        if step_count == max_steps:
             raise OsimliteError(
-                f"no cycle of '{name}' is found after {taken} steps of Newton; still {size:.2g} off"
+                f"no cycle of '{name}' is found after {step_count} steps of Newton; still {size:.2g} off"
             )
         slope = differentiate_step_map(step_map, step_map.expand(reduced))
         if not np.isfinite(slope).all():
@@ -132,27 +132,27 @@ def find_cycle(
                 f"'{name}' makes no step from near the start; give a start that walks"
             )
         # Newton's method for P(x) - x = 0, whose Jacobian is dP/dx - I.
-        move = np.linalg.solve(slope - np.eye(len(reduced)), -miss)
+        move = np.linalg.solve(slope - np.eye(len(reduced)), -residual)
         # Halve the step until the residual decreases; a change of 1e-4 of it is hopeless.
-        part, last = 1.0, size
+        step_fraction, previous_size = 1.0, size
         while True:
-            there, off = _compute_residual(step_map, reduced + part * move)
-            if off < last or part < 1e-4:
+            next_state, trial_size = _compute_residual(step_map, reduced + step_fraction * move)
+            if trial_size < previous_size or step_fraction < 1e-4:
                 break
-            part /= 2.0
-        if not off < last:
+            step_fraction /= 2.0
+        if not trial_size < previous_size:
             raise OsimliteError(
-                f"no cycle of '{name}' is found from there; the best is {last:.2g} off"
+                f"no cycle of '{name}' is found from there; the best is {previous_size:.2g} off"
             )
-        reduced, miss, size = reduced + part * move, there, off
-        taken += 1
+        reduced, residual, size = reduced + step_fraction * move, next_state, trial_size
+        step_count += 1
     state_found = step_map.expand(reduced)
     images = step_map(state_found[None])
     engine = step_map.engine
     per_stride = step_map.exchange is None
     feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
     # All contacts of the feet together move by as much as the walker does in a complete cycle.
-    before, after = (
+    position_before, position_after = (
         measure_along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet]
         .mean(axis=1)
         .tolist()
@@ -162,19 +162,19 @@ def find_cycle(
     return Cycle(
         state_found,
         float(images.lengths[0]),
-        (after - before) / (1 + per_stride),
+        (position_after - position_before) / (1 + per_stride),
         float(images.times[0]),
         values[np.argsort(-np.abs(values))],
         step_map.neutral.shape[1],
         size,
         int(images.scuffs[0]),
         per_stride,
-        taken,
+        step_count,
     )
 
 
 def _compute_residual(step_map: StepMap, reduced: Floats) -> tuple[Floats, float]:
     """Return the residual of the step map, and its norm; infinity where the walker makes no step."""
-    miss = step_map.reduce(step_map(step_map.expand(reduced)[None]).states[0]) - reduced
-    size = float(np.linalg.norm(miss))
-    return miss, size if np.isfinite(size) else np.inf
+    residual = step_map.reduce(step_map(step_map.expand(reduced)[None]).states[0]) - reduced
+    size = float(np.linalg.norm(residual))
+    return residual, size if np.isfinite(size) else np.inf

@@ -179,20 +179,28 @@ class CycleSearch:
         self.threads = threads
         refuse_counts(plan.variables)
         self.variants = Variants(plan)
-        free = [(place, item) for place, item in enumerate(plan.variables) if not item.is_fixed]
-        self._starts = [place for place, item in free if isinstance(item.target, Start)]
-        self._numbers = [place for place, item in free if not isinstance(item.target, Start)]
+        free_variables = [
+            (index, variable)
+            for index, variable in enumerate(plan.variables)
+            if not variable.is_fixed
+        ]
+        self._starts = [
+            index for index, variable in free_variables if isinstance(variable.target, Start)
+        ]
+        self._numbers = [
+            index for index, variable in free_variables if not isinstance(variable.target, Start)
+        ]
         # Without varied initial values all random walkers of a model would be the same.
         if not self._starts:
             raise SettingError(
                 "walkers are drawn at random; vary some values and speeds of coordinates at the start"
             )
-        self._least = [item.low for item in plan.variables]
-        given: Any = self.variants.given.engine
-        self.footing: FootContacts = find_footing(given, feet)
+        self._least = [variable.low for variable in plan.variables]
+        engine: Any = self.variants.given.engine
+        self.footing: FootContacts = find_footing(engine, feet)
         if len(self.footing.feet) != 2:
             raise SettingError(
-                f"a cycle is looked for on two feet; '{given.mechanism.name}' has another number of them"
+                f"a cycle is looked for on two feet; '{engine.mechanism.name}' has another number of them"
             )
         self._first: StepMap | None = None
 
@@ -200,15 +208,15 @@ class CycleSearch:
     @property
     def names(self) -> list[str]:
         """Names of the numbers that are searched."""
-        return [self.plan.variables[place].name for place in self._numbers]
+        return [self.plan.variables[index].name for index in self._numbers]
 
     def make_sample(self, fractions: Floats) -> list[float]:
         """Return a sample of the plan in which the numbers lie at fractions (k,) of their ranges."""
         row = list(self._least)
-        for place, fraction in zip(self._numbers, fractions, strict=True):
+        for index, fraction in zip(self._numbers, fractions, strict=True):
             # Fourteen digits drop the rounding errors of the fraction, so that rounded numbers stay
             # rounded.
-            row[place] = float(f"{self.plan.variables[place].interpolate(np.array(fraction)):.14g}")
+            row[index] = float(f"{self.plan.variables[index].interpolate(np.array(fraction)):.14g}")
         return row
 
     def get_numbers(self, fractions: Floats) -> dict[str, float]:
@@ -218,12 +226,12 @@ class CycleSearch:
             Numbers by name.
         """
         row = self.make_sample(fractions)
-        return {self.plan.variables[place].name: row[place] for place in self._numbers}
+        return {self.plan.variables[index].name: row[index] for index in self._numbers}
 
     def compute_fractions(self, numbers: Mapping[str, float]) -> Floats:
         """Return the fractions of their ranges (k,) at which numbers, by name, lie."""
-        items = {item.name: item for item in self.plan.variables}
-        return np.array([items[name].compute_fraction(numbers[name]) for name in self.names])
+        variables = {variable.name: variable for variable in self.plan.variables}
+        return np.array([variables[name].compute_fraction(numbers[name]) for name in self.names])
 
     def round_fractions(self, fractions: Floats, digits: int) -> Floats:
         """Return the fractions (k,) of numbers that are rounded to significant digits.
@@ -278,11 +286,11 @@ class CycleSearch:
             progress: callback after each part of the walkers.
         """
         rng, result = np.random.default_rng(seed), []
-        for first in range(0, count, WALKERS_PER_CALL):
-            size = min(WALKERS_PER_CALL, count - first)
+        for first_walker in range(0, count, WALKERS_PER_CALL):
+            size = min(WALKERS_PER_CALL, count - first_walker)
             result += self._draw_samples(rng, size)
             if progress is not None:
-                progress(first + size, count)
+                progress(first_walker + size, count)
         return sorted(result, key=lambda candidate: candidate.miss)
 
     def _draw_samples(self, rng: np.random.Generator, count: int) -> list[Candidate]:
@@ -294,27 +302,27 @@ class CycleSearch:
         states = np.zeros((count, engine.state.size))
         vectors = np.zeros((count, len(engine.numbers)))
         variants: list[Variant] = []
-        made = np.ones(count, dtype=bool)
+        is_valid = np.ones(count, dtype=bool)
         for row in range(count):
             sample = self.make_sample(fractions[row])
-            for place, fraction in zip(self._starts, starts[row], strict=True):
-                sample[place] = float(self.plan.variables[place].interpolate(np.array(fraction)))
+            for index, fraction in zip(self._starts, starts[row], strict=True):
+                sample[index] = float(self.plan.variables[index].interpolate(np.array(fraction)))
             try:
                 variant = self.variants.make_variant(sample)
             except OsimliteError:
-                made[row] = False
+                is_valid[row] = False
                 continue
             # Walkers of one call share the structure of the engine.
-            made[row] = variant.structure == self.variants.given.structure
-            if made[row]:
+            is_valid[row] = variant.structure == self.variants.given.structure
+            if is_valid[row]:
                 states[row], vectors[row] = (
                     self.variants.make_start(variant, sample),
                     variant.numbers,
                 )
                 variants.append(variant)
-        states = states[made]
-        vectors = vectors[made]
-        fractions = fractions[made]
+        states = states[is_valid]
+        vectors = vectors[is_valid]
+        fractions = fractions[is_valid]
         if not len(states):
             return []
         states = self.variants.prepare_states(
@@ -333,11 +341,11 @@ class CycleSearch:
             most_tries=MAX_INTEGRATOR_STEPS,
             threads=self.threads,
         )
-        pairs = (
+        candidates = (
             self._find_similar_strikes(walk, row)
             for walk, row in zip(walks, fractions, strict=True)
         )
-        return [pair for pair in pairs if pair is not None]
+        return [candidate for candidate in candidates if candidate is not None]
 
     def _find_similar_strikes(self, walk: WalkerSteps, fractions: Floats) -> Candidate | None:
         """Find the most similar touch-downs of a walk, one step or one stride apart.
@@ -355,32 +363,35 @@ class CycleSearch:
                 accuracy=ROUGH_ACCURACY,
                 threads=self.threads,
             )
-        swap, best = self._first.exchange, None
+        swap, closest = self._first.exchange, None
         strikes = [
             (step.time, step.state if step.foot == 0 or swap is None else step.state[swap])
             for step in walk.steps
             if step.foot == 0 or swap is not None
         ]
-        for (start, one), (end, two) in pairwise(strikes):
-            miss = self._compute_distance(self._first, one, two)
+        for (start, first_state), (end, second_state) in pairwise(strikes):
+            distance = self._compute_distance(self._first, first_state, second_state)
             # A step with a scuff is not a smooth function of the state.
-            if (best is None or miss < best.miss) and not any(
+            if (closest is None or distance < closest.miss) and not any(
                 start < scuff.time < end for scuff in walk.scuffs
             ):
-                best = Candidate(fractions, one.copy(), miss)
-        return best
+                closest = Candidate(fractions, first_state.copy(), distance)
+        return closest
 
     @staticmethod
-    def _compute_distance(step_map: StepMap, one: Floats, two: Floats) -> float:
+    def _compute_distance(step_map: StepMap, first_state: Floats, second_state: Floats) -> float:
         """Return the distance of two states without their neutral directions.
 
         Speeds have the weight `SPEED_WEIGHT_S`.
         """
-        difference = step_map.basis @ step_map.reduce(two - one)
-        n = len(step_map.engine.order)
-        others = *difference[:n], *difference[2 * n :]
+        difference = step_map.basis @ step_map.reduce(second_state - first_state)
+        dof_count = len(step_map.engine.order)
+        other_entries = *difference[:dof_count], *difference[2 * dof_count :]
         return float(
-            np.hypot(np.linalg.norm(others), SPEED_WEIGHT_S * np.linalg.norm(difference[n : 2 * n]))
+            np.hypot(
+                np.linalg.norm(other_entries),
+                SPEED_WEIGHT_S * np.linalg.norm(difference[dof_count : 2 * dof_count]),
+            )
         )
 
     # ---------------------------------------------------------------------------------------- cycles
@@ -396,7 +407,7 @@ class CycleSearch:
         optimize = require("scipy.optimize", extra="sweep", purpose="the search for cycles")
         try:
             problem = _ClosingProblem(self, candidate)
-            solved = optimize.least_squares(
+            solution = optimize.least_squares(
                 problem.compute_residual,
                 problem.start,
                 problem.differentiate_residual,
@@ -411,9 +422,9 @@ class CycleSearch:
                 callback=problem.check_progress,
             )
             # Too far from a cycle for Newton's method, which would diverge.
-            if np.linalg.norm(solved.fun) > NEWTON_RANGE:
+            if np.linalg.norm(solution.fun) > NEWTON_RANGE:
                 return None
-            fractions, _, state = problem.unpack(solved.x)
+            fractions, _, state = problem.unpack(solution.x)
             return self.find_cycle(fractions, state)
         # A candidate that leads nowhere is normal; the next one is tried.
         except (OsimliteError, np.linalg.LinAlgError):
@@ -474,7 +485,7 @@ class CycleSearch:
         return self._first.rebuild_for_model(engine, state, accuracy)
 
 
-def sample_states_of_step(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
+def sample_states_of_step(step_map: StepMap, cycle: Cycle, fractions: Sequence[float]) -> Floats:
     """Return states (k, y) of a cycle at parts of a step.
 
     The walker is at the origin with its trunk as built, as far as neither changes the motion.
@@ -482,9 +493,9 @@ def sample_states_of_step(step_map: StepMap, cycle: Cycle, parts: Sequence[float
     Args:
         step_map: step map of the walker.
         cycle: gait cycle.
-        parts: parts of a step after touch-down (k,), increasing.
+        fractions: parts of a step after touch-down (k,), increasing.
     """
-    times = [part * cycle.period for part in parts]
+    times = [fraction * cycle.period for fraction in fractions]
     runs = run_many(
         step_map.engine,
         cycle.state[None],
@@ -512,14 +523,16 @@ class _ClosingProblem:
         reduced = self._given.reduce(candidate.state)
         self._size = len(reduced)
         # The solver needs a start in the interior of the bounds.
-        inside = np.clip(candidate.fractions, 1e-3, 1.0 - 1e-3)
-        self.start = np.concatenate((reduced, inside))
-        many = np.full(self._size, np.inf)
+        inner_fractions = np.clip(candidate.fractions, 1e-3, 1.0 - 1e-3)
+        self.start = np.concatenate((reduced, inner_fractions))
+        unbounded = np.full(self._size, np.inf)
         self.bounds = (
-            np.concatenate((-many, 0.0 * inside)),
-            np.concatenate((many, 1.0 + 0.0 * inside)),
+            np.concatenate((-unbounded, 0.0 * inner_fractions)),
+            np.concatenate((unbounded, 1.0 + 0.0 * inner_fractions)),
         )
-        self.scale = np.concatenate((np.ones(self._size), np.full(len(inside), FRACTION_SCALE)))
+        self.scale = np.concatenate(
+            (np.ones(self._size), np.full(len(inner_fractions), FRACTION_SCALE))
+        )
 
     def _get_step_map(self, fractions: Floats, state: Floats) -> StepMap:
         """Return the step map of the model at some fractions; the latest ones are kept."""
@@ -552,8 +565,8 @@ class _ClosingProblem:
             _, step_map, state = self.unpack(unknowns)
         except OsimliteError:
             return np.full(self._size, FALL_RESIDUAL)
-        moved = step_map.reduce(step_map(state[None]).states[0]) - unknowns[: self._size]
-        return moved if np.isfinite(moved).all() else np.full(self._size, FALL_RESIDUAL)
+        change = step_map.reduce(step_map(state[None]).states[0]) - unknowns[: self._size]
+        return change if np.isfinite(change).all() else np.full(self._size, FALL_RESIDUAL)
 
     def check_progress(self, intermediate_result: Any) -> None:
         """Stop the solver near a cycle, or where the residual no longer decreases.
@@ -561,27 +574,29 @@ class _ClosingProblem:
         Near a cycle Newton's method takes over.
         """
         self._sizes.append(float(np.linalg.norm(intermediate_result.fun)))
-        here = self._sizes[-1]
-        before = self._sizes[-1 - PATIENCE :][0]
-        if here < NEWTON_RANGE or (len(self._sizes) > PATIENCE and here > 0.5 * before):
+        present_size = self._sizes[-1]
+        earlier_size = self._sizes[-1 - PATIENCE :][0]
+        if present_size < NEWTON_RANGE or (
+            len(self._sizes) > PATIENCE and present_size > 0.5 * earlier_size
+        ):
             raise StopIteration
 
     def differentiate_residual(self, unknowns: Floats) -> Floats:
         """Return the Jacobian of the residual; zeros in directions in which the walker makes no step."""
         _, step_map, state = self.unpack(unknowns)
         columns = [differentiate_step_map(step_map, state, STATE_DIFFERENCE) - np.eye(self._size)]
-        here = self.compute_residual(unknowns)
+        residual = self.compute_residual(unknowns)
         for index in range(self._size, len(unknowns)):
             column = np.full(self._size, np.nan)
             # One-sided differences: the other side may be out of bounds, or may have no step.
             for shift in (FRACTION_DIFFERENCE, -FRACTION_DIFFERENCE):
-                moved = unknowns.copy()
-                moved[index] += shift
+                shifted = unknowns.copy()
+                shifted[index] += shift
                 if (
-                    0.0 <= moved[index] <= 1.0
-                    and (there := self.compute_residual(moved))[0] != FALL_RESIDUAL
+                    0.0 <= shifted[index] <= 1.0
+                    and (shifted_residual := self.compute_residual(shifted))[0] != FALL_RESIDUAL
                 ):
-                    column = (there - here) / shift
+                    column = (shifted_residual - residual) / shift
                     break
             columns.append(column[:, None])
         return np.nan_to_num(np.hstack(columns), nan=0.0)

@@ -76,17 +76,19 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             f"'{engine.mechanism.name}' has no contact forces, so that nothing walks"
         )
     soles = _find_soles(engine)
-    known = [sole.contact for sole in soles]
+    known_contacts = [sole.contact for sole in soles]
     if feet:
-        named_feet = tuple(tuple(part.strip() for part in foot.split("+")) for foot in feet)
-        named = [contact for foot in named_feet for contact in foot]
-        for contact in named:
-            if contact not in known:
+        named_feet = tuple(
+            tuple(contact_name.strip() for contact_name in foot.split("+")) for foot in feet
+        )
+        requested = [contact for foot in named_feet for contact in foot]
+        for contact in requested:
+            if contact not in known_contacts:
                 raise OsimliteError(
                     f"no sphere touches a half space in '{contact}'"
-                    f"{suggest_or_list(contact, known) if known else '; none does'}"
+                    f"{suggest_or_list(contact, known_contacts) if known_contacts else '; none does'}"
                 )
-            if named.count(contact) > 1:
+            if requested.count(contact) > 1:
                 raise OsimliteError(
                     f"'{contact}' is given to the feet twice; name it once, for one of them"
                 )
@@ -96,38 +98,42 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             )
     else:
         named_feet = _find_feet(engine.mechanism, soles)
-    falls = tuple(name for name in known if not any(name in foot for foot in named_feet))
+    falls = tuple(name for name in known_contacts if not any(name in foot for foot in named_feet))
     return FootContacts(named_feet, falls)
 
 
 def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tuple[str, ...], ...]:
     """Return the contacts of the feet from the structure of the model and the names of the contacts."""
     bodies = {sole.body for sole in soles}
-    above = {body: set(_list_ancestors(mechanism, body)) for body in bodies}
-    ends = sorted(body for body in bodies if not any(body in above[other] for other in bodies))
-    if not ends:
+    ancestors_by_body = {body: set(_list_ancestors(mechanism, body)) for body in bodies}
+    end_bodies = sorted(
+        body
+        for body in bodies
+        if not any(body in ancestors_by_body[other_body] for other_body in bodies)
+    )
+    if not end_bodies:
         raise OsimliteError(
             f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground"
         )
     # A walk alternates between two feet.
-    if len(ends) != 2:
-        names = join_words(mechanism.bodies[end].name for end in ends)
+    if len(end_bodies) != 2:
+        names = join_words(mechanism.bodies[end].name for end in end_bodies)
         raise OsimliteError(
-            f"'{mechanism.name}' touches the ground with the ends of {format_count(len(ends), 'leg')} ({names}), not of "
+            f"'{mechanism.name}' touches the ground with the ends of {format_count(len(end_bodies), 'leg')} ({names}), not of "
             "two; say which contacts are feet with --foot"
         )
     result = []
-    for end in ends:
-        own = [sole for sole in soles if sole.body == end]
-        farthest = max(sole.reach for sole in own)
+    for end in end_bodies:
+        soles_of_leg = [sole for sole in soles if sole.body == end]
+        farthest = max(sole.reach for sole in soles_of_leg)
         # A contact much closer to the joint, such as a knee, is no part of the foot.
-        likely = [sole for sole in own if sole.reach >= 0.5 * farthest]
-        named = [sole for sole in likely if _FOOT_WORDS.search(sole.words)]
+        likely = [sole for sole in soles_of_leg if sole.reach >= 0.5 * farthest]
+        named_like_feet = [sole for sole in likely if _FOOT_WORDS.search(sole.words)]
         # A heel may be on another body than the toes, farther up the same leg.
-        shared = set.intersection(*(above[body] for body in ends))
-        leg = above[end] - shared
-        behind = [sole for sole in soles if sole.body in leg and _FOOT_WORDS.search(sole.words)]
-        result.append(tuple(sole.contact for sole in (*behind, *(named or likely))))
+        shared_ancestors = set.intersection(*(ancestors_by_body[body] for body in end_bodies))
+        leg = ancestors_by_body[end] - shared_ancestors
+        rear_soles = [sole for sole in soles if sole.body in leg and _FOOT_WORDS.search(sole.words)]
+        result.append(tuple(sole.contact for sole in (*rear_soles, *(named_like_feet or likely))))
     return tuple(result)
 
 

@@ -140,57 +140,66 @@ def find_gait(
     }
     _check_numbers(settings)
     report = stage or (lambda *_: None)
-    with prepare_folder(folder) as where:
+    with prepare_folder(folder) as output_folder:
         if not force:
-            _protect_results(where, settings)
+            _protect_results(output_folder, settings)
         # Settings are checked and the folder is protected before anything is computed.
         search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
         refuse_constraints(search.variants.given.engine.mechanism)
         candidates = search.find_candidates(
-            samples, seed, lambda done, of: report("random walkers", done, of)
+            samples, seed, lambda finished, total: report("random walkers", finished, total)
         )
         if not candidates:
             raise SimulationError(
                 f"none of {samples} random walkers made two steps; widen the ranges, or draw more (--samples)"
             )
         cycles = close_candidates(
-            search, candidates[:tries], enough, lambda done, of: report("closing cycles", done, of)
+            search,
+            candidates[:tries],
+            enough,
+            lambda finished, total: report("closing cycles", finished, total),
         )
         improvement = StabilityOptimization(search, min(cycles, key=get_cost), digits)
         # Without numbers to vary there is nothing to optimize, and the best cycle is final.
         if search.names:
-            improvement.run(budget, seed, lambda done, of: report("making it stable", done, of))
+            improvement.run(
+                budget, seed, lambda finished, total: report("making it stable", finished, total)
+            )
         best = round_cycle(search, improvement.best, digits)
         cycles += improvement.cycles
         start, walk = choose_start(search, best, start_digits)
-        files = tuple(where / name for name in (BEST_FILE, CYCLES_FILE, SUMMARY_FILE))
+        files = tuple(output_folder / name for name in (BEST_FILE, CYCLES_FILE, SUMMARY_FILE))
         gait = Gait(best, start, walk, len(candidates), len(cycles), files)
-        _write_walker(where, search, gait, cycles, settings)
+        _write_walker(output_folder, search, gait, cycles, settings)
     return gait
 
 
-def _check_numbers(given: Mapping[str, Any]) -> None:
+def _check_numbers(settings: Mapping[str, Any]) -> None:
     """Check the settings before the search, which takes minutes.
 
     Raises:
         SettingError: a setting is out of bounds.
     """
-    for name, least in (("samples", 1), ("tries", 1), ("enough", 1), ("budget", 0)):
-        if given[name] < least:
-            raise SettingError(f"'{name}' is a whole number from {least} on, not {given[name]}")
+    for name, minimum in (("samples", 1), ("tries", 1), ("enough", 1), ("budget", 0)):
+        if settings[name] < minimum:
+            raise SettingError(
+                f"'{name}' is a whole number from {minimum} on, not {settings[name]}"
+            )
     for name in ("stable", "perturb"):
-        if not (isfinite(given[name]) and given[name] > 0.0):
-            raise SettingError(f"'{name}' is a positive number, not {given[name]:g}")
+        if not (isfinite(settings[name]) and settings[name] > 0.0):
+            raise SettingError(f"'{name}' is a positive number, not {settings[name]:g}")
     for name in ("digits", "start_digits"):
-        if given[name] is not None and not 1 <= given[name] <= 17:
-            raise SettingError(f"'{name}' is a whole number from 1 to 17, not {given[name]}")
+        if settings[name] is not None and not 1 <= settings[name] <= 17:
+            raise SettingError(f"'{name}' is a whole number from 1 to 17, not {settings[name]}")
     # Every turn of the search for stability has a seed of its own, of 32 bits at most.
-    most = 2**32 - 1 - given["budget"]
-    if not 0 <= given["seed"] <= most:
-        raise SettingError(f"the seed is a whole number from 0 to {most}, not {given['seed']}")
+    max_seed = 2**32 - 1 - settings["budget"]
+    if not 0 <= settings["seed"] <= max_seed:
+        raise SettingError(
+            f"the seed is a whole number from 0 to {max_seed}, not {settings['seed']}"
+        )
 
 
-def _protect_results(folder: Path, wanted: dict[str, Any]) -> None:
+def _protect_results(folder: Path, settings: dict[str, Any]) -> None:
     """Refuse to overwrite the results of another search.
 
     Raises:
@@ -198,11 +207,11 @@ def _protect_results(folder: Path, wanted: dict[str, Any]) -> None:
     """
     summary = folder / SUMMARY_FILE
     try:
-        before = dict(json.loads(read_file(summary))["settings"])
+        earlier_settings = dict(json.loads(read_file(summary))["settings"])
     except (OsimliteError, ValueError, LookupError, TypeError, RecursionError):
         refuse_overwrite(folder / name for name in (BEST_FILE, CYCLES_FILE, SUMMARY_FILE))
     else:
-        refuse_other_settings(summary, before, wanted)
+        refuse_other_settings(summary, earlier_settings, settings)
 
 
 def close_candidates(
@@ -323,12 +332,12 @@ def _write_walker(
     write(model, folder / BEST_FILE)
     heads = [*search.names, "largest_multiplier", "walking", "step_length_m", "period_s", "scuffs"]
     rows = [",".join(heads)]
-    for each in sorted(cycles, key=get_cost):
-        cycle = each.cycle
+    for model_cycle in sorted(cycles, key=get_cost):
+        cycle = model_cycle.cycle
         numbers = [
-            *each.numbers.values(),
+            *model_cycle.numbers.values(),
             cycle.largest,
-            each.walking,
+            model_cycle.walking,
             cycle.length,
             cycle.period,
             cycle.scuffs,

@@ -122,19 +122,22 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
     return place
 
 
-def _compute_progress(walk: WalkerSteps, places: Sequence[float]) -> float:
+def _compute_progress(walk: WalkerSteps, foot_positions: Sequence[float]) -> float:
     """Return the progress of a walk with feet at some positions along the slope at its end (m)."""
     if walk.scuffs:
-        until = walk.scuffs[0].time
-        lead = walk.scuffs[0].length
+        end_time = walk.scuffs[0].time
+        foot_lead = walk.scuffs[0].length
     else:
-        until = walk.end
-        last = walk.steps[-1].foot if walk.steps else int(np.argmax(places))
+        end_time = walk.end
+        last_foot = walk.steps[-1].foot if walk.steps else int(np.argmax(foot_positions))
         # How far the swing foot is ahead of the foot of the last step.
-        lead = max(place for foot, place in enumerate(places) if foot != last) - places[last]
+        foot_lead = (
+            max(position for foot, position in enumerate(foot_positions) if foot != last_foot)
+            - foot_positions[last_foot]
+        )
     # The fraction stays below 1, so that another step always counts more.
-    near = MIN_STEP_LENGTH_M / (MIN_STEP_LENGTH_M + max(MIN_STEP_LENGTH_M - lead, 0.0))
-    return walk.clean_steps + 0.5 * (near + until / (until + 1.0))
+    closeness = MIN_STEP_LENGTH_M / (MIN_STEP_LENGTH_M + max(MIN_STEP_LENGTH_M - foot_lead, 0.0))
+    return walk.clean_steps + 0.5 * (closeness + end_time / (end_time + 1.0))
 
 
 def _make_walk_measure(

@@ -52,9 +52,11 @@ class StabilityOptimization:
     @property
     def best(self) -> ModelCycle:
         """Cycle with the lowest cost; of rounded numbers as soon as one of those is stable enough."""
-        written = min(self._written, key=get_cost, default=self._first)
+        rounded_best = min(self._written, key=get_cost, default=self._first)
         return (
-            written if self._is_enough(written) else min((self._first, *self.cycles), key=get_cost)
+            rounded_best
+            if self._is_enough(rounded_best)
+            else min((self._first, *self.cycles), key=get_cost)
         )
 
     def run(self, budget: int, seed: int, progress: Progress | None = None) -> None:
@@ -68,23 +70,23 @@ class StabilityOptimization:
             progress: callback with the number of sets that were tried, and of all.
         """
         minimize = run_cma if len(self._first.fractions) > 1 else run_nelder_mead
-        tried = 0
+        tried_count = 0
 
-        def ask(points: Floats) -> Floats:
-            nonlocal tried
-            if tried >= budget or self._is_enough(self.best) != rounds:
+        def compute_costs(points: Floats) -> Floats:
+            nonlocal tried_count
+            if tried_count >= budget or self._is_enough(self.best) != rounds:
                 raise OutOfBudget
-            tried += len(points)
+            tried_count += len(points)
             if progress is not None:
-                progress(min(tried, budget), budget)
+                progress(min(tried_count, budget), budget)
             return np.array([self._evaluate_cost(point, rounds) for point in points])
 
-        while tried < budget:
+        while tried_count < budget:
             # A round ends by an exception when its first stable cycle switches to rounded numbers.
             rounds = self._is_enough(self.best)
             with suppress(OutOfBudget):
                 minimize(
-                    ask,
+                    compute_costs,
                     Search(
                         self.best.fractions, INITIAL_STEP, None, seed, True, budget, TURN_TOLERANCE
                     ),
@@ -103,13 +105,14 @@ class StabilityOptimization:
         key = fractions.tobytes()
         # Rounding maps many points of the search to the same numbers.
         if key not in self._costs:
-            near = min(
-                (self._first, *self.cycles), key=lambda each: _compute_distance(each, fractions)
+            nearest = min(
+                (self._first, *self.cycles),
+                key=lambda known_cycle: _compute_distance(known_cycle, fractions),
             )
             try:
-                result = self._search.find_cycle(fractions, near.cycle.state)
+                result = self._search.find_cycle(fractions, nearest.cycle.state)
             except (OsimliteError, np.linalg.LinAlgError):
-                self._costs[key] = FAILURE_COST + _compute_distance(near, fractions)
+                self._costs[key] = FAILURE_COST + _compute_distance(nearest, fractions)
             else:
                 self._costs[key] = result.cost
                 self.cycles.append(result)

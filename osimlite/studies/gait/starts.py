@@ -37,31 +37,32 @@ def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
         engine: engine of the model.
         footing: contacts of the walker.
     """
-    n = len(engine.order)
+    dof_count = len(engine.order)
     contacts = _list_contacts(engine, footing)
     rng = np.random.default_rng(0)
-    poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
-    here = _compute_contact_centres(engine, poses)[:, contacts]
+    poses = np.hstack((rng.uniform(-0.2, 0.2, (3, dof_count)), np.zeros((3, dof_count))))
+    centres = _compute_contact_centres(engine, poses)[:, contacts]
     depths = measure_along_slope(engine, poses)[1][:, contacts]
-    places, lift = [], None
-    for index in range(n):
-        moved = poses.copy()
-        moved[:, index] += PROBE_STEP
-        way = ((_compute_contact_centres(engine, moved)[:, contacts] - here) / PROBE_STEP).reshape(
-            -1, 3
-        )
+    carrier_indices, lift = [], None
+    for index in range(dof_count):
+        moved_poses = poses.copy()
+        moved_poses[:, index] += PROBE_STEP
+        directions = (
+            (_compute_contact_centres(engine, moved_poses)[:, contacts] - centres) / PROBE_STEP
+        ).reshape(-1, 3)
         # A carrier moves all contacts equally, in all poses, and by a noticeable amount.
-        if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
+        if np.ptp(directions, axis=0).max() > 1e-9 or np.linalg.norm(directions[0]) < 1e-3:
             continue
-        places.append(index)
+        carrier_indices.append(index)
         if (
             lift is None
             and (
-                measure_along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * PROBE_STEP
+                measure_along_slope(engine, moved_poses)[1][:, contacts] - depths
+                < -0.1 * PROBE_STEP
             ).all()
         ):
             lift = index
-    return Carriers(tuple(places), lift)
+    return Carriers(tuple(carrier_indices), lift)
 
 
 def lift_to_depth(
@@ -93,16 +94,19 @@ def lift_to_depth(
     rows = np.arange(len(states)) if numbers is not None else None
     feet = footing.feet if foot < 0 else footing.feet[foot : foot + 1]
     contacts = [engine.contacts.index(name) for names in feet for name in names]
-    one = states.copy()
-    one[:, lift] += PROBE_STEP
+    lifted = states.copy()
+    lifted[:, lift] += PROBE_STEP
     # The depth is linear in the lifting coordinate, so that two poses determine it.
-    now, then = (
-        measure_along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one)
+    depths, lifted_depths = (
+        measure_along_slope(engine, poses, numbers, rows)[1][:, contacts]
+        for poses in (states, lifted)
     )
-    deepest = np.arange(len(states)), now.argmax(axis=1)
-    placed = states.copy()
-    placed[:, lift] += (depth - now[deepest]) * PROBE_STEP / (then[deepest] - now[deepest])
-    return placed
+    deepest = np.arange(len(states)), depths.argmax(axis=1)
+    result = states.copy()
+    result[:, lift] += (
+        (depth - depths[deepest]) * PROBE_STEP / (lifted_depths[deepest] - depths[deepest])
+    )
+    return result
 
 
 def plant_feet(
@@ -124,41 +128,43 @@ def plant_feet(
     Returns:
         States (W, y).
     """
-    n, count = len(engine.order), np.arange(len(states))
+    dof_count, count = len(engine.order), np.arange(len(states))
     result = find_carriers(engine, footing)
-    free = states.copy()
+    unplaced = states.copy()
     # The result must not depend on the carriers' previous values, not even by rounding.
-    free[:, [n + place for place in result.places]] = 0.0
+    unplaced[:, [dof_count + index for index in result.places]] = 0.0
     if result.lift is not None:
-        free[:, result.lift] = 0.0
-    placed = lift_to_depth(engine, footing, free, foot=-1, numbers=numbers)
+        unplaced[:, result.lift] = 0.0
+    planted = lift_to_depth(engine, footing, unplaced, foot=-1, numbers=numbers)
     if not result.places:
-        return placed
+        return planted
     rows = None if numbers is None else count
     feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
-    deepest = feet[measure_along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
-    ahead, back = placed.copy(), placed.copy()
+    deepest = feet[measure_along_slope(engine, planted, numbers, rows)[1][:, feet].argmax(axis=1)]
+    poses_ahead, poses_behind = planted.copy(), planted.copy()
     # Speeds are rates of coordinates here, so that a small step in time moves the values by them.
-    ahead[:, :n] += PROBE_TIME_S * placed[:, n:]
-    back[:, :n] -= PROBE_TIME_S * placed[:, n:]
-    motions = _compute_contact_centres(engine, ahead, numbers, rows) - _compute_contact_centres(
-        engine, back, numbers, rows
-    )
+    poses_ahead[:, :dof_count] += PROBE_TIME_S * planted[:, dof_count:]
+    poses_behind[:, :dof_count] -= PROBE_TIME_S * planted[:, dof_count:]
+    motions = _compute_contact_centres(
+        engine, poses_ahead, numbers, rows
+    ) - _compute_contact_centres(engine, poses_behind, numbers, rows)
     speeds = motions[count, deepest] / (2.0 * PROBE_TIME_S)
-    carried = []
-    here = _compute_contact_centres(engine, placed, numbers, rows)
-    for place in result.places:
-        moved = placed.copy()
-        moved[:, place] += PROBE_STEP
-        carried.append(
-            (_compute_contact_centres(engine, moved, numbers, rows) - here)[count, deepest]
+    carrier_directions = []
+    centres = _compute_contact_centres(engine, planted, numbers, rows)
+    for index in result.places:
+        moved_poses = planted.copy()
+        moved_poses[:, index] += PROBE_STEP
+        carrier_directions.append(
+            (_compute_contact_centres(engine, moved_poses, numbers, rows) - centres)[count, deepest]
             / PROBE_STEP
         )
     # The least-squares solution for the speeds of the carriers that cancel the velocity of the
     # contact.
-    needed = np.einsum("wi,wij->wj", speeds, np.linalg.pinv(np.stack(carried, axis=1)))
-    placed[:, [n + place for place in result.places]] -= needed
-    return placed
+    carrier_speeds = np.einsum(
+        "wi,wij->wj", speeds, np.linalg.pinv(np.stack(carrier_directions, axis=1))
+    )
+    planted[:, [dof_count + index for index in result.places]] -= carrier_speeds
+    return planted
 
 
 def move_along_neutral_directions(states: Floats, neutral: Floats) -> Floats:

@@ -49,9 +49,9 @@ def refuse_constraints(mechanism: Mechanism) -> None:
     Raises:
         UnsupportedError: the model has constraints, or prescribed coordinates.
     """
-    if kept := list_constraints(mechanism):
+    if constraint_names := list_constraints(mechanism):
         raise UnsupportedError(
-            f"gaits are looked for in all directions of the state, some of which {join_words(kept)} takes away; set "
+            f"gaits are looked for in all directions of the state, some of which {join_words(constraint_names)} takes away; set "
             "isEnforced of a constraint and prescribed of a coordinate to false"
         )
 
@@ -111,14 +111,14 @@ class StepMap:
         self.longest = longest
         self.threads = threads
         self.exchange: Ints | None = None
-        here = np.array(near, dtype=float)
-        step, moments = self._simulate_first_step(here)
+        start_state = np.array(near, dtype=float)
+        step, moments = self._simulate_first_step(start_state)
         self.exchange = find_leg_exchange(engine, self.footing, moments)
         self.neutral = find_neutral_directions(engine, moments)
         # The QR decomposition completes the neutral directions to an orthonormal basis of the state
         # space.
-        full, _ = np.linalg.qr(np.hstack((self.neutral, np.eye(len(here)))))
-        self.basis: Floats = full[:, self.neutral.shape[1] :]
+        complete_basis, _ = np.linalg.qr(np.hstack((self.neutral, np.eye(len(start_state)))))
+        self.basis: Floats = complete_basis[:, self.neutral.shape[1] :]
         self.start = self.move_to_strike(step.state, step.foot)
         if step.foot != 0:
             self.start = self._switch_legs(self.start)
@@ -143,26 +143,28 @@ class StepMap:
             OsimliteError: the walker makes no step from there, or the number of neutral directions
                 differs.
         """
-        other = copy(self)
-        other.engine = engine
-        other.start = np.array(near, dtype=float)
-        other.accuracy = self.accuracy if accuracy is None else accuracy
-        other.neutral = find_neutral_directions(engine, other._simulate_first_step(other.start)[1])
-        if other.neutral.shape != self.neutral.shape:
+        rebuilt = copy(self)
+        rebuilt.engine = engine
+        rebuilt.start = np.array(near, dtype=float)
+        rebuilt.accuracy = self.accuracy if accuracy is None else accuracy
+        rebuilt.neutral = find_neutral_directions(
+            engine, rebuilt._simulate_first_step(rebuilt.start)[1]
+        )
+        if rebuilt.neutral.shape != self.neutral.shape:
             raise OsimliteError(
-                f"'{engine.mechanism.name}' has {other.neutral.shape[1]} neutral directions where it had "
+                f"'{engine.mechanism.name}' has {rebuilt.neutral.shape[1]} neutral directions where it had "
                 f"{self.neutral.shape[1]} before its numbers changed"
             )
-        turned = self.basis - other.neutral @ (other.neutral.T @ self.basis)
-        left, _, right = np.linalg.svd(turned, full_matrices=False)
-        other.basis = left @ right
-        return other
+        projected_basis = self.basis - rebuilt.neutral @ (rebuilt.neutral.T @ self.basis)
+        left_vectors, _, right_vectors = np.linalg.svd(projected_basis, full_matrices=False)
+        rebuilt.basis = left_vectors @ right_vectors
+        return rebuilt
 
-    def _simulate_first_step(self, near: Floats) -> tuple[GaitStep, Floats]:
+    def _simulate_first_step(self, state: Floats) -> tuple[GaitStep, Floats]:
         """Return the first step from a state, and states during this step (k, y)."""
         runs = run_many(
             self.engine,
-            near[None],
+            state[None],
             self.longest,
             accuracy=self.accuracy,
             watches=make_fall_watches(self.footing),
@@ -170,15 +172,15 @@ class StepMap:
             event_states=True,
             threads=1,
         )
-        (walk,) = extract_walks(self.engine, near[None], runs, self.footing)
+        (walk,) = extract_walks(self.engine, state[None], runs, self.footing)
         if not walk.steps:
-            how = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
+            reason = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
             raise OsimliteError(
-                f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s ({how}); give another start"
+                f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s ({reason}); give another start"
             )
         # The ends are left out: a foot that just touches has a contact force without a derivative.
         times = np.linspace(0.0, walk.steps[0].time, NEUTRAL_SAMPLES + 2)[1:-1].tolist()
-        runs = run_many(self.engine, near[None], walk.steps[0].time, report_times=times, threads=1)
+        runs = run_many(self.engine, state[None], walk.steps[0].time, report_times=times, threads=1)
         return walk.steps[0], runs.reports[0]
 
     def _switch_legs(self, state: Floats) -> Floats:
@@ -203,31 +205,34 @@ class StepMap:
         rate = np.array(self.engine.compute_derivative(0.0, state.tolist()))
         dt = 1e-7
         _, depths = measure_along_slope(self.engine, np.array([state, state + dt * rate]))
-        touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
-        speed = (depths[1, touching] - depths[0, touching]) / dt
+        contact = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
+        speed = (depths[1, contact] - depths[0, contact]) / dt
         # The contact depth is zero on the section; its rate gives the time by which the event is
         # off.
-        return state - depths[0, touching] / speed * rate
+        return state - depths[0, contact] / speed * rate
 
     # ----------------------------------------------------------------------------------------------- images
     def __call__(self, states: ArrayLike) -> StepImages:
         """Map states (W, y) in which the first foot has just touched down."""
-        first = self._make_step(np.asarray(states, dtype=float), 0)
+        first_step = self._make_step(np.asarray(states, dtype=float), 0)
         if self.exchange is not None:
             return StepImages(
-                first.states[:, self.exchange], first.lengths, first.times, first.scuffs
+                first_step.states[:, self.exchange],
+                first_step.lengths,
+                first_step.times,
+                first_step.scuffs,
             )
-        second = self._make_step(first.states, 1)
+        second_step = self._make_step(first_step.states, 1)
         return StepImages(
-            second.states,
-            (first.lengths + second.lengths) / 2.0,
-            (first.times + second.times) / 2.0,
-            first.scuffs + second.scuffs,
+            second_step.states,
+            (first_step.lengths + second_step.lengths) / 2.0,
+            (first_step.times + second_step.times) / 2.0,
+            first_step.scuffs + second_step.scuffs,
         )
 
-    def _make_step(self, states: Floats, leading: int) -> StepImages:
+    def _make_step(self, states: Floats, leading_foot: int) -> StepImages:
         """Simulate one step of the trailing foot."""
-        count, trailing = len(states), 1 - leading
+        count, trailing_foot = len(states), 1 - leading_foot
         result = StepImages(
             np.full(states.shape, np.nan),
             np.full(count, np.nan),
@@ -239,7 +244,7 @@ class StepMap:
             return result
         # A foot of several contacts may touch with one while it stands on another, so that only a foot
         # of one contact can end the run early.
-        foot = self.footing.feet[trailing]
+        foot = self.footing.feet[trailing_foot]
         stops = [Watch("strike", contact=foot[0], stops=1)] if len(foot) == 1 else []
         runs = run_many(
             self.engine,
@@ -253,9 +258,9 @@ class StepMap:
         )
         walks = extract_walks(self.engine, states[rows], runs, self.footing)
         for row, walk in zip(rows.tolist(), walks, strict=True):
-            step = next((step for step in walk.steps if step.foot == trailing), None)
+            step = next((step for step in walk.steps if step.foot == trailing_foot), None)
             if step is not None:
-                result.states[row] = self.move_to_strike(step.state, trailing)
+                result.states[row] = self.move_to_strike(step.state, trailing_foot)
                 result.lengths[row], result.times[row] = step.length, step.time
                 # The first foot touches down at the start, or a rounding error later: no scuff.
                 result.scuffs[row] = sum(

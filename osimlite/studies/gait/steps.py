@@ -101,8 +101,8 @@ class WalkerSteps:
     @property
     def clean_steps(self) -> int:
         """Number of steps before the first scuff."""
-        first = self.scuffs[0].time if self.scuffs else np.inf
-        return sum(step.time < first for step in self.steps)
+        first_scuff_time = self.scuffs[0].time if self.scuffs else np.inf
+        return sum(step.time < first_scuff_time for step in self.steps)
 
 
 def make_fall_watches(footing: FootContacts) -> list[Watch]:
@@ -191,21 +191,26 @@ def extract_walks(
     counts = [len(events) for events in runs.events]
     moments = np.concatenate([starts, *runs.event_states])
     rows = np.concatenate([row_of, np.repeat(row_of, counts)]).astype(np.int64)
-    reached, depths = measure_along_slope(engine, moments, vectors, rows)
+    positions, depths = measure_along_slope(engine, moments, vectors, rows)
     fatal = np.array([engine.contacts.index(contact) for contact in footing.falls], dtype=np.int64)
     # Events of all runs follow the initial states in one array, so that one call locates all
     # contacts.
-    ends = np.cumsum([len(starts), *counts])
+    event_ends = np.cumsum([len(starts), *counts])
     result = []
     for k, events in enumerate(runs.events):
-        part = slice(ends[k], ends[k + 1])
+        events_of_run = slice(event_ends[k], event_ends[k + 1])
         # A contact that begins before the start raises no event.
         if (depths[k, fatal] > 0.0).any():
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
             result.append(WalkerSteps(0.0, "fell", contact))
             continue
         walk = follow_events(
-            footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0
+            footing,
+            engine.contacts,
+            events,
+            runs.event_states[k],
+            positions[events_of_run],
+            depths[k] > 0.0,
         )
         if walk.walks:
             ending = ENDINGS[int(runs.endings[k])]
@@ -236,13 +241,15 @@ def follow_events(
         reached: positions of the contacts along the slope at the events (e, P) (m).
         touching: whether each contact touches at the start (P,).
     """
-    places = {name: index for index, name in enumerate(contacts)}
-    feet = [np.array([places[contact] for contact in foot]) for foot in footing.feet]
+    contact_indices = {name: index for index, name in enumerate(contacts)}
+    feet = [np.array([contact_indices[contact] for contact in foot]) for foot in footing.feet]
     walk, foot_of = WalkerSteps(), footing.foot_of
-    down = [{name for name in foot if touching[places[name]]} for foot in footing.feet]
-    lifted = [0.0] * len(feet)
-    last, first_place = -1, None
-    for (time, name, begins), state, along in zip(events, states, reached, strict=True):
+    touching_names = [
+        {name for name in foot if touching[contact_indices[name]]} for foot in footing.feet
+    ]
+    lift_times = [0.0] * len(feet)
+    last_foot, first_place = -1, None
+    for (time, name, begins), state, contact_positions in zip(events, states, reached, strict=True):
         if name.startswith(FALL_PREFIX) or (begins and name in footing.falls):
             walk.end = time
             walk.ending = "fell"
@@ -253,37 +260,37 @@ def follow_events(
         number = foot_of[name]
         # A foot is in the air from the end of its last contact.
         if not begins:
-            down[number].discard(name)
-            if not down[number]:
-                lifted[number] = time
+            touching_names[number].discard(name)
+            if not touching_names[number]:
+                lift_times[number] = time
             continue
         # Only the first contact of a foot is a touch-down; others roll onto the ground after it.
-        was_down = bool(down[number])
-        down[number].add(name)
+        was_down = bool(touching_names[number])
+        touching_names[number].add(name)
         if was_down:
             continue
-        here = float(along[places[name]])
-        others = [
-            float(along[foot].max())
-            for other, foot in enumerate(feet)
-            if other != number and down[other]
+        position = float(contact_positions[contact_indices[name]])
+        other_positions = [
+            float(contact_positions[foot].max())
+            for other_foot, foot in enumerate(feet)
+            if other_foot != number and touching_names[other_foot]
         ]
         # In flight, the step is measured from the foot that made the last one.
-        if others:
-            behind = max(others)
-        elif 0 <= last != number:
-            behind = float(along[feet[last]].max())
+        if other_positions:
+            rear_position = max(other_positions)
+        elif 0 <= last_foot != number:
+            rear_position = float(contact_positions[feet[last_foot]].max())
         else:
-            behind = here
-        length, air = here - behind, time - lifted[number]
+            rear_position = position
+        length, air_time = position - rear_position, time - lift_times[number]
         if first_place is None:
-            first_place = here
-        if number != last and length >= MIN_STEP_LENGTH_M and air >= MIN_AIR_TIME_S:
-            walk.steps.append(GaitStep(time, number, length, air, state))
-            walk.distance = here - first_place
-            last = number
+            first_place = position
+        if number != last_foot and length >= MIN_STEP_LENGTH_M and air_time >= MIN_AIR_TIME_S:
+            walk.steps.append(GaitStep(time, number, length, air_time, state))
+            walk.distance = position - first_place
+            last_foot = number
         else:
-            walk.scuffs.append(Scuff(time, number, length, air))
+            walk.scuffs.append(Scuff(time, number, length, air_time))
     return walk
 
 
@@ -310,23 +317,25 @@ def measure_along_slope(
     """
     table = np.array(engine.numbers if vectors is None else vectors, dtype=np.float64, order="C")
     table = table.reshape(-1, table.shape[-1])
-    which = (
+    number_rows = (
         np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     )
-    places = engine.locate_contacts(states, table, which)
-    origin = places[..., :3]
-    normal = places[..., 3:6]
-    center = places[..., 6:]
+    contact_geometry = engine.locate_contacts(states, table, number_rows)
+    origin = contact_geometry[..., :3]
+    normal = contact_geometry[..., 3:6]
+    center = contact_geometry[..., 6:]
     gravity = table[:, :3]
     pull = (
-        gravity[which][:, None, :]
-        - np.sum(gravity[which][:, None, :] * normal, axis=2, keepdims=True) * normal
+        gravity[number_rows][:, None, :]
+        - np.sum(gravity[number_rows][:, None, :] * normal, axis=2, keepdims=True) * normal
     )
     slope = np.linalg.norm(pull, axis=2)
     # On level ground gravity has no component along the plane but rounding errors.
-    level = slope < 1e-6 * np.maximum(np.linalg.norm(gravity, axis=1)[which], 1e-12)[:, None]
+    level = slope < 1e-6 * np.maximum(np.linalg.norm(gravity, axis=1)[number_rows], 1e-12)[:, None]
     forward = np.array((1.0, 0.0, 0.0)) - normal[..., :1] * normal
-    along = np.where(level[..., None], forward, pull)
-    along /= np.linalg.norm(along, axis=2, keepdims=True)
-    radii = engine.get_contact_radii(table)[which]
-    return np.sum(center * along, axis=2), radii - np.sum((center - origin) * normal, axis=2)
+    slope_direction = np.where(level[..., None], forward, pull)
+    slope_direction /= np.linalg.norm(slope_direction, axis=2, keepdims=True)
+    radii = engine.get_contact_radii(table)[number_rows]
+    return np.sum(center * slope_direction, axis=2), radii - np.sum(
+        (center - origin) * normal, axis=2
+    )

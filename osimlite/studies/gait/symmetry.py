@@ -55,8 +55,10 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
     if len(legs) != 2 or legs[0][-1] == legs[1][-1]:
         return None
     # Bodies that both legs share, such as the pelvis, are not exchanged.
-    own = [[body for body in leg if body not in other] for leg, other in (legs, legs[::-1])]
-    places = list(engine.order)
+    separate_bodies = [
+        [body for body in leg if body not in other_leg] for leg, other_leg in (legs, legs[::-1])
+    ]
+    coordinates = list(engine.order)
     freedoms = [
         [
             engine.order.index(c)
@@ -64,24 +66,29 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
             for c in mechanism.bodies[body].mobilizer.coordinates
             if c in engine.order
         ]
-        for leg in own
+        for leg in separate_bodies
     ]
     if len(freedoms[0]) != len(freedoms[1]):
         return None
-    n = len(places)
+    dof_count = len(coordinates)
     source = np.arange(engine.state.size)
-    for one, two in zip(*freedoms, strict=True):
-        source[[one, two, n + one, n + two]] = two, one, n + two, n + one
+    for first_dof, second_dof in zip(*freedoms, strict=True):
+        source[[first_dof, second_dof, dof_count + first_dof, dof_count + second_dof]] = (
+            second_dof,
+            first_dof,
+            dof_count + second_dof,
+            dof_count + first_dof,
+        )
     exchange_auxiliary(engine, source, np.asarray(states, dtype=float))
     for state in np.asarray(states, dtype=float):
-        here, there = (
+        derivative, exchanged_derivative = (
             np.array(engine.compute_derivative(0.0, y.tolist())) for y in (state, state[source])
         )
         if not np.allclose(
-            here[source],
-            there,
+            derivative[source],
+            exchanged_derivative,
             rtol=RELATIVE_TOLERANCE,
-            atol=RELATIVE_TOLERANCE * np.abs(here).max(),
+            atol=RELATIVE_TOLERANCE * np.abs(derivative).max(),
         ):
             return None
     return source
@@ -96,21 +103,25 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
             the effect of another one after the exchange.
         states: states at which the effects are compared (k, y).
     """
-    first = 2 * len(engine.order)
-    if first == engine.state.size:
+    first_auxiliary = 2 * len(engine.order)
+    if first_auxiliary == engine.state.size:
         return
     # At their start values, auxiliary states that belong together are equal, so that effects differ
     # by the legs only.
     states = engine.state.restart_auxiliary(states)
-    columns = [*source[:first], first, first + 1]
-    before = np.stack([_compute_effects(engine, state)[:, columns] for state in states], axis=1)
-    after = np.stack([_compute_effects(engine, state[source]) for state in states], axis=1)
-    tolerances = RELATIVE_TOLERANCE * np.abs(before).max(axis=(0, 1))
-    for index, effects in enumerate(after):
-        alike = np.flatnonzero((np.abs(before - effects) <= tolerances).all(axis=(1, 2)))
+    columns = [*source[:first_auxiliary], first_auxiliary, first_auxiliary + 1]
+    effects_before = np.stack(
+        [_compute_effects(engine, state)[:, columns] for state in states], axis=1
+    )
+    effects_after = np.stack([_compute_effects(engine, state[source]) for state in states], axis=1)
+    tolerances = RELATIVE_TOLERANCE * np.abs(effects_before).max(axis=(0, 1))
+    for index, effects in enumerate(effects_after):
+        equal_states = np.flatnonzero(
+            (np.abs(effects_before - effects) <= tolerances).all(axis=(1, 2))
+        )
         # A state that keeps its effect under the exchange is not exchanged.
-        if len(alike) and index not in alike:
-            source[first + index] = first + alike[0]
+        if len(equal_states) and index not in equal_states:
+            source[first_auxiliary + index] = first_auxiliary + equal_states[0]
 
 
 def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
@@ -119,14 +130,16 @@ def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
     It consists of the derivatives of all rates of coordinates and speeds, and of its own rate, by
     the auxiliary state, and of its own rate.
     """
-    first = 2 * len(engine.order)
-    here = np.array(engine.compute_derivative(0.0, state.tolist()))
+    first_auxiliary = 2 * len(engine.order)
+    derivative = np.array(engine.compute_derivative(0.0, state.tolist()))
     rows = []
-    for index in range(first, len(state)):
-        moved = state.copy()
-        moved[index] += DIFFERENCE_STEP
-        slope = (np.array(engine.compute_derivative(0.0, moved.tolist())) - here) / DIFFERENCE_STEP
-        rows.append([*slope[:first], slope[index], here[index]])
+    for index in range(first_auxiliary, len(state)):
+        shifted = state.copy()
+        shifted[index] += DIFFERENCE_STEP
+        slope = (
+            np.array(engine.compute_derivative(0.0, shifted.tolist())) - derivative
+        ) / DIFFERENCE_STEP
+        rows.append([*slope[:first_auxiliary], slope[index], derivative[index]])
     return np.array(rows)
 
 
@@ -156,8 +169,8 @@ def find_neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
     # Start from directions that change no rate, then add those that change rates along known neutral
     # directions only, until there are no more.
     while True:
-        rest = np.eye(size) - result @ result.T
-        rows = np.concatenate([rest @ slope for slope in slopes])
+        complement = np.eye(size) - result @ result.T
+        rows = np.concatenate([complement @ slope for slope in slopes])
         sizes = np.linalg.norm(rows, axis=1)
         # Rows of different units are scaled to length 1 before singular values are compared.
         rows = rows[sizes > RELATIVE_TOLERANCE] / sizes[sizes > RELATIVE_TOLERANCE, None]
@@ -183,13 +196,16 @@ def compute_derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Float
         differences. It is large where a contact just touches.
     """
     columns, uneven = [], []
-    here = np.array(engine.compute_derivative(0.0, state.tolist()))
-    for k in range(len(state)):
-        ahead, back = state.copy(), state.copy()
-        ahead[k] += DIFFERENCE_STEP
-        back[k] -= DIFFERENCE_STEP
-        rates = [np.array(engine.compute_derivative(0.0, y.tolist())) for y in (ahead, back)]
+    derivative = np.array(engine.compute_derivative(0.0, state.tolist()))
+    for index in range(len(state)):
+        state_ahead, state_behind = state.copy(), state.copy()
+        state_ahead[index] += DIFFERENCE_STEP
+        state_behind[index] -= DIFFERENCE_STEP
+        rates = [
+            np.array(engine.compute_derivative(0.0, y.tolist()))
+            for y in (state_ahead, state_behind)
+        ]
         columns.append((rates[0] - rates[1]) / (2.0 * DIFFERENCE_STEP))
-        uneven.append((rates[0] - 2.0 * here + rates[1]) / DIFFERENCE_STEP)
+        uneven.append((rates[0] - 2.0 * derivative + rates[1]) / DIFFERENCE_STEP)
     slope = np.array(columns).T
     return slope, float(np.linalg.norm(uneven) / np.linalg.norm(slope))

@@ -55,9 +55,9 @@ class _ObservedCopies:
         # A misspelt name would silently leave the coordinate visible.
         for name in task.hidden:
             if name not in self.state_names:
-                near = suggest_name(name, self.state_names)
+                suggestion = suggest_name(name, self.state_names)
                 raise gymnasium.error.Error(
-                    f"nothing is called '{name}' that could be hidden{near}"
+                    f"nothing is called '{name}' that could be hidden{suggestion}"
                 )
         self._visible = [k for k, name in enumerate(self.state_names) if name not in task.hidden]
         self.labels = tuple(self.state_names[k] for k in self._visible)
@@ -65,27 +65,27 @@ class _ObservedCopies:
         tree = simulation.model.tree()
         limits = [(tree.find(path).min_control, tree.find(path).max_control) for path in paths]
         # Learners need bounded actions; controls without bounds are limited to -1 to 1.
-        low, high = self._limits = np.clip(
+        lower, upper = self._limits = np.clip(
             np.array(limits, dtype=np.float32).reshape(-1, 2).T, -1.0, 1.0
         )
         # Learners expect 0 to be a valid action; controls below the smallest excitation count as it.
-        self.actions = gymnasium.spaces.Box(np.minimum(low, 0.0), high, dtype=np.float32)
+        self.actions = gymnasium.spaces.Box(np.minimum(lower, 0.0), upper, dtype=np.float32)
         self.observations = gymnasium.spaces.Box(
             -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (len(self._visible),), dtype=np.float32
         )
         self.max_steps = round(task.seconds / task.step)
 
-    def reset_copy(self, which: int, rng: np.random.Generator) -> None:
+    def reset_copy(self, copy_index: int, rng: np.random.Generator) -> None:
         """Set a copy to an initial state of the task.
 
         Args:
-            which: index of the copy.
+            copy_index: index of the copy.
             rng: random generator for the initial state.
         """
         start = self.copies.start
         if self.task.start is not None:
             start = self.task.start(start, self.names, rng)
-        self.copies.set_states(which, start)
+        self.copies.set_states(copy_index, start)
 
     def observe(self, controls: Array) -> Observation:
         """Return the states of all copies by name, with the controls of the step (w, c)."""
@@ -120,21 +120,23 @@ class _ObservedCopies:
                 f"actions have the shape {expected}, not {values.shape}"
             )
         controls = np.clip(values, *self._limits)
-        before = self.observe(controls)
+        observation_before = self.observe(controls)
         succeeded = self.copies.step_all(controls)
-        after = self.observe(controls)
+        observation_after = self.observe(controls)
         # States of a copy whose integration failed may be undefined; its reward is 0.
         with np.errstate(all="ignore"):
-            rewards = np.where(succeeded, self.task.reward(before, after), 0.0)
-        return rewards, ~succeeded | self.task.is_over(after)
+            rewards = np.where(
+                succeeded, self.task.reward(observation_before, observation_after), 0.0
+            )
+        return rewards, ~succeeded | self.task.is_over(observation_after)
 
-    def draw_image(self, which: int = 0) -> Any:
+    def draw_image(self, copy_index: int = 0) -> Any:
         """Return the image of a copy (height, width, 3)."""
         from osimlite.studies.gym.pictures import draw_pose
 
         simulation = self.copies.simulation
         return draw_pose(
-            simulation, np.array(simulation.state.values(self.copies.states[which].tolist()))
+            simulation, np.array(simulation.state.values(self.copies.states[copy_index].tolist()))
         )
 
 
@@ -142,18 +144,20 @@ def _resolve_task(
     task: Task | Callable[[], Task] | None, model: Any, reward: Any, options: dict[str, Any]
 ) -> Task:
     """Return the task that the arguments of an environment describe."""
-    known = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
+    known_names = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
     for name in options:
-        if name not in known:
-            raise gymnasium.error.Error(f"a task has no '{name}'{suggest_or_list(name, known)}")
+        if name not in known_names:
+            raise gymnasium.error.Error(
+                f"a task has no '{name}'{suggest_or_list(name, known_names)}"
+            )
     # A registered environment has a task, whose attributes may be overridden but not its model.
     if task is not None:
         if model is not None:
             raise gymnasium.error.Error(
                 "this environment has its model; take osimlite/Model-v0 for another"
             )
-        made = task if isinstance(task, Task) else task()
-        return replace(made, **options, **({} if reward is None else {"reward": reward}))
+        base_task = task if isinstance(task, Task) else task()
+        return replace(base_task, **options, **({} if reward is None else {"reward": reward}))
     if model is None or reward is None:
         raise gymnasium.error.Error("give a task, or a model and a reward(before, after)")
     return make_task(model, reward, **options)
@@ -231,12 +235,12 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
             Observation (o,), reward, whether the model has failed, whether the time of the episode
             is over, and an empty dictionary.
         """
-        rewards, over = self._all.step(np.asarray(action)[None])
+        rewards, has_failed = self._all.step(np.asarray(action)[None])
         self._steps += 1
         return (
             self._all.flatten_observations()[0],
             float(rewards[0]),
-            bool(over[0]),
+            bool(has_failed[0]),
             self._steps >= self._all.max_steps,
             {},
         )
@@ -320,7 +324,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
                 if isinstance(seed, list)
                 else [None if seed is None else seed + k for k in range(self.num_envs)]
             )
-            self._random = [gymnasium.utils.seeding.np_random(each)[0] for each in seeds]
+            self._random = [gymnasium.utils.seeding.np_random(copy_seed)[0] for copy_seed in seeds]
         for k, rng in enumerate(self._random):
             self._all.reset_copy(k, rng)
         self._steps[:], self._ended[:] = 0, False
@@ -336,25 +340,25 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             Observations (w, o), rewards (w,), whether each copy has failed (w,), whether the time
             of its episode is over (w,), and an empty dictionary.
         """
-        again = np.flatnonzero(self._ended)
+        restarted = np.flatnonzero(self._ended)
         # All copies are stepped, then those with a new episode are set to their initial state.
-        initial = {int(k): self._reset_state(int(k)) for k in again}
-        rewards, over = self._all.step(actions)
+        initial = {int(k): self._reset_state(int(k)) for k in restarted}
+        rewards, has_failed = self._all.step(actions)
         for k, state in initial.items():
             self._all.copies.set_states(k, state)
         self._steps += 1
         # gymnasium's NEXT_STEP mode: the step after an end returns the first observation and no
         # reward.
-        self._steps[again], rewards[again], over[again] = 0, 0.0, False
+        self._steps[restarted], rewards[restarted], has_failed[restarted] = 0, 0.0, False
         # Truncation by time differs from termination: the learner may still expect future rewards.
-        late = self._steps >= self._all.max_steps
-        self._ended = over | late
-        return self._all.flatten_observations(), rewards, over, late, {}
+        is_out_of_time = self._steps >= self._all.max_steps
+        self._ended = has_failed | is_out_of_time
+        return self._all.flatten_observations(), rewards, has_failed, is_out_of_time, {}
 
-    def _reset_state(self, k: int) -> Array:
+    def _reset_state(self, copy_index: int) -> Array:
         """Draw a new initial state of a copy from the random generator of this copy."""
-        self._all.reset_copy(k, self._random[k])
-        return self._all.copies.states[k].copy()
+        self._all.reset_copy(copy_index, self._random[copy_index])
+        return self._all.copies.states[copy_index].copy()
 
     def render(self) -> Any:
         """Return the poses of all copies as images (height, width, 3); None without a render mode."""

@@ -96,10 +96,10 @@ def _perturb_state(scale: float) -> Callable[[Array, tuple[str, ...], np.random.
 
     def start(y: Array, names: tuple[str, ...], rng: np.random.Generator) -> Array:
         # Muscle states are left alone: they depend on the pose.
-        moving = np.array([name.endswith(("/value", "/speed")) for name in names])
+        is_perturbed = np.array([name.endswith(("/value", "/speed")) for name in names])
         result = y.copy()
         # Small perturbations keep learners from memorizing one motion.
-        result[moving] += scale * rng.uniform(-1.0, 1.0, int(moving.sum()))
+        result[is_perturbed] += scale * rng.uniform(-1.0, 1.0, int(is_perturbed.sum()))
         return result
 
     return start
@@ -191,7 +191,7 @@ def make_task(
     from osimlite.io.document.reader import read
 
     template = read(model) if not isinstance(model, Model) else model
-    if not any(isinstance(item, Actuator) for item in template.components()):
+    if not any(isinstance(component, Actuator) for component in template.components()):
         from osimlite.errors import ModelError
 
         raise ModelError(f"'{template.name}' has no actuators that could be learnt to use")

@@ -78,18 +78,18 @@ PowerTerms = Iterable[tuple[int, Array, Array]]
 """Terms whose sum is a function of time: power, and per candidate start (w,) (s) and gain (w,)."""
 
 
-def _read_integer(node: SettingNode, key: str, least: int) -> int:
-    """Return a setting that is a whole number from `least` to `MAX_CONTROL_POINTS`."""
+def _read_integer(node: SettingNode, key: str, minimum: int) -> int:
+    """Return a setting that is a whole number from `minimum` to `MAX_CONTROL_POINTS`."""
     number = node.number(key)
-    if number not in range(least, MAX_CONTROL_POINTS + 1):
+    if number not in range(minimum, MAX_CONTROL_POINTS + 1):
         raise node.error(
-            f"'{key}' must be a whole number from {least} to {MAX_CONTROL_POINTS}, not {number:g}"
+            f"'{key}' must be a whole number from {minimum} to {MAX_CONTROL_POINTS}, not {number:g}"
         )
     return int(number)
 
 
 def _read_control_points(
-    node: SettingNode, parameters: Parameters, before: str
+    node: SettingNode, parameters: Parameters, prefix: str
 ) -> tuple[Array, Array]:
     """Return times (n, w) (s) and values (n, w) of the control points of a function."""
     count = _read_integer(node, "control_points", 1)
@@ -98,46 +98,49 @@ def _read_control_points(
     if node.get("control_point_dt") is None and count > 1:
         raise node.error("several control points need 'control_point_dt'")
     values = [
-        parameters.get_number(node, "control_point_y", 0.0, f"{before}Y{k}") for k in range(count)
+        parameters.get_number(node, "control_point_y", 0.0, f"{prefix}Y{k}") for k in range(count)
     ]
-    spans = [
-        parameters.get_number(node, "control_point_dt", 0.0, f"{before}DT{k}")
+    intervals = [
+        parameters.get_number(node, "control_point_dt", 0.0, f"{prefix}DT{k}")
         for k in range(count - 1)
     ]
-    if np.any(np.array(spans) <= 0.0):
+    if np.any(np.array(intervals) <= 0.0):
         raise node.error("'control_point_dt' must be positive")
     # Scenarios give intervals between points; each may be a parameter.
-    return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
+    return np.cumsum([np.zeros_like(values[0]), *intervals], axis=0), np.array(values)
 
 
-def _read_piecewise_constant(node: SettingNode, parameters: Parameters, before: str) -> PowerTerms:
+def _read_piecewise_constant(node: SettingNode, parameters: Parameters, prefix: str) -> PowerTerms:
     """Return the terms of a function that keeps each value until the next time."""
-    times, values = _read_control_points(node, parameters, before)
+    times, values = _read_control_points(node, parameters, prefix)
     # Steps of constants: each point adds the difference to the previous value from its time on.
-    return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
+    return [(0, *point) for point in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
 
 
-def _read_piecewise_linear(node: SettingNode, parameters: Parameters, before: str) -> PowerTerms:
+def _read_piecewise_linear(node: SettingNode, parameters: Parameters, prefix: str) -> PowerTerms:
     """Return a broken line as a constant and changes of slope.
 
     After the last point the last slope continues, unless `flat_extrapolation` is set.
     """
-    times, values = _read_control_points(node, parameters, before)
+    times, values = _read_control_points(node, parameters, prefix)
     # A broken line is its first value plus ramps that start at each point with the change of slope
     # there; a last ramp of slope 0 ends it flat.
     slopes = np.diff(values, axis=0) / np.diff(times, axis=0)
-    ends = [np.zeros_like(values[:1])] if node.flag("flat_extrapolation", False) else []
-    bends = np.diff(np.concatenate([np.zeros_like(values[:1]), slopes, *ends]), axis=0)
-    return [(0, times[0], values[0]), *((1, *each) for each in zip(times, bends, strict=False))]
+    end_slope = [np.zeros_like(values[:1])] if node.flag("flat_extrapolation", False) else []
+    bends = np.diff(np.concatenate([np.zeros_like(values[:1]), slopes, *end_slope]), axis=0)
+    return [
+        (0, times[0], values[0]),
+        *((1, *bend_at_time) for bend_at_time in zip(times, bends, strict=False)),
+    ]
 
 
-def _read_polynomial(node: SettingNode, parameters: Parameters, before: str) -> PowerTerms:
+def _read_polynomial(node: SettingNode, parameters: Parameters, prefix: str) -> PowerTerms:
     """Return the terms of a polynomial of time; each coefficient is a parameter."""
     degree = _read_integer(node, "degree" if node.get("order") is None else "order", 0)
     for k in range(degree + 1):
         node.text(f"coefficient{k}")
     gains = [
-        parameters.get_number(node, f"coefficient{k}", 0.0, f"{before}C{k}")
+        parameters.get_number(node, f"coefficient{k}", 0.0, f"{prefix}C{k}")
         for k in range(degree + 1)
     ]
     return [(k, np.zeros_like(gain), gain) for k, gain in enumerate(gains)]
@@ -172,7 +175,7 @@ class Reflexes:
     """
 
     def __init__(
-        self, node: SettingNode, kind: str, walkers: SensedModel, parameters: Parameters
+        self, node: SettingNode, controller_type: str, walkers: SensedModel, parameters: Parameters
     ) -> None:
         self.walkers = walkers
         self.terms: list[TermOrGate] = []
@@ -182,36 +185,36 @@ class Reflexes:
         self._swings_from_stance = False
         self._has_states = False
         self._is_noisy = False
-        parts = [(kind, node)]
+        controllers = [(controller_type, node)]
         # Noise is the last part: it is added to what all other parts compute.
-        if kind == COMPOSITE:
-            parts = [*node.select_all(*CONTROLLERS[:-1]), *node.select_all(NOISE)]
+        if controller_type == COMPOSITE:
+            controllers = [*node.select_all(*CONTROLLERS[:-1]), *node.select_all(NOISE)]
             node.refuse_unread_parts(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
         # The kernels expect the loads of the legs as the first two sensors.
-        if any(name == "GaitStateController" for name, _ in parts):
+        if any(name == "GaitStateController" for name, _ in controllers):
             walkers.expect_legs()
             for leg in range(len(SIDES)):
                 self._add_sensor(make_load_source(walkers, leg))
-        for name, part in parts:
+        for name, controller in controllers:
             if name == NOISE:
-                self._read_noise(part)
+                self._read_noise(controller)
             elif name == FEED_FORWARD:
-                self._read_functions(part, parameters)
+                self._read_functions(controller, parameters)
             elif name == "ReflexController":
                 # A ReflexController alone is not symmetric by default, one within a
                 # GaitStateController is.
-                self.symmetric = part.flag("symmetric", False)
-                self._is_sided = part.flag("dual_sided", True)
+                self.symmetric = controller.flag("symmetric", False)
+                self._is_sided = controller.flag("dual_sided", True)
                 for leg in (0, 1) if self._is_sided else (0,):
-                    self._add_reflexes(part, parameters, "", leg, ALL_LEG_STATES)
+                    self._add_reflexes(controller, parameters, "", leg, ALL_LEG_STATES)
             # The kernels store one state per leg, so that two gait state machines cannot coexist.
             elif self._has_states:
-                raise part.error(
+                raise controller.error(
                     "legs are in the states of one GaitStateController, and this is another one"
                 )
             else:
                 self._has_states = self._is_sided = True
-                self._read_states(part, parameters)
+                self._read_states(controller, parameters)
 
     def _read_noise(self, node: SettingNode) -> None:
         """Read the noise of controls, as in SCONE, and of sensors, which is an addition of ours."""
@@ -253,7 +256,7 @@ class Reflexes:
             raise node.error(
                 f"a {FEED_FORWARD} needs one function: {join_words(list(TIME_FUNCTIONS))}"
             )
-        kind, function = functions[0]
+        function_type, function = functions[0]
         names = {
             k: n
             for k, n in enumerate(self.walkers.names)
@@ -263,14 +266,16 @@ class Reflexes:
             raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
         for target, name in names.items():
             # Without its side the name of a parameter is the same for both legs.
-            before = name[:-2] if symmetric and name.endswith(SIDES) else name
-            for power, start, gain in TIME_FUNCTIONS[kind](function, parameters, f"{before}."):
+            prefix = name[:-2] if symmetric and name.endswith(SIDES) else name
+            for power, start, gain in TIME_FUNCTIONS[function_type](
+                function, parameters, f"{prefix}."
+            ):
                 term = target, -1, power, 0, ALL_LEG_STATES, -1
                 # The kernels count time in control steps.
                 self.terms.append(
                     TermOrGate(term, start, gain * self.walkers.step**power, np.zeros_like(gain))
                 )
-        function.refuse_unread_parts(f"a {kind}")
+        function.refuse_unread_parts(f"a {function_type}")
 
     def _read_states(self, node: SettingNode, parameters: Parameters) -> None:
         """Read the thresholds of a GaitStateController and its conditional reflexes."""
@@ -287,7 +292,7 @@ class Reflexes:
             # Thresholds of foot positions are relative to the length of the leg.
             length = node.number("override_leg_length", self.walkers.legs[leg].length)
             prefix = "" if self.symmetric else f"leg{leg}{side}."
-            of = {
+            thresholds = {
                 name: parameters.get_number(node, name, value, prefix + name)
                 for name, value in (
                     ("stance_load_threshold", 0.1),
@@ -296,7 +301,7 @@ class Reflexes:
                     ("liftoff_threshold", DISABLED_THRESHOLD),
                 )
             }
-            stance = of["stance_load_threshold"]
+            stance = thresholds["stance_load_threshold"]
             swing = node.get("swing_load_threshold")
             # One load threshold serves both transitions unless the scenario sets a second one for
             # swing, which makes a hysteresis.
@@ -306,16 +311,19 @@ class Reflexes:
                 if swing is None
                 else parameters.parse_number(swing, prefix + "swing_load_threshold"),
             )
-            ahead = (
-                length * of[f"{name}_threshold"] for name in ("late_stance", "liftoff", "landing")
+            position_limits = (
+                length * thresholds[f"{name}_threshold"]
+                for name in ("late_stance", "liftoff", "landing")
             )
-            first = 1 + LIMITS.OF_LEG * leg
-            self._limits[:, first : first + LIMITS.OF_LEG] = np.column_stack([*loads, *ahead])
+            first_column = 1 + LIMITS.OF_LEG * leg
+            self._limits[:, first_column : first_column + LIMITS.OF_LEG] = np.column_stack(
+                [*loads, *position_limits]
+            )
         conditional = node.get("ConditionalControllers")
         if conditional is None:
             raise node.error("a GaitStateController needs ConditionalControllers")
-        for _, each in conditional.select_all("ConditionalController"):
-            self._add_conditional(each, parameters)
+        for _, controller in conditional.select_all("ConditionalController"):
+            self._add_conditional(controller, parameters)
         conditional.refuse_unread_parts("ConditionalControllers")
         node.refuse_unread_parts("a GaitStateController")
 
@@ -349,10 +357,12 @@ class Reflexes:
         symmetric = node.flag("symmetric", self.symmetric)
         blocks = [node, *(block for _, block in node.select_all("Reflexes"))]
         for block in blocks:
-            for kind, reflex in block.select_all(*REFLEX_TYPES):
-                self._add_reflex(kind, reflex, parameters, prefix, leg, states, symmetric)
+            for reflex_name, reflex in block.select_all(*REFLEX_TYPES):
+                self._add_reflex(reflex_name, reflex, parameters, prefix, leg, states, symmetric)
             block.refuse_unread_parts("a ReflexController", tuple(REFLEX_TYPES))
-        if not any(kind in REFLEX_TYPES for block in blocks for kind, _ in block.parts):
+        if not any(
+            reflex_name in REFLEX_TYPES for block in blocks for reflex_name, _ in block.parts
+        ):
             raise node.error("a ReflexController needs reflexes")
 
     def _find_index(self, node: SettingNode, name: str, names: list[str], leg: int) -> int:
@@ -367,19 +377,21 @@ class Reflexes:
             leg: index of the leg of the reflex.
         """
         # A name that fits as it is goes before the same name with a side.
-        own = (
+        local_name = (
             name[:-2] + SIDES[1 - leg]
             if self._is_sided and name.endswith(OTHER_SIDE_SUFFIX)
             else name
         )
-        for full in (own, own + SIDES[leg]) if self._is_sided else (own,):
-            if full in names:
-                return names.index(full)
-        beside = f" or '{own}{SIDES[leg]}'" if self._is_sided else ""
-        raise node.error(f"the model has no '{own}'{beside}{suggest_or_list(own, names)}")
+        for candidate in (local_name, local_name + SIDES[leg]) if self._is_sided else (local_name,):
+            if candidate in names:
+                return names.index(candidate)
+        alternative = f" or '{local_name}{SIDES[leg]}'" if self._is_sided else ""
+        raise node.error(
+            f"the model has no '{local_name}'{alternative}{suggest_or_list(local_name, names)}"
+        )
 
     def _resolve_target_and_source(
-        self, node: SettingNode, prefix: str, leg: int, symmetric: bool, kind: ReflexType
+        self, node: SettingNode, prefix: str, leg: int, symmetric: bool, reflex_type: ReflexType
     ) -> tuple[int, int, str]:
         """Find target and source of a reflex, and the prefix of its parameters.
 
@@ -388,49 +400,55 @@ class Reflexes:
             prefix: prefix of the states in which it is active.
             leg: index of its leg.
             symmetric: whether both legs share parameters.
-            kind: type of the reflex.
+            reflex_type: type of the reflex.
 
         Returns:
             Index of the actuator, index of the source, and prefix of the parameters.
         """
         # Refused explicitly, as ignoring them would change the walk silently.
-        for key in ("min_control_value", "max_control_value", *kind.refused):
+        for key in ("min_control_value", "max_control_value", *reflex_type.refused):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of reflexes is not done here")
         target = node.text("target")
-        source = node.text("source", target if kind.is_own else None)
+        source = node.text("source", target if reflex_type.is_own else None)
 
         def format_name(name: str) -> str:
             # SCONE names parameters by target and source: symmetric ones without the side of the
             # reflex, with "_o" for the opposite leg; others with the full name.
-            bare = name[:-2] if name.endswith((*SIDES, OTHER_SIDE_SUFFIX)) else name
+            stem = name[:-2] if name.endswith((*SIDES, OTHER_SIDE_SUFFIX)) else name
             if not self._is_sided:
                 return name
             if not symmetric:
-                if name.endswith(SIDES) or bare in self.walkers.coordinates:
+                if name.endswith(SIDES) or stem in self.walkers.coordinates:
                     return name
-                return bare + SIDES[1 - leg if name.endswith(OTHER_SIDE_SUFFIX) else leg]
+                return stem + SIDES[1 - leg if name.endswith(OTHER_SIDE_SUFFIX) else leg]
             return (
-                f"{bare}{OTHER_SIDE_SUFFIX}"
-                if name != bare and not name.endswith(SIDES[leg])
-                else bare
+                f"{stem}{OTHER_SIDE_SUFFIX}"
+                if name != stem and not name.endswith(SIDES[leg])
+                else stem
             )
 
-        first = format_name(target)
-        second = format_name(source)
-        own = node.text("par_name", "")
-        name = format_name(own) if own else first if first == second else f"{first}-{second}"
+        target_name = format_name(target)
+        source_name = format_name(source)
+        parameter_name = node.text("par_name", "")
+        name = (
+            format_name(parameter_name)
+            if parameter_name
+            else target_name
+            if target_name == source_name
+            else f"{target_name}-{source_name}"
+        )
         number = self._find_index(node, target, self.walkers.names, leg)
         return (
             number,
-            self._find_index(node, source, kind.names(self.walkers), leg),
+            self._find_index(node, source, reflex_type.names(self.walkers), leg),
             f"{prefix}{name}.",
         )
 
     @staticmethod
-    def _read_delay(node: SettingNode, parameters: Parameters, before: str) -> Array:
+    def _read_delay(node: SettingNode, parameters: Parameters, prefix: str) -> Array:
         """Return the delay (s) of a reflex for each candidate."""
-        delay = parameters.get_number(node, "delay", 0.0, before + "delay")
+        delay = parameters.get_number(node, "delay", 0.0, prefix + "delay")
         if np.any(delay < 0.0):
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
         # Written so that NaN is refused, too.
@@ -455,64 +473,68 @@ class Reflexes:
         symmetric: bool,
     ) -> None:
         """Add one reflex of a leg, with a term for each of its channels."""
-        kind = REFLEX_TYPES[name]
-        node.read_keys.update(kind.settings)
-        target, number, before = self._resolve_target_and_source(node, prefix, leg, symmetric, kind)
-        delay = self._read_delay(node, parameters, before)
-        gate = self._add_gate(node, parameters, before, leg) if name == CONDITIONAL else -1
-        written = {key for key, _ in node.parts}
-        for letter, make_source, rest, is_free in kind.channels:
+        reflex_type = REFLEX_TYPES[name]
+        node.read_keys.update(reflex_type.settings)
+        target, number, reflex_prefix = self._resolve_target_and_source(
+            node, prefix, leg, symmetric, reflex_type
+        )
+        delay = self._read_delay(node, parameters, reflex_prefix)
+        gate = self._add_gate(node, parameters, reflex_prefix, leg) if name == CONDITIONAL else -1
+        written_keys = {key for key, _ in node.parts}
+        for letter, make_source, default_offset, is_free in reflex_type.channels:
             keys = {
                 f"K{letter}",
                 f"{letter}0",
                 *(() if is_free is None else (f"allow_neg_{letter}",)),
             }
             node.read_keys |= keys
-            if written.isdisjoint(keys):
+            if written_keys.isdisjoint(keys):
                 continue
             # SCONE reads offset and gain in this order, which is the order of the parameters.
-            settings = (f"{letter}0", rest), (f"K{letter}", 0.0)
+            settings = (f"{letter}0", default_offset), (f"K{letter}", 0.0)
             numbers = {
-                key: parameters.get_number(node, key, value, before + key)
-                for key, value in (settings if kind.corrects else settings[::-1])
+                key: parameters.get_number(node, key, value, reflex_prefix + key)
+                for key, value in (settings if reflex_type.corrects else settings[::-1])
             }
             gain = numbers[f"K{letter}"]
-            free = is_free is None or node.flag(f"allow_neg_{letter}", is_free)
+            takes_any_sign = is_free is None or node.flag(f"allow_neg_{letter}", is_free)
             # A gain of 0 that is no parameter needs no sensor.
-            if np.any(gain != 0.0) or f"{before}K{letter}" in parameters.requested:
+            if np.any(gain != 0.0) or f"{reflex_prefix}K{letter}" in parameters.requested:
                 source = make_source(
                     self.walkers, node, number, SIDES[leg] if self._is_sided else ""
                 )
                 sign = (
                     TERM_TYPE.FREE
-                    if free
+                    if takes_any_sign
                     else TERM_TYPE.OF_RESULT
-                    if kind.corrects
+                    if reflex_type.corrects
                     else TERM_TYPE.OF_SENSOR
                 )
                 term = target, self._add_sensor(source), sign, leg, states, gate
                 self.terms.append(
-                    TermOrGate(term, delay, -gain if kind.corrects else gain, numbers[f"{letter}0"])
+                    TermOrGate(
+                        term, delay, -gain if reflex_type.corrects else gain, numbers[f"{letter}0"]
+                    )
                 )
-        constant = parameters.get_number(node, "C0", 0.0, f"{before}C0")
+        constant = parameters.get_number(node, "C0", 0.0, f"{reflex_prefix}C0")
         # A constant excitation is a function of time of degree 0 that starts at once.
-        if np.any(constant != 0.0) or f"{before}C0" in parameters.requested:
+        if np.any(constant != 0.0) or f"{reflex_prefix}C0" in parameters.requested:
             zero = np.zeros_like(constant)
             self.terms.append(
                 TermOrGate((target, -1, TERM_TYPE.FREE, leg, states, -1), zero, constant, zero)
             )
         node.refuse_unread_parts(f"a {name}")
 
-    def _add_gate(self, node: SettingNode, parameters: Parameters, before: str, leg: int) -> int:
+    def _add_gate(self, node: SettingNode, parameters: Parameters, prefix: str, leg: int) -> int:
         """Add the range of a ConditionalMuscleReflex; return its index, or -1 without a range."""
         if node.get("dof") is None:
             return -1
         name = node.text("dof")
         number = self._find_index(node, name, self.walkers.coordinates, leg)
-        start = f"{before[:-1]}-{name}."
+        start = f"{prefix[:-1]}-{name}."
         # Names of the gate's parameters contain the coordinate.
         delay = self._read_delay(node, parameters, start)
-        low, high = (
+        lower, upper = (
             parameters.get_number(node, f"pos_{end}", limit, f"{start}pos_{end}")
             # A limit beyond any value leaves the range open at this end.
             for end, limit in (("min", -1e12), ("max", 1e12))
@@ -521,7 +543,7 @@ class Reflexes:
             self._add_sensor(make_source(self.walkers, node, number, ""))
             for make_source in (VALUE_SOURCE, SPEED_SOURCE)
         )
-        self._gates.append(TermOrGate((value, speed), delay, low, high))
+        self._gates.append(TermOrGate((value, speed), delay, lower, upper))
         return len(self._gates) - 1
 
     def pack(self) -> tuple[Ints, Array]:
@@ -533,35 +555,41 @@ class Reflexes:
             Integers, and the numbers of each candidate (w, r).
         """
         # Terms with sensors come first; sums are rounded in this order.
-        parts = [*sorted(self.terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
+        terms_and_gates = [
+            *sorted(self.terms, key=lambda term: term.ints[TERM.SENSOR] < 0),
+            *self._gates,
+        ]
         # The kernels interpolate the history in units of control steps.
-        delays = [part.delay / self.walkers.step for part in parts]
-        each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
+        delays = [record.delay / self.walkers.step for record in terms_and_gates]
+        columns_of_parts = [
+            (delay, record.first, record.second)
+            for delay, record in zip(delays, terms_and_gates, strict=True)
+        ]
         numbers = np.column_stack(
-            [self._limits, *(column for columns in each for column in columns)]
+            [self._limits, *(column for columns in columns_of_parts for column in columns)]
         )
         sensor_delays = (
             np.max(delay)
-            for part, delay in zip(parts, delays, strict=True)
-            if part.ints[TERM.SENSOR] >= 0
+            for record, delay in zip(terms_and_gates, delays, strict=True)
+            if record.ints[TERM.SENSOR] >= 0
         )
         # One step more for the current sensors, and one for the interpolation between two steps.
         history = int(np.ceil(max([*sensor_delays, self._limits[0, LIMITS.DELAY]]))) + 2
-        ints = [number for part in parts for number in part.ints]
-        more = list[float]()
+        ints = [number for record in terms_and_gates for number in record.ints]
+        sensor_numbers = list[float]()
         for source in self.sources:
             ints += (
                 source.kind,
                 source.place,
-                numbers.shape[1] + len(more) if source.numbers else source.more,
+                numbers.shape[1] + len(sensor_numbers) if source.numbers else source.more,
             )
             # Numbers of sensors follow those of all terms and gates, and are the same for all
             # candidates.
-            more += source.numbers
-        numbers = np.column_stack([numbers, np.tile(more, (len(numbers), 1))])
-        head = np.zeros(REFLEXES.HEAD, dtype=np.int64)
+            sensor_numbers += source.numbers
+        numbers = np.column_stack([numbers, np.tile(sensor_numbers, (len(numbers), 1))])
+        header = np.zeros(REFLEXES.HEAD, dtype=np.int64)
         sensors = len(self.sources)
-        head[: REFLEXES.ROOM + 1] = (
+        header[: REFLEXES.ROOM + 1] = (
             *(
                 len(self.terms),
                 len(self._gates),
@@ -572,5 +600,5 @@ class Reflexes:
             ),
             *(numbers.shape[1], LEGS + history * sensors),
         )
-        head[REFLEXES.IS_NOISY] = self._is_noisy
-        return np.array([*head, *ints], dtype=np.int64), np.ascontiguousarray(numbers)
+        header[REFLEXES.IS_NOISY] = self._is_noisy
+        return np.array([*header, *ints], dtype=np.int64), np.ascontiguousarray(numbers)

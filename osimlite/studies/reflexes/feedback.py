@@ -64,36 +64,38 @@ class Feedback:
     ) -> None:
         if isinstance(given, Mapping):
             self._source_text = "data of Python"
-            top = make_node(given)
+            root_node = make_node(given)
             folder = Path()
         else:
             self._source_text = str(given)
-            top = read_settings(given)
+            root_node = read_settings(given)
             folder = Path(given).parent
         # The controller may stand alone, in an objective, or in a complete scenario.
-        optimizer = next((node for _, node in top.select_all(*OPTIMIZERS)), top)
+        optimizer = next((node for _, node in root_node.select_all(*OPTIMIZERS)), root_node)
         objective = optimizer.get("SimulationObjective")
-        holder, model = top, top
+        controller_parent, model = root_node, root_node
         if objective is not None:
-            holder = objective
+            controller_parent = objective
             model = objective.get("ModelOpenSim4") or SettingNode()
-        found = holder.select_one(*CONTROLLERS)
-        if found is None:
-            raise holder.error(f"a controller is needed: {join_words(list(CONTROLLERS))}")
-        self._kind, self._node = found
+        selection = controller_parent.select_one(*CONTROLLERS)
+        if selection is None:
+            raise controller_parent.error(
+                f"a controller is needed: {join_words(list(CONTROLLERS))}"
+            )
+        self._kind, self._node = selection
         self.step = read_control_step(model)
         self._legs = read_leg_names(model)
-        known = {
+        initial_values = {
             name: best for name, (best, _, _) in read_initial_parameters(optimizer, folder).items()
         }
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
         # Values of the user override those of `init`.
-        self._initial = known
-        self._values = {**known, **values}
+        self._initial = initial_values
+        self._values = {**initial_values, **values}
         # Other parts of a scenario, such as measures, are not needed here and may remain unread.
         if objective is None:
-            top.refuse_unread_parts("a file of a controller")
+            root_node.refuse_unread_parts("a file of a controller")
 
     def __str__(self) -> str:
         return self._source_text
@@ -112,10 +114,16 @@ class Feedback:
             engine: engine of the model.
         """
         _, _, parameters = self._read(model, engine)
-        found = parameters.requested.values()
+        requested = parameters.requested.values()
         values = self._values
         return [
-            Gain(each.name, values.get(each.name, each.mean), each.low, each.high) for each in found
+            Gain(
+                parameter.name,
+                values.get(parameter.name, parameter.mean),
+                parameter.low,
+                parameter.high,
+            )
+            for parameter in requested
         ]
 
     def with_values(self, values: Mapping[str, float]) -> Self:
@@ -159,20 +167,22 @@ class Feedback:
         plan, numbers = reflexes.pack()
         # Controls without reflexes are left to other sources, unless there is base noise, which acts
         # on all controls. Proportional noise of a control that is 0 is 0.
-        everything = np.arange(len(sensed.names))
+        all_controls = np.arange(len(sensed.names))
         is_noisy = numbers[0, LIMITS.CONTROL_NOISE] > 0.0
         targets = [term.ints[TERM.TARGET] for term in reflexes.terms]
-        others = np.setdiff1d(everything, everything if is_noisy else targets)
+        unused_controls = np.setdiff1d(all_controls, all_controls if is_noisy else targets)
         # With bounds of 0 the kernels add nothing to a control.
-        first = SENSOR_NUMBERS.HEAD + 2 * len(sensed.muscles)
-        known = sensed.sensor_numbers.copy()
-        known[first + others] = known[first + len(sensed.names) + others] = 0.0
+        first_bound = SENSOR_NUMBERS.HEAD + 2 * len(sensed.muscles)
+        sensor_numbers = sensed.sensor_numbers.copy()
+        sensor_numbers[first_bound + unused_controls] = sensor_numbers[
+            first_bound + len(sensed.names) + unused_controls
+        ] = 0.0
         return KernelController(
             tuple(sensed.paths),
             self.step,
             tuple(source.name for source in reflexes.sources),
             sensed.sensor_plan,
-            known,
+            sensor_numbers,
             plan,
             numbers,
             parameters.values_used,

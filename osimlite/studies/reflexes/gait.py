@@ -72,27 +72,28 @@ class GaitMeasures(NamedTuple):
             Per label a text with units, in the order of a report.
         """
         names = ("mass centre", self.centre), ("pelvis", self.pelvis)
-        high = (
-            f"{name} {mean:.3f} m ({low:.3f} to {high:.3f})" for name, (mean, low, high) in names
+        height_texts = (
+            f"{name} {mean:.3f} m ({lowest:.3f} to {height_texts:.3f})"
+            for name, (mean, lowest, height_texts) in names
         )
-        words = {
+        texts = {
             "distance": f"{self.distance:.3f} m, {self.speed:.3f} m/s",
-            "heights": ", ".join(high),
+            "heights": ", ".join(height_texts),
         }
         if self.strides is not None:
-            each = self.strides
-            left, right = (100.0 * part for part in each.stance)
-            words["strides"] = (
-                f"{each.number}, of {each.time:.3f} s and {each.length:.3f} m; {each.touches} steps without scuffs"
+            strides = self.strides
+            left, right = (100.0 * fraction for fraction in strides.stance)
+            texts["strides"] = (
+                f"{strides.number}, of {strides.time:.3f} s and {strides.length:.3f} m; {strides.touches} steps without scuffs"
             )
-            words["stance"] = (
-                f"{left:.1f} % of a stride left, {right:.1f} % right; both feet {100.0 * each.both:.1f} %"
+            texts["stance"] = (
+                f"{left:.1f} % of a stride left, {right:.1f} % right; both feet {100.0 * strides.both:.1f} %"
             )
-            first, dip, second = each.humps
-            words["ground"] = (
-                f"{first:.2f}, {dip:.2f}, {second:.2f} body weights (peak, valley, peak); maximum {each.peak:.2f}"
+            first_peak, valley, second_peak = strides.humps
+            texts["ground"] = (
+                f"{first_peak:.2f}, {valley:.2f}, {second_peak:.2f} body weights (peak, valley, peak); maximum {strides.peak:.2f}"
             )
-        return words
+        return texts
 
 
 def measure_gait(scenario: Scenario, walked: WalkResult) -> GaitMeasures | None:
@@ -111,67 +112,84 @@ def measure_gait(scenario: Scenario, walked: WalkResult) -> GaitMeasures | None:
     moments = list(zip(walked.states.times.tolist(), states.tolist(), strict=True))
     centre = locate_mass_centers(walkers.engine, moments)[:, :3]
     pelvis = locate_station(walkers.engine, moments, walkers.legs[0].base, np.zeros(3))[:, :3]
-    far = centre[-1, 0] - centre[0, 0]
+    distance = centre[-1, 0] - centre[0, 0]
     times = walked.states.times
-    upper, lower = (
+    centre_heights, pelvis_heights = (
         (float(y.mean()), float(y.min()), float(y.max())) for y in (centre[:, 1], pelvis[:, 1])
     )
     return GaitMeasures(
-        float(far),
-        float(far / times[-1]),
-        upper,
-        lower,
+        float(distance),
+        float(distance / times[-1]),
+        centre_heights,
+        pelvis_heights,
         measure_strides(times, centre[:, 0], walked.loads.rows),
     )
 
 
-def measure_strides(times: Array, way: Array, loads: Array) -> Strides | None:
+def measure_strides(times: Array, positions: Array, loads: Array) -> Strides | None:
     """Return averages over the strides of a walk; None with fewer than three touch-downs of a leg.
 
     Args:
         times: times of the samples (n,) (s).
-        way: position of the walker along x (n,) (m).
+        positions: position of the walker along x (n,) (m).
         loads: ground reaction force on each leg over the body weight (n, 2).
     """
     touches: Any = loads > CONTACT_LOAD
-    spans = []
-    for on in touches.T:
-        _remove_brief_contacts(on, times)
-        begins = np.flatnonzero(on[1:] & ~on[:-1]) + 1
+    stride_starts = []
+    for is_touching in touches.T:
+        _remove_brief_contacts(is_touching, times)
+        begins = np.flatnonzero(is_touching[1:] & ~is_touching[:-1]) + 1
         # One stride needs two touch-downs after the first.
         if len(begins) < 3:
             return None
         # The stride after the first touch-down still depends on the initial state.
-        spans.append(begins[1:])
+        stride_starts.append(begins[1:])
     humps, stance = [], []
-    for on, load, begins in zip(touches.T, loads.T, spans, strict=True):
-        stance.append(float(on[begins[0] : begins[-1]].mean()))
-        for first, last in pairwise(begins):
-            there = load[first:last][on[first:last]]
+    for is_touching, load, begins in zip(touches.T, loads.T, stride_starts, strict=True):
+        stance.append(float(is_touching[begins[0] : begins[-1]].mean()))
+        for start_row, end_row in pairwise(begins):
+            stance_loads = load[start_row:end_row][is_touching[start_row:end_row]]
             # The ground reaction of walking has two humps: at loading and at push-off.
-            middle = len(there) // 2
-            one = int(np.argmax(there[: middle or 1]))
-            two = middle + int(np.argmax(there[middle:]))
-            humps.append((there[one], there[one : two + 1].min(), there[two]))
-    start = min(begins[0] for begins in spans)
-    end = max(begins[-1] for begins in spans)
-    count = sum(len(begins) - 1 for begins in spans)
+            middle_row = len(stance_loads) // 2
+            first_peak = int(np.argmax(stance_loads[: middle_row or 1]))
+            second_peak = middle_row + int(np.argmax(stance_loads[middle_row:]))
+            humps.append(
+                (
+                    stance_loads[first_peak],
+                    stance_loads[first_peak : second_peak + 1].min(),
+                    stance_loads[second_peak],
+                )
+            )
+    start = min(begins[0] for begins in stride_starts)
+    end = max(begins[-1] for begins in stride_starts)
+    count = sum(len(begins) - 1 for begins in stride_starts)
     time, length = (
-        sum(row[begins[-1]] - row[begins[0]] for begins in spans) / count for row in (times, way)
+        sum(row[begins[-1]] - row[begins[0]] for begins in stride_starts) / count
+        for row in (times, positions)
     )
     # Double support and peak cover the time in which both legs have complete strides.
-    both = float(touches[start:end].all(axis=1).mean())
+    double_support = float(touches[start:end].all(axis=1).mean())
     peak = float(loads[start:end].max())
-    found = tuple(np.mean(humps, axis=0).tolist())
+    mean_humps = tuple(np.mean(humps, axis=0).tolist())
     return Strides(
-        count, float(time), float(length), tuple(stance), both, found, peak, count + 2 * len(spans)
+        count,
+        float(time),
+        float(length),
+        tuple(stance),
+        double_support,
+        mean_humps,
+        peak,
+        count + 2 * len(stride_starts),
     )
 
 
-def _remove_brief_contacts(on: Any, times: Array) -> None:
+def _remove_brief_contacts(is_touching: Any, times: Array) -> None:
     """Remove contacts, and then swings, that are shorter than `MIN_CONTACT_S`, in place."""
     for contact in (True, False):
-        edges = np.flatnonzero(on[1:] != on[:-1]) + 1
-        for first, last in pairwise(edges):
-            if on[first] == contact and times[last] - times[first] < MIN_CONTACT_S:
-                on[first:last] = not contact
+        edges = np.flatnonzero(is_touching[1:] != is_touching[:-1]) + 1
+        for start_row, end_row in pairwise(edges):
+            if (
+                is_touching[start_row] == contact
+                and times[end_row] - times[start_row] < MIN_CONTACT_S
+            ):
+                is_touching[start_row:end_row] = not contact

@@ -55,27 +55,27 @@ class Criteria:
         self._ints: list[int] = []
         self._numbers: list[float] = []
 
-    def add(self, kind: int, place: int, measure: Measure, *numbers: float) -> int:
+    def add(self, criterion_type: int, index: int, measure: Measure, *numbers: float) -> int:
         """Request a criterion for the time in which a measure is active.
 
         Args:
-            kind: kind of criterion, such as `CRITERION_TYPE.GAIT` of the kernels.
-            place: index in the sensor row, or a power of activations.
+            criterion_type: kind of criterion, such as `CRITERION_TYPE.GAIT` of the kernels.
+            index: index in the sensor row, or a power of activations.
             measure: measure that needs it.
             numbers: numbers of the criterion, see `CRITERION_NUMBERS` of the kernels.
 
         Returns:
             Offset of the criterion in the workspace.
         """
-        first = self.size
-        self._ints += kind, place, len(self._numbers), first
+        offset = self.size
+        self._ints += criterion_type, index, len(self._numbers), offset
         self._numbers += measure.start, measure.stop, *numbers
         self.size += (
             GAIT_WORK.STEPS + 2 * self.max_steps
-            if kind == CRITERION_TYPE.GAIT
+            if criterion_type == CRITERION_TYPE.GAIT
             else SAMPLE_WORK.SIZE
         )
-        return first
+        return offset
 
     def pack(self) -> tuple[Ints, Array]:
         """Return the criteria as the kernels take them.
@@ -116,7 +116,7 @@ class Measure(ABC):
         node: SettingNode,
         walkers: Walkers,
         criteria: Criteria,
-        above: Measure | None = None,
+        parent: Measure | None = None,
         side: str = "",
     ) -> None:
         self.node = node
@@ -127,25 +127,27 @@ class Measure(ABC):
         self.name = node.text("name", "") or self.default_name()
         self.weight = node.number("weight", 1.0)
         threshold = node.get("threshold")
-        soft = node.get("soft_threshold")
+        soft_threshold = node.get("soft_threshold")
         self.offset = node.number("result_offset", 0.0)
         self.threshold = None if threshold is None else node.number("threshold")
         # SCONE's soft threshold subtracts the threshold from the value, then cuts at zero. SCONE lets
         # it replace the two others without a word.
-        if soft is not None:
+        if soft_threshold is not None:
             for key in ("result_offset", "threshold"):
-                other = node.get(key)
-                if other is not None:
-                    raise other.error(f"'{key}' and 'soft_threshold' exclude each other; keep one")
+                excluded = node.get(key)
+                if excluded is not None:
+                    raise excluded.error(
+                        f"'{key}' and 'soft_threshold' exclude each other; keep one"
+                    )
             self.offset = -node.number("soft_threshold")
             self.threshold = 0.0
         self.transition = node.number("threshold_transition", 0.0)
         self.start = node.number("start_time", 0.0)
         # SCONE's default of 0 means no end.
         self.stop = node.number("stop_time", 0.0) or inf
-        if above is not None:
-            self.start = max(self.start, above.start)
-            self.stop = min(self.stop, above.stop)
+        if parent is not None:
+            self.start = max(self.start, parent.start)
+            self.stop = min(self.stop, parent.stop)
         self.minimize = node.flag("minimize", self.minimize)
         self.report: dict[str, Array] = {}
         self.terms: dict[str, Array] = {}
@@ -182,35 +184,37 @@ class Measure(ABC):
         value = self.compute_result(times, duration) + self.offset
         # Thresholds apply only to measures that are minimized.
         if self.minimize and self.threshold is not None:
-            least, over = self.threshold, self.transition
+            threshold, transition = self.threshold, self.transition
             # In the transition the value rises from 0 at the threshold to its full size at the end.
-            between = value * (value - least) / over if over > 0.0 else value
-            value = np.where(value < least, 0.0, np.where(value < least + over, between, value))
-        found: Array = self.weight * value
+            blended = value * (value - threshold) / transition if transition > 0.0 else value
+            value = np.where(
+                value < threshold, 0.0, np.where(value < threshold + transition, blended, value)
+            )
+        weighted: Array = self.weight * value
         # A composite measure has collected the terms of its parts, its own would count them twice.
-        self.terms = self.terms or {self.name: found}
-        return found
+        self.terms = self.terms or {self.name: weighted}
+        return weighted
 
-    def read_recorded(self, first: int, place: int) -> Array:
+    def read_recorded(self, offset: int, index: int) -> Array:
         """Return a number of a criterion from the workspaces of the candidates (w,).
 
         Args:
-            first: offset of the criterion, see `Criteria.add`.
-            place: index within the criterion.
+            offset: offset of the criterion, see `Criteria.add`.
+            index: index within the criterion.
         """
-        found: Array = self.walkers.criteria_work[:, first + place]
-        return found
+        recorded: Array = self.walkers.criteria_work[:, offset + index]
+        return recorded
 
-    def average_over_time(self, first: int) -> Array:
+    def average_over_time(self, offset: int) -> Array:
         """Return the time average of a criterion (w,).
 
         A criterion that was active for no time has its last value.
         """
-        total, span, last = (
-            self.read_recorded(first, place)
-            for place in (SAMPLE_WORK.TOTAL, SAMPLE_WORK.SPAN, SAMPLE_WORK.VALUE)
+        total, duration, last_value = (
+            self.read_recorded(offset, index)
+            for index in (SAMPLE_WORK.TOTAL, SAMPLE_WORK.SPAN, SAMPLE_WORK.VALUE)
         )
-        return np.divide(total, span, out=last.copy(), where=span > 0.0)
+        return np.divide(total, duration, out=last_value.copy(), where=duration > 0.0)
 
 
 class GaitMeasure(Measure):
@@ -252,35 +256,35 @@ class GaitMeasure(Measure):
         counts = np.zeros(self.count)
         target = max(min(abs(self.low), abs(self.high)), self.least_speed)
         # Candidates differ in their number of steps, so that they are scored one by one.
-        for k, room in enumerate(self.walkers.criteria_work[:, self._first :]):
-            row = room[: GAIT_WORK.STEPS + 2 * int(room[GAIT_WORK.COUNT])].tolist()
+        for candidate, recorded in enumerate(self.walkers.criteria_work[:, self._first :]):
+            row = recorded[: GAIT_WORK.STEPS + 2 * int(recorded[GAIT_WORK.COUNT])].tolist()
             numbers = row[GAIT_WORK.STEPS :]
             # The kernels note completed steps; the unfinished last one ends with the walk.
-            last = float(times[k]), row[GAIT_WORK.HERE] - row[GAIT_WORK.BEFORE]
-            steps = [*zip(numbers[::2], numbers[1::2], strict=True), last]
+            last_step = float(times[candidate]), row[GAIT_WORK.HERE] - row[GAIT_WORK.BEFORE]
+            steps = [*zip(numbers[::2], numbers[1::2], strict=True), last_step]
             # SCONE ignores the first steps, but fewer of them if there are hardly more.
-            first = min(max(len(steps) - self.first_steps, 0), self.first_steps)
-            good = time = length = 0.0
-            for number, (t, far) in enumerate(steps):
+            first_counted = min(max(len(steps) - self.first_steps, 0), self.first_steps)
+            total_score = time = length = 0.0
+            for number, (t, step_length) in enumerate(steps):
                 dt = t - (steps[number - 1][0] if number else 0.0)
-                if number < first or dt <= 0.0:
+                if number < first_counted or dt <= 0.0:
                     continue
-                speed = far / dt
+                speed = step_length / dt
                 if speed < self.low:
-                    off = speed - self.low
+                    speed_deviation = speed - self.low
                 elif speed > self.high:
-                    off = speed - self.high
+                    speed_deviation = speed - self.high
                 else:
-                    off = 0.0
-                good += dt * min(max(1.0 - abs(off) / target, -1.0), 1.0)
-                time, length = time + dt, length + far
+                    speed_deviation = 0.0
+                total_score += dt * min(max(1.0 - abs(speed_deviation) / target, -1.0), 1.0)
+                time, length = time + dt, length + step_length
             # The time after a fall counts as time without progress, so that longer walks score
             # better.
-            if times[k] < duration and (row[GAIT_WORK.FALLEN] or self.always):
-                time += duration - float(times[k])
-            result[k] = 1.0 - good / time if time else 1.0
-            speeds[k] = length / time if time else 0.0
-            counts[k] = len(steps)
+            if times[candidate] < duration and (row[GAIT_WORK.FALLEN] or self.always):
+                time += duration - float(times[candidate])
+            result[candidate] = 1.0 - total_score / time if time else 1.0
+            speeds[candidate] = length / time if time else 0.0
+            counts[candidate] = len(steps)
         self.report = {"speed": speeds, "steps": counts}
         return result
 
@@ -314,19 +318,19 @@ class JumpMeasure(Measure):
             times: times at which the jumps ended (w,) (s).
             duration: longest duration (s).
         """
-        start, here, peak, prepared, does = (
+        start, height, peak, prepared, does = (
             self.read_recorded(self._first, getattr(JUMP_WORK, name))
             for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
         )
         # Rising before the take-off is subtracted: otherwise standing up would count as a jump.
         early = 100.0 * np.maximum(prepared - start, 0.0)
         self.report = {"jump height": 100.0 * peak, "early rise": early}
-        found = np.where(
+        jump_height = np.where(
             does == JUMP_PHASE.PREPARES,
-            100.0 * (start + (here - start) / times),
+            100.0 * (start + (height - start) / times),
             100.0 * peak - early,
         )
-        return -found if self.negates else found
+        return -jump_height if self.negates else jump_height
 
 
 class EffortMeasure(Measure):
@@ -337,10 +341,10 @@ class EffortMeasure(Measure):
 
         The mass is F_max / specific tension * density * optimal fiber length.
         """
-        kind, walkers = node.text("measure_type"), self.walkers
-        if kind not in EFFORTS:
+        effort_type, walkers = node.text("measure_type"), self.walkers
+        if effort_type not in EFFORTS:
             raise node.error(
-                f"effort of the type '{kind}' is not done here{suggest_or_list(kind, EFFORTS)}"
+                f"effort of the type '{effort_type}' is not done here{suggest_or_list(effort_type, EFFORTS)}"
             )
         self.by_distance = node.flag("use_cost_of_transport", False)
         self.least_distance = node.number("min_distance", 1.0)
@@ -355,8 +359,8 @@ class EffortMeasure(Measure):
         for key in ("use_symmetric_fiber_ratios", "store_individual_muscle_efforts"):
             node.get(key)
         if node.get("name") is None:
-            self.name = kind
-        self._kind, power = EFFORTS[kind]
+            self.name = effort_type
+        self._kind, power = EFFORTS[effort_type]
         self._first = self.criteria.add(self._kind, power, self, slow, *masses)
 
     def compute_result(self, times: Array, duration: float) -> Array:
@@ -366,25 +370,25 @@ class EffortMeasure(Measure):
             times: times at which the walks ended (w,) (s).
             duration: longest duration (s).
         """
-        total, start, here = (
+        total, start, position = (
             self.read_recorded(self._first, k)
             for k in (SAMPLE_WORK.TOTAL, SAMPLE_WORK.START, SAMPLE_WORK.HERE)
         )
         # A smallest distance keeps walkers that fall at once from having an infinite cost of
         # transport.
-        far = np.maximum(self.least_distance, np.abs(here - start))
+        distance = np.maximum(self.least_distance, np.abs(position - start))
         if self._kind == CRITERION_TYPE.WANG:
             mass = self.walkers.mass
             self.report = {
                 "power": self.average_over_time(self._first) / mass,
-                "transport": total / (mass * far),
+                "transport": total / (mass * distance),
             }
-        found = (
-            total / (self.walkers.mass * far)
+        effort = (
+            total / (self.walkers.mass * distance)
             if self.by_distance
             else self.average_over_time(self._first)
         )
-        return found / len(self.walkers.names) if self.by_muscle else found
+        return effort / len(self.walkers.names) if self.by_muscle else effort
 
 
 class Penalty(Measure):
@@ -393,13 +397,15 @@ class Penalty(Measure):
     _statistics: tuple[tuple[str, int], ...] = ()
     """Per criterion its mode (average, highest, lowest or sum) and its offset in the workspace."""
 
-    def penalize(self, node: SettingNode, kind: int, place: int = 0, factor: float = 1.0) -> None:
+    def penalize(
+        self, node: SettingNode, criterion_type: int, index: int = 0, factor: float = 1.0
+    ) -> None:
         """Request a criterion for the excess of a number beyond a range.
 
         Args:
             node: node with the range and the penalties.
-            kind: kind of criterion of the kernels.
-            place: index of the number in the sensor row.
+            criterion_type: kind of criterion of the kernels.
+            index: index of the number in the sensor row.
             factor: factor of the number before the comparison, for example 180/pi for degrees.
 
         Raises:
@@ -413,7 +419,10 @@ class Penalty(Measure):
         mode = node.text("mode", "average")
         if mode not in ("average", "highest", "lowest", "sum"):
             raise node.error(f"penalties have no mode '{mode}'")
-        self._statistics = *self._statistics, (mode, self.criteria.add(kind, place, self, *numbers))
+        self._statistics = (
+            *self._statistics,
+            (mode, self.criteria.add(criterion_type, index, self, *numbers)),
+        )
 
     def compute_result(self, times: Array, duration: float) -> Array:
         """Return the sum of the statistics of all criteria (w,).
@@ -422,17 +431,17 @@ class Penalty(Measure):
             times: times at which the walks ended (w,) (s).
             duration: longest duration (s).
         """
-        places = {
+        index_by_mode = {
             "sum": SAMPLE_WORK.TOTAL,
             "highest": SAMPLE_WORK.HIGHEST,
             "lowest": SAMPLE_WORK.LOWEST,
         }
         total = np.zeros(self.count)
-        for mode, first in self._statistics:
+        for mode, offset in self._statistics:
             total += (
-                self.read_recorded(first, places[mode])
-                if mode in places
-                else self.average_over_time(first)
+                self.read_recorded(offset, index_by_mode[mode])
+                if mode in index_by_mode
+                else self.average_over_time(offset)
             )
         return total
 
@@ -453,18 +462,21 @@ class DofMeasure(Penalty):
         infos = {info.name: info for info in self.walkers.mechanism.coordinates}
         # Ranges of rotations are in degrees by default, the sensor row is in radians.
         factor = 180.0 / np.pi if node.flag("in_degrees", infos[name].unit == "rad") else 1.0
-        for what, first, scale in (
+        for quantity, first_sensor, scale in (
             ("position", SENSES.VALUES, factor),
             ("velocity", SENSES.SPEEDS, factor),
             ("force", SENSES.MOMENTS, 1.0),
             ("limit_torque", SENSES.MOMENTS, 1.0),
         ):
-            part = node.get(what)
-            if part is not None:
+            range_node = node.get(quantity)
+            if range_node is not None:
                 self.penalize(
-                    part, CRITERION_TYPE.NUMBER, int(senses[first]) + names.index(name), scale
+                    range_node,
+                    CRITERION_TYPE.NUMBER,
+                    int(senses[first_sensor]) + names.index(name),
+                    scale,
                 )
-                part.refuse_unread_parts(f"a {what}")
+                range_node.refuse_unread_parts(f"a {quantity}")
 
     def default_name(self) -> str:
         """Return the name of the coordinate."""
@@ -493,13 +505,13 @@ class CompositeMeasure(Measure):
         if node.flag("use_first_non_zero_result", False):
             raise node.error("use_first_non_zero_result is not done here")
         # `symmetric` applies where `dual_sided` is not set.
-        both = node.flag("dual_sided", node.flag("symmetric", False))
+        is_dual_sided = node.flag("dual_sided", node.flag("symmetric", False))
         blocks = [node, *(block for _, block in node.select_all("Measures"))]
         self.parts: list[Measure] = [
-            MEASURES[name](part, self.walkers, self.criteria, self, side)
+            MEASURES[name](measure_node, self.walkers, self.criteria, self, side)
             for block in blocks
-            for name, part in block.select_all(*MEASURES)
-            for side in (SIDES if both else (self.side,))
+            for name, measure_node in block.select_all(*MEASURES)
+            for side in (SIDES if is_dual_sided else (self.side,))
         ]
         # As in SCONE, a composite follows its first part.
         self.minimize = node.flag("minimize", not self.parts or self.parts[0].minimize)
@@ -512,11 +524,11 @@ class CompositeMeasure(Measure):
             duration: longest duration (s).
         """
         total = sum(
-            (part.add_weighted(times, duration) for part in self.parts), np.zeros(self.count)
+            (measure.add_weighted(times, duration) for measure in self.parts), np.zeros(self.count)
         )
-        for part in self.parts:
-            self.terms |= part.terms
-            self.report |= part.report
+        for measure in self.parts:
+            self.terms |= measure.terms
+            self.report |= measure.report
         return total
 
 

@@ -76,20 +76,22 @@ class Parameters:
         Raises:
             DocumentError: the part is neither a number nor a parameter.
         """
-        part = node.get(key)
-        found = (
-            np.full(self.count, default) if part is None else self.parse_number(part, name or key)
+        number_node = node.get(key)
+        numbers = (
+            np.full(self.count, default)
+            if number_node is None
+            else self.parse_number(number_node, name or key)
         )
-        self.values_used[name or key] = float(found[0])
-        return found
+        self.values_used[name or key] = float(numbers[0])
+        return numbers
 
-    def parse_number(self, part: SettingNode, name: str) -> Array:
+    def parse_number(self, number_node: SettingNode, name: str) -> Array:
         """Return a number of each candidate (w,) from its own node.
 
         Values of parameters are clipped to their bounds.
 
         Args:
-            part: node of the number.
+            number_node: node of the number.
             name: name of the parameter.
 
         Raises:
@@ -97,15 +99,15 @@ class Parameters:
                 bounds.
         """
         # A parameter is `1~0.5<0,2>`, `~1<0,2>`, or a block of mean, std, min and max.
-        if part.parts:
+        if number_node.parts:
             defaults = ("mean", None), ("std", np.nan), ("min", -np.inf), ("max", np.inf)
             return self._request_parameter(
-                part, name, *(part.number(key, value) for key, value in defaults)
+                number_node, name, *(number_node.number(key, value) for key, value in defaults)
             )
-        text = part.value
+        text = number_node.value
         match = _FORM.match(text)
         if match is None or not text:
-            raise part.error(
+            raise number_node.error(
                 f"'{name}' must be a number or a parameter such as 1~0.1<0,2>, not '{text}'"
             )
         if "~" not in text and match["low"] is None:
@@ -115,40 +117,46 @@ class Parameters:
         if mean is None:
             mean, std = std, None
         if mean is None:
-            raise part.error(f"the parameter '{name}' has no mean")
-        low, high = (
+            raise number_node.error(f"the parameter '{name}' has no mean")
+        lower, upper = (
             float(match[end]) if match[end] is not None else limit
             for end, limit in (("low", -np.inf), ("high", np.inf))
         )
         return self._request_parameter(
-            part, name, float(mean), np.nan if std is None else float(std), low, high
+            number_node, name, float(mean), np.nan if std is None else float(std), lower, upper
         )
 
     def _request_parameter(
-        self, part: SettingNode, name: str, mean: float, std: float, low: float, high: float
+        self,
+        number_node: SettingNode,
+        name: str,
+        mean: float,
+        std: float,
+        lower: float,
+        upper: float,
     ) -> Array:
         """Return the values (count,) of a parameter, and note its definition."""
-        if not low <= mean <= high:
-            raise part.error(
-                f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}"
+        if not lower <= mean <= upper:
+            raise number_node.error(
+                f"the parameter '{name}' begins at {mean:g}, which is not from {lower:g} to {upper:g}"
             )
         # NaN stands for a parameter that states no standard deviation.
         std = self.auto_std_factor * abs(mean) if np.isnan(std) else std
         # Both legs of a symmetric controller read one parameter; its first definition counts.
-        self.requested.setdefault(name, Parameter(name, mean, std, low, high))
+        self.requested.setdefault(name, Parameter(name, mean, std, lower, upper))
         # Values of a file or of a caller may be beyond the bounds.
         value = self.values.get(name, mean)
-        return np.clip(np.broadcast_to(np.asarray(value, dtype=float), (self.count,)), low, high)
+        return np.clip(np.broadcast_to(np.asarray(value, dtype=float), (self.count,)), lower, upper)
 
 
-def format_par_line(parameter: Parameter, best: float) -> str:
+def format_par_line(parameter: Parameter, best_value: float) -> str:
     """Return a line of a .par file as SCONE writes it: name, best value, mean, standard deviation.
 
     Args:
         parameter: parameter with mean and standard deviation.
-        best: best value so far.
+        best_value: best value so far.
     """
-    numbers = "\t".join(f"{number:.17g}" for number in (best, parameter.mean, parameter.std))
+    numbers = "\t".join(f"{number:.17g}" for number in (best_value, parameter.mean, parameter.std))
     return f"{parameter.name:<32}\t{numbers}\n"
 
 
@@ -171,14 +179,14 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
         raise DocumentError(message, file=str(path)) from None
     result = {}
     for number, line in enumerate(text.splitlines(), 1):
-        words = line.split()
-        if not words:
+        fields = line.split()
+        if not fields:
             continue
         try:
-            best, mean, std = (parse_finite(word) for word in words[1:4])
+            best_value, mean, std = (parse_finite(field) for field in fields[1:4])
         except ValueError:
             raise DocumentError(
                 "a name, best, mean and standard deviation are wanted", file=str(path), line=number
             ) from None
-        result[words[0]] = best, mean, std
+        result[fields[0]] = best_value, mean, std
     return result

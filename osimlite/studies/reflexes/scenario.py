@@ -118,12 +118,12 @@ class Scenario:
 
     def __init__(self, given: str | Path | Mapping[str, Any], model: Model | None = None) -> None:
         if isinstance(given, Mapping):
-            self.folder, top = Path(), make_node(given)
+            self.folder, root_node = Path(), make_node(given)
         else:
             self.folder = Path(given).parent
-            top = read_settings(given)
-        found = next(iter(top.select_all(*OPTIMIZERS)), None)
-        self.optimizer = top if found is None else found[1]
+            root_node = read_settings(given)
+        selected_optimizer = next(iter(root_node.select_all(*OPTIMIZERS)), None)
+        self.optimizer = root_node if selected_optimizer is None else selected_optimizer[1]
         self.population = DEFAULT_POPULATION
         self.generations = DEFAULT_GENERATIONS
         self.seed = 0
@@ -138,11 +138,11 @@ class Scenario:
             )
         settings = objective.get("ModelOpenSim4")
         if settings is None:
-            other = next(
+            other_model = next(
                 (name for name, _ in objective.parts if name.startswith("Model")), "no model"
             )
             raise objective.error(
-                f"of models only ModelOpenSim4 is done here, and this has {other}"
+                f"of models only ModelOpenSim4 is done here, and this has {other_model}"
             )
         self.settings: SettingNode = settings
         if model is None:
@@ -155,7 +155,7 @@ class Scenario:
                 f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s"
             )
         self.initial = read_initial_parameters(self.optimizer, self.folder)
-        if found is not None:
+        if selected_optimizer is not None:
             self.population = self.optimizer.count("lambda", DEFAULT_POPULATION, 1, MAX_POPULATION)
             self.generations = self.optimizer.count(
                 "max_generations", DEFAULT_GENERATIONS, 0, 10**9
@@ -163,7 +163,7 @@ class Scenario:
             self.seed = self.optimizer.count("random_seed", 0, 0, MAX_SEED)
             for key in IGNORED_SEARCH_SETTINGS:
                 self.optimizer.get(key)
-            self.optimizer.refuse_unread_parts(f"a {found[0]}")
+            self.optimizer.refuse_unread_parts(f"a {selected_optimizer[0]}")
         self._walkers: dict[int, Walkers] = {}
         self._read_settings()
 
@@ -192,11 +192,11 @@ class Scenario:
         controller = objective.select_one(*CONTROLLERS)
         measure = objective.select_one(*MEASURES)
         if controller is None:
-            other = next(
+            other_controller = next(
                 (name for name, _ in objective.parts if name.endswith("Controller")), "none"
             )
             raise objective.error(
-                f"of controllers {join_words(list(CONTROLLERS))} are done here, and this has {other}"
+                f"of controllers {join_words(list(CONTROLLERS))} are done here, and this has {other_controller}"
             )
         if measure is None:
             raise objective.error(f"a measure is needed: {join_words(list(MEASURES))}")
@@ -216,7 +216,7 @@ class Scenario:
         Returns:
             Value per name of a parameter.
         """
-        return {name: best for name, (best, _, _) in self.initial.items()}
+        return {name: best_value for name, (best_value, _, _) in self.initial.items()}
 
     def parameters(self) -> list[Parameter]:
         """Return all parameters to optimize, with the initial means and standard deviations.
@@ -227,9 +227,11 @@ class Scenario:
         requested = Parameters({})
         Candidates(self, requested, self.step)
         result = []
-        for each in requested.requested.values():
-            _, mean, std = self.initial.get(each.name, (each.mean, each.mean, each.std))
-            result.append(each._replace(mean=mean, std=std))
+        for parameter in requested.requested.values():
+            _, mean, std = self.initial.get(
+                parameter.name, (parameter.mean, parameter.mean, parameter.std)
+            )
+            result.append(parameter._replace(mean=mean, std=std))
         return result
 
     def walk(
@@ -294,8 +296,8 @@ class Scenario:
 
     def close(self) -> None:
         """Release the compiled engines of all copies."""
-        for each in self._walkers.values():
-            each.close()
+        for walkers in self._walkers.values():
+            walkers.close()
         self._walkers.clear()
 
 
@@ -314,12 +316,12 @@ class Candidates:
         self.duration = duration
         self.walkers = walkers = scenario.get_walkers(parameters.count)
         self._set_initial_states()
-        kind, controller = scenario.controller
-        reflexes = Reflexes(controller, kind, walkers, parameters)
+        controller_type, controller = scenario.controller
+        reflexes = Reflexes(controller, controller_type, walkers, parameters)
         self._steps = round(duration / walkers.step)
-        name, own = scenario.measure
+        name, measure_node = scenario.measure
         criteria = Criteria(self._steps)
-        self.measure: Measure = MEASURES[name](own, walkers, criteria)
+        self.measure: Measure = MEASURES[name](measure_node, walkers, criteria)
         walkers.set_reflexes_and_criteria(*reflexes.pack(), *criteria.pack(), criteria.size)
         node = scenario.settings
         load = node.number("initial_load", 0.2)
@@ -329,8 +331,8 @@ class Candidates:
         # A model without this vertical coordinate, or a load of 0, starts at the height of its
         # file.
         if load > 0.0 and height is not None:
-            for k in range(walkers.count):
-                _settle_on_ground(walkers, k, height, load)
+            for candidate in range(walkers.count):
+                _settle_on_ground(walkers, candidate, height, load)
 
     def _set_initial_states(self) -> None:
         """Set the initial states: the model's default, then a file, then offsets.
@@ -371,15 +373,15 @@ class Candidates:
                 if label in walkers.offsets and len(table.times):
                     walkers.copies.states[:, walkers.offsets[label]] = table[label][0]
             return
-        top = read_settings(path)
+        root_node = read_settings(path)
         for block, ending in (("values", "value"), ("velocities", "speed")):
-            part = top.get(block)
-            for name, node in part.parts if part is not None else ():
+            block_node = root_node.get(block)
+            for name, node in block_node.parts if block_node is not None else ():
                 offset = next(
                     (
                         number
-                        for full, number in walkers.offsets.items()
-                        if full.endswith(f"/{name}/{ending}")
+                        for state_name, number in walkers.offsets.items()
+                        if state_name.endswith(f"/{name}/{ending}")
                     ),
                     None,
                 )
@@ -402,12 +404,12 @@ class Candidates:
         walkers.advance(ORDER.BEGIN)
         walkers.equilibrate_muscles(walkers.excitations)
         walkers.advance(ORDER.START)
-        rows, going = [], list(range(walkers.count))
-        for first in range(0, self._steps, STEPS_PER_CALL):
-            rows.append(walkers.advance(min(STEPS_PER_CALL, self._steps - first), going))
+        rows, active = [], list(range(walkers.count))
+        for first_step in range(0, self._steps, STEPS_PER_CALL):
+            rows.append(walkers.advance(min(STEPS_PER_CALL, self._steps - first_step), active))
             # Candidates that have fallen are not simulated any further.
-            going = np.flatnonzero(walkers.progress[:, PROGRESS.GOING]).tolist()
-            if not going:
+            active = np.flatnonzero(walkers.progress[:, PROGRESS.GOING]).tolist()
+            if not active:
                 break
         # The kernels record the start of each step; the end of the last one is added here.
         rows.append(
@@ -458,10 +460,13 @@ def read_initial_parameters(
     """
     result: dict[str, tuple[float, float, float]] = {}
     for _, init in optimizer.select_all("init"):
-        own = read_par(find_file(init.text("file"), folder))
+        file_parameters = read_par(find_file(init.text("file"), folder))
         factor = init.number("std_factor", 1.0)
-        best = init.flag("use_best_as_mean", False)
-        result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
+        uses_best = init.flag("use_best_as_mean", False)
+        result |= {
+            name: (v[0], v[0] if uses_best else v[1], factor * v[2])
+            for name, v in file_parameters.items()
+        }
         init.refuse_unread_parts("an init")
     return result
 
@@ -490,37 +495,37 @@ def read_leg_names(node: SettingNode) -> dict[str, str]:
     }
 
 
-def _settle_on_ground(walkers: Walkers, which: int, height: int, load: float) -> None:
+def _settle_on_ground(walkers: Walkers, candidate: int, height: int, load: float) -> None:
     """Move a walker to the height at which the ground carries a part of its weight, as SCONE does.
 
     Args:
         walkers: candidates.
-        which: index of the candidate.
+        candidate: index of the candidate.
         height: offset of the vertical coordinate in its state.
         load: required ground reaction force over the weight.
 
     Raises:
         SimulationError: no height within `MAX_LIFT_M` carries this load.
     """
-    state = walkers.copies.states[which]
+    state = walkers.copies.states[candidate]
     start = float(state[height])
 
     def compute_load(value: float) -> float:
         state[height] = value
-        walkers.advance(ORDER.FEEL, (which,))
-        return float(walkers.get_leg_loads()[which].sum())
+        walkers.advance(ORDER.FEEL, (candidate,))
+        return float(walkers.get_leg_loads()[candidate].sum())
 
     # The load falls with height; bracket the root, then bisect.
-    top = start
-    while compute_load(top) > load and top - start < MAX_LIFT_M:
-        top += LIFT_STEP_M
-    bottom = top - LIFT_STEP_M
-    while compute_load(bottom) <= load and bottom - start > -MAX_LIFT_M:
-        bottom -= LIFT_STEP_M
+    upper = start
+    while compute_load(upper) > load and upper - start < MAX_LIFT_M:
+        upper += LIFT_STEP_M
+    lower = upper - LIFT_STEP_M
+    while compute_load(lower) <= load and lower - start > -MAX_LIFT_M:
+        lower -= LIFT_STEP_M
     for _ in range(MAX_BISECTIONS):
-        middle = 0.5 * (top + bottom)
-        found = compute_load(middle)
-        if abs(found - load) / load <= LOAD_TOLERANCE:
+        middle_height = 0.5 * (upper + lower)
+        carried_load = compute_load(middle_height)
+        if abs(carried_load - load) / load <= LOAD_TOLERANCE:
             return
-        top, bottom = (top, middle) if found > load else (middle, bottom)
+        upper, lower = (upper, middle_height) if carried_load > load else (middle_height, lower)
     raise SimulationError(f"in no height the ground carries {load:g} of the weight")

@@ -86,77 +86,88 @@ def search_parameters(
             f"a search takes {MIN_POPULATION} candidates in a generation at least, and one generation"
         )
     strategy = require("cma", extra="optimize", purpose="the search for parameters")
-    own = scenario.parameters()
-    if not own:
+    parameters = scenario.parameters()
+    if not parameters:
         raise SettingError("the scenario has no parameters, which are written as 1~0.1<0,2>")
     path = Path(folder) / BEST_FILE
     if not resume and path.exists():
         raise SettingError(
             f"'{path}' exists already: continue it with --resume, or name another folder"
         )
-    best = np.array([each.mean for each in own])
-    least = np.inf
+    best_values = np.array([parameter.mean for parameter in parameters])
+    best_result = np.inf
     if resume:
-        known = read_par(path)
-        names = [each.name for each in own]
+        saved_parameters = read_par(path)
+        names = [parameter.name for parameter in parameters]
         # A parameter that only one side has would silently start from its mean, or be lost.
-        for name in sorted({*known} ^ {*names}):
-            whose = "the scenario" if name in known else f"'{path}'"
-            raise SettingError(f"{whose} has no parameter '{name}': they are of different searches")
-        # The scenario may have other bounds than when the file was written.
-        own = [
-            each._replace(
-                mean=float(np.clip(known[each.name][1], each.low, each.high)),
-                std=known[each.name][2],
+        for name in sorted({*saved_parameters} ^ {*names}):
+            place_text = "the scenario" if name in saved_parameters else f"'{path}'"
+            raise SettingError(
+                f"{place_text} has no parameter '{name}': they are of different searches"
             )
-            for each in own
+        # The scenario may have other bounds than when the file was written.
+        parameters = [
+            parameter._replace(
+                mean=float(
+                    np.clip(saved_parameters[parameter.name][1], parameter.low, parameter.high)
+                ),
+                std=saved_parameters[parameter.name][2],
+            )
+            for parameter in parameters
         ]
-        best = np.array([known[name][0] for name in names])
-        least = float(
+        best_values = np.array([saved_parameters[name][0] for name in names])
+        best_result = float(
             scenario.walk(
-                {each.name: value for each, value in zip(own, best, strict=True)}
+                {
+                    parameter.name: value
+                    for parameter, value in zip(parameters, best_values, strict=True)
+                }
             ).results[0]
         )
     make_folder(Path(folder))
     # CMA-ES works on (value - mean) / std, so that its initial step size is 1 for all parameters.
     # A standard deviation of 0 (a mean of 0 without one) becomes tiny, not a division by zero.
-    scale = np.array([each.std if each.std > 0.0 else 1e-6 for each in own])
-    middle = np.array([each.mean for each in own])
+    scale = np.array([parameter.std if parameter.std > 0.0 else 1e-6 for parameter in parameters])
+    means = np.array([parameter.mean for parameter in parameters])
     lows, highs = (
-        (np.array([getattr(each, end) for each in own]) - middle) / scale for end in ("low", "high")
+        (np.array([getattr(parameter, end) for parameter in parameters]) - means) / scale
+        for end in ("low", "high")
     )
     # The package takes seed 0 as "draw one from the clock".
     cma_seed = seed + 1
     options = {"bounds": [lows, highs], "popsize": population, "seed": cma_seed, "verbose": -9}
-    es = strategy.CMAEvolutionStrategy(np.zeros(len(own)), 1.0, options)
+    es = strategy.CMAEvolutionStrategy(np.zeros(len(parameters)), 1.0, options)
     start_time = time.perf_counter()
     try:
         for number in range(1, generations + 1):
             points = np.array(es.ask())
-            values = middle + scale * points
+            values = means + scale * points
             walked = scenario.walk(
-                {each.name: values[:, k] for k, each in enumerate(own)}, population
+                {parameter.name: values[:, k] for k, parameter in enumerate(parameters)}, population
             )
             es.tell(list(points), walked.results.tolist())
             index = int(np.argmin(walked.results))
-            if walked.results[index] < least:
-                best = values[index]
-                least = float(walked.results[index])
+            if walked.results[index] < best_result:
+                best_values = values[index]
+                best_result = float(walked.results[index])
                 # SCONE continues from mean and standard deviation in the file, not from the best.
                 # The mean of the distribution is a better start for a later search than the best
                 # sample.
-                mean = middle + scale * es.result.xfavorite
+                mean = means + scale * es.result.xfavorite
                 stds = scale * es.sigma * np.sqrt(np.diag(es.C))
-                found = [
-                    each._replace(mean=m, std=s) for each, m, s in zip(own, mean, stds, strict=True)
+                written_parameters = [
+                    parameter._replace(mean=m, std=s)
+                    for parameter, m, s in zip(parameters, mean, stds, strict=True)
                 ]
-                write_atomically(path, "".join(map(format_par_line, found, best)))
+                write_atomically(
+                    path, "".join(map(format_par_line, written_parameters, best_values))
+                )
             if report is not None:
                 rate = 60.0 * number / (time.perf_counter() - start_time)
                 report(
                     Generation(
                         number,
-                        least,
+                        best_result,
                         float(np.median(walked.results)),
                         float(walked.times.max()),
                         rate,
@@ -167,4 +178,6 @@ def search_parameters(
     # The best parameters are in the file already; the caller continues with them.
     except KeyboardInterrupt:
         pass
-    return dict(zip((each.name for each in own), best.tolist(), strict=True))
+    return dict(
+        zip((parameter.name for parameter in parameters), best_values.tolist(), strict=True)
+    )

@@ -75,11 +75,11 @@ class SettingNode:
             DocumentError: several parts have this key.
         """
         self.read_keys.add(key)
-        found = [node for name, node in self.parts if name == key]
-        if len(found) > 1:
+        matches = [node for name, node in self.parts if name == key]
+        if len(matches) > 1:
             # Which of the two the author meant cannot be known.
-            raise found[1].error(f"'{key}' stands here again; it counts once only")
-        return found[0] if found else None
+            raise matches[1].error(f"'{key}' stands here again; it counts once only")
+        return matches[0] if matches else None
 
     def text(self, key: str, default: str | None = None) -> str:
         """Return the text of a part.
@@ -91,9 +91,9 @@ class SettingNode:
         Raises:
             DocumentError: the part is missing and has no default, or occurs twice.
         """
-        found = self.get(key)
-        if found is not None:
-            return found.value
+        part = self.get(key)
+        if part is not None:
+            return part.value
         if default is None:
             raise self.error(f"'{key}' is missing")
         return default
@@ -108,8 +108,8 @@ class SettingNode:
         Raises:
             DocumentError: the part is missing and has no default, or is not a number.
         """
-        found = self.get(key)
-        if found is None and default is not None:
+        part = self.get(key)
+        if part is None and default is not None:
             return default
         text = self.text(key)
         try:
@@ -118,25 +118,25 @@ class SettingNode:
             number = math.nan
         # "nan" parses as a number, but no setting may be undefined.
         if math.isnan(number):
-            raise (found or self).error(f"'{key}' must be a number, not '{text}'")
+            raise (part or self).error(f"'{key}' must be a number, not '{text}'")
         return number
 
-    def count(self, key: str, default: int, least: int, most: int) -> int:
+    def count(self, key: str, default: int, minimum: int, maximum: int) -> int:
         """Return the whole number of a part.
 
         Args:
             key: key of the part.
             default: number if there is no such part.
-            least: smallest number that is allowed.
-            most: largest number that is allowed.
+            minimum: smallest number that is allowed.
+            maximum: largest number that is allowed.
 
         Raises:
             DocumentError: the part is not a whole number, or is out of bounds.
         """
         number = self.number(key, default)
-        if not least <= number <= most or number != int(number):
+        if not minimum <= number <= maximum or number != int(number):
             raise (self.get(key) or self).error(
-                f"'{key}' must be a whole number from {least} to {most}, not '{self.text(key)}'"
+                f"'{key}' must be a whole number from {minimum} to {maximum}, not '{self.text(key)}'"
             )
         return int(number)
 
@@ -192,38 +192,38 @@ class SettingNode:
         Raises:
             DocumentError: there are several such parts.
         """
-        found = [*self.select_all(*names)]
-        if len(found) > 1:
-            raise found[1][1].error(
-                f"'{found[1][0]}' stands beside '{found[0][0]}'; join them in a composite one"
+        matches = [*self.select_all(*names)]
+        if len(matches) > 1:
+            raise matches[1][1].error(
+                f"'{matches[1][0]}' stands beside '{matches[0][0]}'; join them in a composite one"
             )
-        return found[0] if found else None
+        return matches[0] if matches else None
 
     def error(self, message: str) -> DocumentError:
         """Return an error that points at this node."""
         return DocumentError(message, file=self.file, line=self.line or None)
 
-    def refuse_unread_parts(self, what: str, known: tuple[str, ...] = ()) -> None:
+    def refuse_unread_parts(self, node_description: str, more_keys: tuple[str, ...] = ()) -> None:
         """Refuse parts whose keys the program has not read, so that no setting is ignored silently.
 
         Args:
-            what: description of this node for the message, for example "a NoiseController".
-            known: further keys to compare with for a suggestion.
+            node_description: description of this node for the message, for example "a NoiseController".
+            more_keys: further keys to compare with for a suggestion.
 
         Raises:
             DocumentError: there is such a part; the message suggests the nearest known key.
         """
         for name, node in self.parts:
             if name not in self.read_keys and name not in IGNORED_KEYS:
-                near = suggest_name(name, {*self.read_keys, *known})
-                raise node.error(f"'{name}' of {what} is not done here{near}")
+                suggestion = suggest_name(name, {*self.read_keys, *more_keys})
+                raise node.error(f"'{name}' of {node_description} is not done here{suggestion}")
 
 
-def parse_finite(word: str) -> float:
+def parse_finite(text: str) -> float:
     """Parse a finite number; raise ValueError for anything else."""
-    number = float(word)
+    number = float(text)
     if not math.isfinite(number):
-        raise ValueError(f"{word} is not finite")
+        raise ValueError(f"{text} is not finite")
     return number
 
 
@@ -278,9 +278,9 @@ def _list_parts(key: str, value: Any) -> Iterator[tuple[str, SettingNode]]:
     """Yield the parts that a value of YAML means: one, or one for each mapping of a list."""
     if isinstance(value, Mapping):
         yield key, make_node(value)
-    elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
-        for item in value:
-            yield from _list_parts(key, item)
+    elif isinstance(value, list | tuple) and any(isinstance(element, Mapping) for element in value):
+        for element in value:
+            yield from _list_parts(key, element)
     else:
         yield (
             key,
@@ -305,55 +305,55 @@ def _read_source(
     if depth > MAX_INCLUDE_DEPTH:
         raise DocumentError("the files include one another without end", file=str(path))
     if path.suffix in SUFFIXES:
-        top = SettingNode(file=str(path), line=1)
-        found = parse_yaml(text, str(path), with_lines=True)
-        if found is not None:
-            _fill_from_yaml(top, found, path, base, depth, 0, budget)
-        return top
+        root_node = SettingNode(file=str(path), line=1)
+        match = parse_yaml(text, str(path), with_lines=True)
+        if match is not None:
+            _fill_from_yaml(root_node, match, path, base, depth, 0, budget)
+        return root_node
     tokens = []
     line = 1
     offset = 0
     while offset < len(text):
-        found = _TOKEN.match(text, offset)
+        match = _TOKEN.match(text, offset)
         # Only an opening quotation mark without its end matches no token.
-        if found is None:
+        if match is None:
             raise DocumentError(
                 f"a quotation mark is not closed: {text[offset : offset + 20]!r}",
                 file=str(path),
                 line=line,
             )
-        if found["token"] is not None:
-            tokens.append((found["token"], line))
-        line += found.group().count("\n")
-        offset = found.end()
+        if match["token"] is not None:
+            tokens.append((match["token"], line))
+        line += match.group().count("\n")
+        offset = match.end()
     reader = _TokenReader(tokens, path, base, constants, depth, budget)
-    top = SettingNode(file=str(path), line=1)
-    reader.fill(top, 0)
+    root_node = SettingNode(file=str(path), line=1)
+    reader.fill(root_node, 0)
     if reader.index < len(tokens):
-        raise top.error(f"line {tokens[reader.index][1]}: a '}}' without its '{{'")
-    return top
+        raise root_node.error(f"line {tokens[reader.index][1]}: a '}}' without its '{{'")
+    return root_node
 
 
 def _fill_from_yaml(
-    node: SettingNode, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget
+    node: SettingNode, mapping: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget
 ) -> None:
     """Add the parts of a YAML mapping to a node.
 
     Args:
         node: node to fill.
-        found: YAML node with marks of lines.
+        mapping: YAML node with marks of lines.
         path: file of the mapping.
         base: folder of the scenario.
         depth: number of includes that led to this file.
         level: nesting of mappings.
         budget: remaining files and parts.
     """
-    if found.id != "mapping":
+    if mapping.id != "mapping":
         raise node.error("keys with values are wanted")
     # An anchor that contains an alias of itself has no end.
     if level > MAX_NESTING:
         raise node.error(f"the parts nest more than {MAX_NESTING} levels deep")
-    for key, value in found.value:
+    for key, value in mapping.value:
         if key.id != "scalar":
             raise node.error("a key must be a word")
         if key.value == "include":
@@ -366,22 +366,25 @@ def _fill_from_yaml(
             included = _resolve_include(value.value, path, base)
             node.parts += _read_source(included, base, {}, depth + 1, budget).parts
             continue
-        several = value.value if value.id == "sequence" else [value]
-        if value.id == "sequence" and all(item.id == "scalar" for item in several):
+        values = value.value if value.id == "sequence" else [value]
+        if value.id == "sequence" and all(value_node.id == "scalar" for value_node in values):
             # A list of plain values is one value of several words, such as a vector.
-            words = " ".join(item.value for item in several)
+            joined_text = " ".join(value_node.value for value_node in values)
             node.parts.append(
-                (key.value, SettingNode(words, file=node.file, line=value.start_mark.line + 1))
+                (
+                    key.value,
+                    SettingNode(joined_text, file=node.file, line=value.start_mark.line + 1),
+                )
             )
             continue
-        for item in several:
+        for value_node in values:
             budget.take_part(node)
-            part = SettingNode(file=node.file, line=item.start_mark.line + 1)
-            node.parts.append((key.value, part))
-            if item.id == "scalar":
-                part.value = item.value
+            child_node = SettingNode(file=node.file, line=value_node.start_mark.line + 1)
+            node.parts.append((key.value, child_node))
+            if value_node.id == "scalar":
+                child_node.value = value_node.value
             else:
-                _fill_from_yaml(part, item, path, base, depth, level + 1, budget)
+                _fill_from_yaml(child_node, value_node, path, base, depth, level + 1, budget)
 
 
 class _TokenReader:
@@ -424,48 +427,50 @@ class _TokenReader:
         while self.index < len(self.tokens) and self.tokens[self.index][0] != "}":
             key = self.next()
             if key == "<<":
-                words = []
-                while (word := self.next()) != ">>":
-                    words.append(word.strip('"'))
-                node.parts += self._read_included(" ".join(words)).parts
+                texts = []
+                while (text := self.next()) != ">>":
+                    texts.append(text.strip('"'))
+                node.parts += self._read_included(" ".join(texts)).parts
                 continue
             self.budget.take_part(node)
-            part = SettingNode(file=str(self.path), line=self.line())
-            what = self.next() if self.index < len(self.tokens) else ""
+            child_node = SettingNode(file=str(self.path), line=self.line())
+            token = self.next() if self.index < len(self.tokens) else ""
             # A part is `key = value`, `key { ... }`, or `key = value { ... }`.
-            if what == "=":
-                part.value = self._read_value()
+            if token == "=":
+                child_node.value = self._read_value()
                 if self.index < len(self.tokens) and self.tokens[self.index][0] == "{":
-                    what = self.next()
-            if what == "{":
-                self.fill(part, level + 1)
+                    token = self.next()
+            if token == "{":
+                self.fill(child_node, level + 1)
                 if self.next() != "}":
-                    raise part.error(f"'{key}' has no end")
-            elif what != "=":
-                raise part.error(f"after '{key}' a '=' or a '{{' is wanted, not '{what}'")
+                    raise child_node.error(f"'{key}' has no end")
+            elif token != "=":
+                raise child_node.error(f"after '{key}' a '=' or a '{{' is wanted, not '{token}'")
             # Constants are shared by all files that are read after this line.
             if key.startswith("$"):
-                self.constants[key] = part.value
+                self.constants[key] = child_node.value
             else:
-                node.parts.append((key.strip('"'), part))
+                node.parts.append((key.strip('"'), child_node))
 
     def _read_value(self) -> str:
         """Return a value: a word, the words of a list, or the value of a constant."""
         value = self.next()
         if value == "[":
-            words = []
-            while (word := self.next()) != "]":
-                words.append(word.strip('"'))
-            return " ".join(words)
+            texts = []
+            while (text := self.next()) != "]":
+                texts.append(text.strip('"'))
+            return " ".join(texts)
         if value in ("{", "}", "="):
             raise DocumentError(
                 f"a value is wanted, not '{value}'", file=str(self.path), line=self.line()
             )
         if value.startswith("$"):
             if value not in self.constants:
-                near = suggest_name(value, self.constants)
+                suggestion = suggest_name(value, self.constants)
                 raise DocumentError(
-                    f"there is no constant '{value}'{near}", file=str(self.path), line=self.line()
+                    f"there is no constant '{value}'{suggestion}",
+                    file=str(self.path),
+                    line=self.line(),
                 )
             return self.constants[value]
         return value.strip('"')
@@ -492,24 +497,26 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
         MissingFileError: there is no such file.
         DocumentError: the file must not be included.
     """
-    found = find_file(name, path.parent, base)
-    real = found.resolve()
-    if not {found.suffix.lower(), real.suffix.lower()} <= {*INCLUDED_ENDINGS}:
+    included = find_file(name, path.parent, base)
+    real = included.resolve()
+    if not {included.suffix.lower(), real.suffix.lower()} <= {*INCLUDED_ENDINGS}:
         endings = join_words(INCLUDED_ENDINGS)
         message = f"'{name}' is not included: the name of the file must end in {endings}"
         raise DocumentError(message, file=str(path))
     # Scenarios of SCONE include files of folders up to three levels above. The climb ends at folders
     # that hold more than one project, such as home: their files are not part of the scenario.
-    top = base.resolve()
-    shared = find_shared_folders()
-    for folder in top.parents[:3]:
-        if str(folder) in shared:
+    root = base.resolve()
+    shared_folders = find_shared_folders()
+    for folder in root.parents[:3]:
+        if str(folder) in shared_folders:
             break
-        top = folder
-    if not real.is_relative_to(top) or any(part[0] == "." for part in real.relative_to(top).parts):
-        message = f"'{name}' is not included: it is hidden, or outside of '{top}'"
+        root = folder
+    if not real.is_relative_to(root) or any(
+        path_part[0] == "." for path_part in real.relative_to(root).parts
+    ):
+        message = f"'{name}' is not included: it is hidden, or outside of '{root}'"
         raise DocumentError(message, file=str(path))
-    return found
+    return included
 
 
 def find_file(name: str, *folders: Path) -> Path:

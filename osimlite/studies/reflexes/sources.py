@@ -96,50 +96,51 @@ def _list_bodies(sensed: SensedModel) -> list[str]:
     return [body.name for body in sensed.mechanism.bodies]
 
 
-def _select_muscle_factory(what: str, first: int) -> SourceFactory:
+def _select_muscle_factory(quantity: str, offset_index: int) -> SourceFactory:
     """Return the factory of a sensor of muscles.
 
     Args:
-        what: quantity for the name of the sensor.
-        first: index in `SENSES` of the offset of this quantity in the sensor row.
+        quantity: quantity for the name of the sensor.
+        offset_index: index in `SENSES` of the offset of this quantity in the sensor row.
     """
 
-    def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+    def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
-            f"{sensed.paths[number].removeprefix('/')}.{what}",
+            f"{sensed.paths[number].removeprefix('/')}.{quantity}",
             SOURCE_TYPE.IN_ROW,
-            int(sensed.sensor_plan[first]) + number,
+            int(sensed.sensor_plan[offset_index]) + number,
         )
 
-    return feel
+    return make_source
 
 
 def _make_spindle_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
     """Return the sensor of the firing rate of a muscle's spindles, from fiber length and velocity."""
     length, speed = (
-        int(sensed.sensor_plan[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES)
+        int(sensed.sensor_plan[offset_index]) + number
+        for offset_index in (SENSES.LENGTHS, SENSES.VELOCITIES)
     )
     return Source(
         f"{sensed.paths[number].removeprefix('/')}.spindle", SOURCE_TYPE.SPINDLE, length, speed
     )
 
 
-def select_coordinate_factory(what: str, first: int) -> SourceFactory:
+def select_coordinate_factory(quantity: str, offset_index: int) -> SourceFactory:
     """Return the factory of a sensor of coordinates.
 
     Args:
-        what: quantity for the name of the sensor.
-        first: index in `SENSES` of the offset of this quantity in the sensor row.
+        quantity: quantity for the name of the sensor.
+        offset_index: index in `SENSES` of the offset of this quantity in the sensor row.
     """
 
-    def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+    def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
-            f"{sensed.coordinates[number]}.{what}",
+            f"{sensed.coordinates[number]}.{quantity}",
             SOURCE_TYPE.IN_ROW,
-            int(sensed.sensor_plan[first]) + number,
+            int(sensed.sensor_plan[offset_index]) + number,
         )
 
-    return feel
+    return make_source
 
 
 VALUE_SOURCE = select_coordinate_factory("value", SENSES.VALUES)
@@ -167,15 +168,15 @@ def _format_vectors(*vectors: Array) -> str:
     return "".join(f"({','.join(f'{x + 0.0:.10g}' for x in vector)})" for vector in vectors)
 
 
-def _select_point_factory(what: str, kind: int) -> SourceFactory:
+def _select_point_factory(quantity: str, source_type: int) -> SourceFactory:
     """Return the factory of a sensor of a point of a body.
 
     Args:
-        what: quantity for the name of the sensor.
-        kind: kind of sensor, `SOURCE_TYPE.POSITION` or `SOURCE_TYPE.VELOCITY`.
+        quantity: quantity for the name of the sensor.
+        source_type: kind of sensor, `SOURCE_TYPE.POSITION` or `SOURCE_TYPE.VELOCITY`.
     """
 
-    def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+    def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         offset = node.vector("offset", "0 0 0")
         direction = node.vector("direction")
         if not direction.any():
@@ -184,14 +185,14 @@ def _select_point_factory(what: str, kind: int) -> SourceFactory:
         link, frame = sensed.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
         return Source(
-            f"{_list_bodies(sensed)[number]}.{what}{_format_vectors(offset, direction)}",
-            kind,
+            f"{_list_bodies(sensed)[number]}.{quantity}{_format_vectors(offset, direction)}",
+            source_type,
             link,
             0,
             numbers,
         )
 
-    return feel
+    return make_source
 
 
 def _read_axis(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Array:
@@ -206,8 +207,12 @@ def _read_axis(sensed: SensedModel, node: SettingNode, number: int, side: str) -
     if not axis.any():
         raise node.error("'axis' has no direction")
     # A body with a side counts as of this side, else the side of the reflex decides.
-    own = next((end for end in SIDES if _list_bodies(sensed)[number].endswith(end)), side)
-    return axis / np.linalg.norm(axis) * ((-1.0, -1.0, 1.0) if own == SIDES[0] else (1.0, 1.0, 1.0))
+    body_side = next((end for end in SIDES if _list_bodies(sensed)[number].endswith(end)), side)
+    return (
+        axis
+        / np.linalg.norm(axis)
+        * ((-1.0, -1.0, 1.0) if body_side == SIDES[0] else (1.0, 1.0, 1.0))
+    )
 
 
 def _make_angle_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:

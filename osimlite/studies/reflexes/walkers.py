@@ -99,19 +99,24 @@ class SensedModel:
         self.engine = engine
         self.mechanism: Mechanism = engine.mechanism
         tree = model.tree()
-        known = engine.forces.controls.names
+        control_paths = engine.forces.controls.names
         # A control of an actuator with several has the path of the actuator, "_" and a number.
-        owners: list[Any] = [
-            tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known
+        actuators: list[Any] = [
+            tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]]
+            for path in control_paths
         ]
-        self.order = sorted(range(len(known)), key=lambda k: not isinstance(owners[k], Muscle))
-        self.paths = [known[k] for k in self.order]
+        self.order = sorted(
+            range(len(control_paths)), key=lambda k: not isinstance(actuators[k], Muscle)
+        )
+        self.paths = [control_paths[k] for k in self.order]
         self.names = [path.rpartition("/")[2] for path in self.paths]
-        self.muscles: list[Any] = [owners[k] for k in self.order if isinstance(owners[k], Muscle)]
-        self.optimal = np.array([item.optimal_fiber_length for item in self.muscles])
-        self.strengths = np.array([item.max_isometric_force for item in self.muscles])
+        self.muscles: list[Any] = [
+            actuators[k] for k in self.order if isinstance(actuators[k], Muscle)
+        ]
+        self.optimal = np.array([muscle.optimal_fiber_length for muscle in self.muscles])
+        self.strengths = np.array([muscle.max_isometric_force for muscle in self.muscles])
         self.control_min, self.control_max = np.transpose(
-            [_read_control_bounds(owners[k]) for k in self.order]
+            [_read_control_bounds(actuators[k]) for k in self.order]
         ).reshape(2, -1)
         self.mass = self.mechanism.total_mass
         self.weight = self.mass * float(np.linalg.norm(self.mechanism.gravity))
@@ -124,14 +129,14 @@ class SensedModel:
         """Return plan and numbers of the sensor rows, see :mod:`osimlite.mechanics.kernels.sensors`."""
         engine, bodies = self.engine, self.mechanism.bodies
         limits: list[int] = []
-        for item in model.components(CoordinateLimitForce):
+        for limit_force in model.components(CoordinateLimitForce):
             # Locked coordinates are not in the state and have no sensor.
-            if item.appliesForce and str(item.coordinate) in self.coordinates:
-                places = engine.find_offsets(model.tree().path_of(item), ("force",))
-                limits += self.coordinates.index(str(item.coordinate)), *places
-        m = len(self.muscles)
-        n = len(self.coordinates)
-        b = len(bodies)
+            if limit_force.appliesForce and str(limit_force.coordinate) in self.coordinates:
+                force_offsets = engine.find_offsets(model.tree().path_of(limit_force), ("force",))
+                limits += self.coordinates.index(str(limit_force.coordinate)), *force_offsets
+        muscle_count = len(self.muscles)
+        coordinate_count = len(self.coordinates)
+        body_count = len(bodies)
         legs = len(self.legs)
         # The kernels work on links, into which several bodies may be merged.
         centres = []
@@ -139,7 +144,7 @@ class SensedModel:
             frame = placement.frame
             centres.append(frame[:3, :3] @ body.mass_properties.center + frame[:3, 3])
         masses = np.array([body.mass_properties.mass for body in bodies])
-        own = (
+        number_groups = (
             [self.weight, masses.sum(), self.step, float(lags)],
             self.optimal,
             self.strengths,
@@ -148,12 +153,35 @@ class SensedModel:
             np.ravel(centres),
             masses,
         )
-        known = np.concatenate(own)
-        sizes = m, m, m, m, m, n, n, n, legs, 3 * b, 3, 1
-        head = m, n, legs, len(limits) // 2, b, len(self.names), len(known)
-        plan = [*head, 0, *np.cumsum(sizes).tolist()]
+        numbers = np.concatenate(number_groups)
+        sizes = (
+            muscle_count,
+            muscle_count,
+            muscle_count,
+            muscle_count,
+            muscle_count,
+            coordinate_count,
+            coordinate_count,
+            coordinate_count,
+            legs,
+            3 * body_count,
+            3,
+            1,
+        )
+        header = (
+            muscle_count,
+            coordinate_count,
+            legs,
+            len(limits) // 2,
+            body_count,
+            len(self.names),
+            len(numbers),
+        )
+        plan = [*header, 0, *np.cumsum(sizes).tolist()]
         plan += [
-            place for path in self.paths[:m] for place in engine.find_offsets(path, OF_MUSCLES)
+            offset
+            for path in self.paths[:muscle_count]
+            for offset in engine.find_offsets(path, OF_MUSCLES)
         ] + limits
         plan += [placement.link for placement in engine.placements]
         plan += [
@@ -161,7 +189,7 @@ class SensedModel:
             for leg in self.legs
             for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)
         ]
-        return np.array(plan, dtype=np.int64), known
+        return np.array(plan, dtype=np.int64), numbers
 
     def _find_legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
         """Find the legs whose bodies and contact forces have the given names and a side."""
@@ -174,34 +202,49 @@ class SensedModel:
             np.array([info.default_value for info in self.mechanism.coordinates])
         )
         origins = {name: at_rest.origins[k] for k, name in enumerate(names)}
-        elements = [item for item in self.engine.forces.elements if isinstance(item, PairContact)]
-        first = np.cumsum([0, *(len(item.pairs) for item in elements)])
+        elements = [
+            contact_element
+            for contact_element in self.engine.forces.elements
+            if isinstance(contact_element, PairContact)
+        ]
+        first_pairs = np.cumsum([0, *(len(contact_element.pairs) for contact_element in elements)])
         pairs = {
-            item.path.rpartition("/")[2]: range(a, b)
-            for item, a, b in zip(elements, first[:-1], first[1:], strict=True)
+            contact_element.path.rpartition("/")[2]: range(a, b)
+            for contact_element, a, b in zip(
+                elements, first_pairs[:-1], first_pairs[1:], strict=True
+            )
         }
         legs = []
         for side in SIDES:
-            top = f"{upper}{side}"
+            upper_body = f"{upper}{side}"
             # SCONE's legs are femur, tibia and foot: the foot is two bodies below the upper leg.
-            below = {name: parents.get(parents.get(name, ""), "") for name in names}
+            second_parents = {name: parents.get(parents.get(name, ""), "") for name in names}
             foot = (
                 f"{lower}{side}"
                 if lower
-                else next((name for name, far in below.items() if far == top), "")
+                else next(
+                    (
+                        name
+                        for name, grandparent in second_parents.items()
+                        if grandparent == upper_body
+                    ),
+                    "",
+                )
             )
             # A model without legs is allowed; measures and reflexes that need them refuse it.
-            if top not in names or foot not in names or f"{contact}{side}" not in pairs:
+            if upper_body not in names or foot not in names or f"{contact}{side}" not in pairs:
                 continue
-            length, here = 0.0, foot
-            while here != top and here in parents:
+            length, present_body = 0.0, foot
+            while present_body != upper_body and present_body in parents:
                 length += float(
-                    np.linalg.norm(origins[here] - origins.get(parents[here], np.zeros(3)))
+                    np.linalg.norm(
+                        origins[present_body] - origins.get(parents[present_body], np.zeros(3))
+                    )
                 )
-                here = parents[here]
-            base = parents.get(top, "")
+                present_body = parents[present_body]
+            base = parents.get(upper_body, "")
             if base not in names:
-                raise ModelError(f"'{top}' hangs on no body")
+                raise ModelError(f"'{upper_body}' hangs on no body")
             legs.append(
                 Leg(side, names.index(base), names.index(foot), pairs[f"{contact}{side}"], length)
             )
@@ -216,9 +259,9 @@ class SensedModel:
         """
         if len(self.legs) != len(SIDES):
             upper, contact = self._leg_names
-            near = suggest_name(f"{upper}_l", [body.name for body in self.mechanism.bodies])
-            wanted = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
-            raise ModelError(f"the model has no legs, which are {wanted}{near}")
+            suggestion = suggest_name(f"{upper}_l", [body.name for body in self.mechanism.bodies])
+            expected_names = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
+            raise ModelError(f"the model has no legs, which are {expected_names}{suggestion}")
 
 
 def _read_control_bounds(actuator: Any) -> tuple[float, float]:
@@ -272,10 +315,10 @@ class Walkers(SensedModel):
             legs,
             lags=options.integrator in LAGGING_INTEGRATORS,
         )
-        others = self.names[len(self.muscles) :]
-        if others:
+        other_actuators = self.names[len(self.muscles) :]
+        if other_actuators:
             raise ModelError(
-                f"{join_words(others)} are no muscles, and efforts of muscles alone are known"
+                f"{join_words(other_actuators)} are no muscles, and efforts of muscles alone are known"
             )
         state = self.copies.simulation.state
         size = len(self.coordinates)
@@ -293,7 +336,7 @@ class Walkers(SensedModel):
 
     # ------------------------------------------------------------------------------------------------- walking
     def set_reflexes_and_criteria(
-        self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int
+        self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, criteria_size: int
     ) -> None:
         """Set the reflexes that drive the walkers and the criteria that score them.
 
@@ -303,12 +346,12 @@ class Walkers(SensedModel):
             numbers: numbers of the reflexes of each candidate (w, r).
             criteria: integers of the criteria, see :mod:`osimlite.mechanics.kernels.criteria`.
             bounds: numbers of the criteria.
-            room: length of the workspace of the criteria.
+            criteria_size: length of the workspace of the criteria.
         """
         # The memory of a candidate is that of its reflexes, followed by that of the criteria.
-        plan[REFLEXES.ROOM] += room
+        plan[REFLEXES.ROOM] += criteria_size
         memory = np.zeros((self.count, plan[REFLEXES.ROOM]))
-        self.criteria_work = memory[:, plan[REFLEXES.ROOM] - room :]
+        self.criteria_work = memory[:, plan[REFLEXES.ROOM] - criteria_size :]
         self._walk_arguments = (
             self.sensor_plan,
             self.sensor_numbers,
@@ -320,13 +363,13 @@ class Walkers(SensedModel):
             memory,
         )
 
-    def advance(self, order: int, which: Sequence[int] | None = None) -> Array:
+    def advance(self, order: int, indices: Sequence[int] | None = None) -> Array:
         """Carry out an order for some walkers.
 
         Args:
             order: number of control steps, or `FEEL`, `BEGIN` or `START` of
                 :mod:`osimlite.mechanics.kernels.walks`.
-            which: indices of the walkers; all by default.
+            indices: indices of the walkers; all by default.
 
         Returns:
             Per control step of the first walker its state at the start, excitations and leg loads,
@@ -337,14 +380,16 @@ class Walkers(SensedModel):
         """
         states = self.copies.states
         record = np.empty((max(order, 0), states.shape[1] + len(self.names) + len(self.legs)))
-        selected = range(self.count) if which is None else which
-        before = int(self.progress[0, PROGRESS.STEPS])
-        parts = *self._walk_arguments, self.rows, self.excitations, record, self.progress, order
-        if self.copies.walk_some(selected, *parts) != OUTCOME.OK:
+        selected = range(self.count) if indices is None else indices
+        steps_before = int(self.progress[0, PROGRESS.STEPS])
+        arguments = *self._walk_arguments, self.rows, self.excitations, record, self.progress, order
+        if self.copies.walk_some(selected, *arguments) != OUTCOME.OK:
             # The kernels return a code only; evaluating again in Python raises the error with its cause.
             for k in selected:
                 self.engine.compute_applied_forces(0.0, states[k].tolist())
-        return record[: int(self.progress[0, PROGRESS.STEPS]) - before] if order > 0 else record
+        return (
+            record[: int(self.progress[0, PROGRESS.STEPS]) - steps_before] if order > 0 else record
+        )
 
     def get_leg_loads(self) -> Array:
         """Return the latest ground reaction forces on the legs over the weight (w, l)."""

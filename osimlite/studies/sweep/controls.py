@@ -95,25 +95,25 @@ class Control:
         return {OFFSET: 0.0, SCALE: 1.0}.get(self.kind)
 
 
-def parse_control(name: str, actuators: Sequence[str], word: str) -> Control:
+def parse_control(name: str, actuators: Sequence[str], time_or_mode: str) -> Control:
     """Return the control that is meant by the word after the `@` in the name of a variable.
 
     Args:
         name: name of the variable, for errors.
         actuators: paths of the actuators.
-        word: word after the `@`, or "" for an offset.
+        time_or_mode: word after the `@`, or "" for an offset.
 
     Raises:
         SettingError: the word has no meaning.
     """
-    kind, at = OFFSET, 0.0
-    if word == SCALE:
-        kind = SCALE
-    elif number := re.fullmatch(rf"{SWITCH}(\d+)", word):
-        kind, at = SWITCH, float(number[1])
-    elif word:
-        kind, at = NODE, _parse_time(name, word)
-    return Control(tuple(actuators), kind, at)
+    mode, time = OFFSET, 0.0
+    if time_or_mode == SCALE:
+        mode = SCALE
+    elif number := re.fullmatch(rf"{SWITCH}(\d+)", time_or_mode):
+        mode, time = SWITCH, float(number[1])
+    elif time_or_mode:
+        mode, time = NODE, _parse_time(name, time_or_mode)
+    return Control(tuple(actuators), mode, time)
 
 
 def expand_nodes(name: str) -> list[str]:
@@ -124,33 +124,35 @@ def expand_nodes(name: str) -> list[str]:
     Raises:
         SettingError: the times are malformed.
     """
-    front, at, word = name.partition("@")
-    if at and not word:
-        _parse_time(name, word)
-    if ":" in word:
-        first, _, rest = word.partition(":")
-        last, _, number = rest.partition(":")
+    control_name, separator, times_text = name.partition("@")
+    if separator and not times_text:
+        _parse_time(name, times_text)
+    if ":" in times_text:
+        first_time, _, end_and_count = times_text.partition(":")
+        last_time, _, number = end_and_count.partition(":")
         if not number.isdigit() or int(number) < 2:
             raise SettingError(
                 f"nodes are given as @FIRST:LAST:COUNT, with a count of two or more; got '{name}'"
             )
-        times = np.linspace(_parse_time(name, first), _parse_time(name, last), int(number)).tolist()
-    elif "," in word:
-        times = [_parse_time(name, part) for part in word.split(",")]
+        times = np.linspace(
+            _parse_time(name, first_time), _parse_time(name, last_time), int(number)
+        ).tolist()
+    elif "," in times_text:
+        times = [_parse_time(name, time_text) for time_text in times_text.split(",")]
     else:
         return [name]
-    return [f"{front}@{time:.12g}" for time in times]
+    return [f"{control_name}@{time:.12g}" for time in times]
 
 
-def _parse_time(name: str, word: str) -> float:
+def _parse_time(name: str, text: str) -> float:
     """Return the time (s) behind the @ of a name."""
     try:
-        time = float(word)
+        time = float(text)
     except ValueError:
         time = -1.0
     if not 0.0 <= time < np.inf:
         raise SettingError(
-            f"behind the @ of '{name}' is a time in s, 'switch1', 'switch2' ... or 'scale', not '{word}'"
+            f"behind the @ of '{name}' is a time in s, 'switch1', 'switch2' ... or 'scale', not '{text}'"
         )
     return time
 
@@ -174,8 +176,8 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
     # Lines and steps are defined for any number of nodes.
     if interpolation != "cubic":
         return
-    for actuator, parts in _group_by_actuator(controls, NODE).items():
-        times = [time for time, _ in parts]
+    for actuator, nodes in _group_by_actuator(controls, NODE).items():
+        times = [time for time, _ in nodes]
         # Beyond its nodes a cubic would be extrapolated.
         if len(times) < MIN_CUBIC_NODES or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
@@ -197,40 +199,44 @@ def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedCont
         SettingError: an actuator is unknown, or a control is something else.
     """
     actuators = {
-        key: item.path for item in model.components(Actuator) for key in (item.name, item.path)
+        key: actuator.path
+        for actuator in model.components(Actuator)
+        for key in (actuator.name, actuator.path)
     }
-    made = _make_empty_controller(model, "given", [actuators.get(key, key) for key in controls])
-    for name, given in controls.items():
+    controller = _make_empty_controller(
+        model, "given", [actuators.get(key, key) for key in controls]
+    )
+    for name, control in controls.items():
         if name not in actuators:
             raise SettingError(
                 f"the model has no actuator '{name}' to control{suggest_name(name, actuators)}"
             )
-        if isinstance(given, tuple):
-            times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in given)
+        if isinstance(control, tuple):
+            times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in control)
             # OpenSim extrapolates a PiecewiseLinearFunction linearly; equal outer values hold the
             # ends.
             y = (values[0], *values, values[-1])
-            made.ControlFunctions.objects.append(
+            controller.ControlFunctions.objects.append(
                 PiecewiseLinearFunction(x=_extend_times(times), y=y)
             )
-        elif isinstance(given, int | float):
-            made.ControlFunctions.objects.append(Constant(value=float(given)))
+        elif isinstance(control, int | float):
+            controller.ControlFunctions.objects.append(Constant(value=float(control)))
         else:
             raise SettingError(
-                f"the control of '{name}' is {given!r}; a sweep takes numbers and tables"
+                f"the control of '{name}' is {control!r}; a sweep takes numbers and tables"
             )
-    return made
+    return controller
 
 
 def _make_empty_controller(
-    model: Model, kind: str, actuators: Sequence[str]
+    model: Model, base_name: str, actuators: Sequence[str]
 ) -> PrescribedController:
     """Return a controller without functions, with an unused name.
 
     A model of an earlier search has controllers of the same kind.
     """
-    taken = {item.name for item in model.components(Controller)}
-    name = next(name for number in count(1) if (name := f"{kind}_{number}") not in taken)
+    used_names = {controller.name for controller in model.components(Controller)}
+    name = next(name for number in count(1) if (name := f"{base_name}_{number}") not in used_names)
     return PrescribedController(name=name, socket_actuators=tuple(actuators))
 
 
@@ -257,70 +263,77 @@ class VariedControls:
     def __init__(self, model: Model, controls: Mapping[int, Control], interpolation: str) -> None:
         self.controllers: list[Controller] = []
         self._puts: list[tuple[Function, str, Callable[[Values], Any]]] = []
-        for actuator, ((_, place),) in _group_by_actuator(controls, SCALE).items():
-            self._add_multiplier(model, actuator, place)
+        for actuator, ((_, index),) in _group_by_actuator(controls, SCALE).items():
+            self._add_multiplier(model, actuator, index)
         # One controller per kind: OpenSim adds the controls of all controllers.
-        for kind in (OFFSET, NODE, SWITCH):
-            if parts := _group_by_actuator(controls, kind):
-                made = _make_empty_controller(model, kind, list(parts))
-                made.ControlFunctions.objects += [
-                    self._make_function(kind, own, interpolation) for own in parts.values()
+        for mode in (OFFSET, NODE, SWITCH):
+            if controls_by_actuator := _group_by_actuator(controls, mode):
+                controller = _make_empty_controller(model, mode, list(controls_by_actuator))
+                controller.ControlFunctions.objects += [
+                    self._make_function(mode, actuator_controls, interpolation)
+                    for actuator_controls in controls_by_actuator.values()
                 ]
-                self.controllers.append(model.add(made))
+                self.controllers.append(model.add(controller))
 
     def apply(self, values: Values) -> None:
         """Set the functions of the controllers to the values of all variables."""
-        for function, name, made in self._puts:
-            setattr(function, name, made(values))
+        for function, name, make_value in self._puts:
+            setattr(function, name, make_value(values))
 
     def _make_function(
-        self, kind: str, parts: Sequence[tuple[float, int]], interpolation: str
+        self, mode: str, timed_indices: Sequence[tuple[float, int]], interpolation: str
     ) -> Function:
         """Return a control as a function of time, whose numbers each run sets."""
-        times, places = zip(*parts, strict=True)
+        times, indices = zip(*timed_indices, strict=True)
         function: Function
-        if kind == OFFSET:
+        if mode == OFFSET:
             function = Constant()
-            self._puts.append((function, "value", lambda values: values[places[0]]))
-        elif kind == SWITCH:
+            self._puts.append((function, "value", lambda values: values[indices[0]]))
+        elif mode == SWITCH:
             # A search may move one switch past another: sorting keeps the function defined.
-            x = (BEFORE_START_S, *(0.0 for _ in places))
-            y = (float(k % 2) for k in range(len(places) + 1))
+            x = (BEFORE_START_S, *(0.0 for _ in indices))
+            y = (float(k % 2) for k in range(len(indices) + 1))
             function = PiecewiseConstantFunction(x=x, y=tuple(y))
             self._puts.append(
-                (function, "x", lambda values: (BEFORE_START_S, *sorted(values[k] for k in places)))
+                (
+                    function,
+                    "x",
+                    lambda values: (BEFORE_START_S, *sorted(values[k] for k in indices)),
+                )
             )
         else:
             if interpolation == "cubic":
                 function = GCVSpline(half_order=2, x=times, weights=(1.0,) * len(times))
             else:
-                made = (
+                function_class = (
                     PiecewiseLinearFunction
                     if interpolation == "linear"
                     else PiecewiseConstantFunction
                 )
-                function = made(x=_extend_times(times))
-                places = (places[0], *places, places[-1])
-            function.y = (0.0,) * len(places)
-            self._puts.append((function, "y", lambda values: tuple(values[k] for k in places)))
+                function = function_class(x=_extend_times(times))
+                indices = (indices[0], *indices, indices[-1])
+            function.y = (0.0,) * len(indices)
+            self._puts.append((function, "y", lambda values: tuple(values[k] for k in indices)))
         return function
 
-    def _add_multiplier(self, model: Model, actuator: str, place: int) -> None:
+    def _add_multiplier(self, model: Model, actuator: str, index: int) -> None:
         """Replace the functions of a control by multiples of them."""
-        before = len(self._puts)
+        count_before = len(self._puts)
         for controller in model.components(PrescribedController):
             functions = controller.ControlFunctions.objects
             targets = [
-                model.tree().target(controller, "socket_actuators", word)
-                for word in controller.socket_actuators
+                model.tree().target(controller, "socket_actuators", path)
+                for path in controller.socket_actuators
             ]
-            for number, (target, own) in enumerate(zip(targets, functions, strict=False)):
+            for number, (target, original) in enumerate(zip(targets, functions, strict=False)):
                 if target is not None and target.path == actuator:
-                    functions[number] = multiplier = MultiplierFunction(name=own.name, function=own)
-                    self._puts.append((multiplier, "scale", lambda values: values[place]))
+                    functions[number] = multiplier = MultiplierFunction(
+                        name=original.name, function=original
+                    )
+                    self._puts.append((multiplier, "scale", lambda values: values[index]))
                     self.controllers.append(controller)
         # Scaling nothing would leave all runs equal, without a message.
-        if len(self._puts) == before:
+        if len(self._puts) == count_before:
             raise SettingError(
                 f"no function of a PrescribedController makes the control of '{actuator}', so that there is nothing to "
                 "scale; give one with --controls"
@@ -328,15 +341,15 @@ class VariedControls:
 
 
 def _group_by_actuator(
-    controls: Mapping[int, Control], kind: str
+    controls: Mapping[int, Control], mode: str
 ) -> dict[str, list[tuple[float, int]]]:
     """Return the controls of a kind by actuator.
 
     Each is a pair of time or number, and index of the variable; pairs are sorted.
     """
     result: dict[str, list[tuple[float, int]]] = {}
-    for place, part in controls.items():
-        if part.kind == kind:
-            for actuator in part.actuators:
-                result.setdefault(actuator, []).append((part.at, place))
-    return {actuator: sorted(parts) for actuator, parts in result.items()}
+    for index, control in controls.items():
+        if control.kind == mode:
+            for actuator in control.actuators:
+                result.setdefault(actuator, []).append((control.at, index))
+    return {actuator: sorted(timed_indices) for actuator, timed_indices in result.items()}

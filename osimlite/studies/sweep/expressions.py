@@ -81,29 +81,31 @@ class ExpressionMeasure:
     """
 
     def __init__(self, text: str, engine: Any) -> None:
-        self._text, known = text, list_quantities(engine)
+        self._text, quantities = text, list_quantities(engine)
         # Longer names first, so that "knee_r/speed" is not read as "knee_r" divided by "speed".
-        names = sorted(map(re.escape, known), key=len, reverse=True)
+        names = sorted(map(re.escape, quantities), key=len, reverse=True)
         calls = "|".join([*REDUCTIONS, *FUNCTIONS])
         self._quantities: list[Quantity] = []
         self.names: set[str] = set()
 
         # Names of quantities, such as "soleus_r/activation", are not Python names. They are replaced
         # by placeholders, so that Python's parser reads the rest.
-        def replace_name(found: re.Match[str]) -> str:
-            if found["call"] or found["number"]:
-                return found[0]
-            if found["word"]:
+        def replace_name(match: re.Match[str]) -> str:
+            if match["call"] or match["number"]:
+                return match[0]
+            if match["word"]:
                 raise SettingError(
-                    f"the measure '{text}' has no '{found[0]}' to look at{suggest_name(found[0], known)}"
+                    f"the measure '{text}' has no '{match[0]}' to look at{suggest_name(match[0], quantities)}"
                 )
-            self._quantities.append(known[found[0]])
-            self.names.add(found[0])
+            self._quantities.append(quantities[match[0]])
+            self.names.add(match[0])
             return f"_{len(self._quantities) - 1}"
 
-        marks = rf"(?P<call>\b({calls})(?=\s*\())|(?P<name>(?<!\w)({'|'.join(names)})(?![\w.]))"
-        marks += r"|(?P<number>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)|(?P<word>[^\W\d][\w.|]*)"
-        python = re.sub(marks, replace_name, text).replace("^", "**")
+        token_pattern = (
+            rf"(?P<call>\b({calls})(?=\s*\())|(?P<name>(?<!\w)({'|'.join(names)})(?![\w.]))"
+        )
+        token_pattern += r"|(?P<number>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)|(?P<word>[^\W\d][\w.|]*)"
+        python = re.sub(token_pattern, replace_name, text).replace("^", "**")
         try:
             self._tree = parse_expression(python.strip()).body
         except SyntaxError:
@@ -143,8 +145,8 @@ class ExpressionMeasure:
     def _evaluate_node(self, node: ast.AST, times: Floats, columns: Sequence[Floats]) -> Any:
         """Evaluate a part of the expression: a number, or a history (t,)."""
 
-        def evaluate(part: ast.AST) -> Any:
-            return self._evaluate_node(part, times, columns)
+        def evaluate(child: ast.AST) -> Any:
+            return self._evaluate_node(child, times, columns)
 
         match node:
             case ast.Constant(int() | float() as number):
@@ -170,7 +172,7 @@ def _measure_depth(tree: ast.AST) -> int:
     depth, level = 0, [tree]
     while level:
         depth += 1
-        level = [part for node in level for part in ast.iter_child_nodes(node)]
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
     return depth
 
 
@@ -187,27 +189,32 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
     result: dict[str, Quantity] = {
         "time": lambda engine, moments: np.array([t for t, _ in moments])
     }
-    places = {place: number for number, place in enumerate(engine.order)}
-    for place, info in enumerate(mechanism.coordinates):
+    dof_by_coordinate = {
+        coordinate_index: number for number, coordinate_index in enumerate(engine.order)
+    }
+    for coordinate_index, info in enumerate(mechanism.coordinates):
         value = (
-            partial(_read_state, places[place])
-            if place in places
-            else partial(_read_constant, place)
+            partial(_read_state, dof_by_coordinate[coordinate_index])
+            if coordinate_index in dof_by_coordinate
+            else partial(_read_constant, coordinate_index)
         )
         speed = (
-            partial(_read_state, count + places[place])
-            if place in places
+            partial(_read_state, count + dof_by_coordinate[coordinate_index])
+            if coordinate_index in dof_by_coordinate
             else partial(_read_constant, None)
         )
         for name in (info.name, info.path):
             result |= {name: value, f"{name}/value": value, f"{name}/speed": speed}
-    more: list[tuple[str, Quantity]] = []
+    named_quantities: list[tuple[str, Quantity]] = []
     for number, path in enumerate(engine.state.paths):
         state = partial(_read_state, 2 * count + number)
-        more += [(path, state), ("/".join(path.split("/")[-2:]), state)]
+        named_quantities += [(path, state), ("/".join(path.split("/")[-2:]), state)]
     for number, path in enumerate(engine.forces.controls.names):
         control = partial(_compute_control, number)
-        more += [(f"{path}/control", control), (f"{path.rpartition('/')[2]}/control", control)]
+        named_quantities += [
+            (f"{path}/control", control),
+            (f"{path.rpartition('/')[2]}/control", control),
+        ]
     points: dict[str, Callable[[Any, Moments], Floats]] = {"center_of_mass": locate_mass_centers}
     points |= {
         path.rpartition("/")[2]: partial(_locate_marker, path) for path in mechanism.stations
@@ -217,17 +224,19 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
     }
     for name, motion in points.items():
         for axis, letter in enumerate("XYZ"):
-            more += [(f"{name}_{letter}", partial(_select_axis, motion, axis))]
-            more += [(f"{name}_{letter}/speed", partial(_select_axis, motion, 3 + axis))]
-    more += [
+            named_quantities += [(f"{name}_{letter}", partial(_select_axis, motion, axis))]
+            named_quantities += [
+                (f"{name}_{letter}/speed", partial(_select_axis, motion, 3 + axis))
+            ]
+    named_quantities += [
         (label, partial(_compute_force, number)) for number, label in enumerate(engine.columns)
     ]
-    more += [
+    named_quantities += [
         (label, partial(_compute_probe, number))
         for number, label in enumerate(list_probe_labels(engine.probes))
     ]
     # Reversed, so that of equal names the first one remains; coordinates have precedence.
-    return dict(reversed(more)) | result
+    return dict(reversed(named_quantities)) | result
 
 
 def list_driven_names(engine: Any) -> set[str]:
@@ -240,36 +249,39 @@ def list_driven_names(engine: Any) -> set[str]:
     return controls | {*engine.columns, *list_probe_labels(engine.probes)}
 
 
-def _read_state(place: int, engine: Any, moments: Moments) -> Floats:
+def _read_state(offset: int, engine: Any, moments: Moments) -> Floats:
     """Return the history (t,) of an entry of the state."""
-    return np.array([y[place] for _, y in moments])
+    return np.array([y[offset] for _, y in moments])
 
 
-def _read_constant(place: int | None, engine: Any, moments: Moments) -> Floats:
+def _read_constant(coordinate_index: int | None, engine: Any, moments: Moments) -> Floats:
     """Return the value of a locked coordinate, or 0 for its speed, at all moments."""
     return np.full(
-        len(moments), 0.0 if place is None else engine.mechanism.coordinates[place].default_value
+        len(moments),
+        0.0
+        if coordinate_index is None
+        else engine.mechanism.coordinates[coordinate_index].default_value,
     )
 
 
-def _compute_control(place: int, engine: Any, moments: Moments) -> Floats:
+def _compute_control(control_index: int, engine: Any, moments: Moments) -> Floats:
     """Return the history (t,) of a control."""
     result = []
     for t, y in moments:
         # Controls are computed with the forces.
         engine.compute_applied_forces(t, y)
-        result.append(engine.read_controls()[place])
+        result.append(engine.read_controls()[control_index])
     return np.array(result)
 
 
-def _compute_force(place: int, engine: Any, moments: Moments) -> Floats:
+def _compute_force(column: int, engine: Any, moments: Moments) -> Floats:
     """Return the history (t,) of a column of the forces' records."""
-    return np.array([engine.force_records(t, y)[place] for t, y in moments])
+    return np.array([engine.force_records(t, y)[column] for t, y in moments])
 
 
-def _compute_probe(place: int, engine: Any, moments: Moments) -> Floats:
+def _compute_probe(column: int, engine: Any, moments: Moments) -> Floats:
     """Return the history (t,) of a value of the probes."""
-    return np.array(list(compute_probe_rows(engine, moments, moments)))[:, place]
+    return np.array(list(compute_probe_rows(engine, moments, moments)))[:, column]
 
 
 def _locate_marker(path: str, engine: Any, moments: Moments) -> Floats:

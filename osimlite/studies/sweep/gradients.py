@@ -85,8 +85,8 @@ class Gradients:
                 "--method gradient is for runs that last their time; leave out --below and --above"
             )
         self._plan, self._variants = plan, Variants(plan)
-        given = self._variants.given
-        self._measure = make_measure(plan.measures[0], given.engine, plan.feet)
+        base_variant = self._variants.given
+        self._measure = make_measure(plan.measures[0], base_variant.engine, plan.feet)
         if self._measure.watches:
             raise UnsupportedError(
                 f"'{self._measure.name}' is of events; take another measure, or another --method"
@@ -98,73 +98,83 @@ class Gradients:
         )
         self._steps: tuple[bytes, TangentSteps] | None = None
 
-    def evaluate(self, values: Sequence[float], free: Sequence[int]) -> Array:
+    def evaluate(self, values: Sequence[float], free_indices: Sequence[int]) -> Array:
         """Return the derivatives by some variables (f,).
 
         Args:
             values: values of all variables (d,).
-            free: indices of the variables (f,).
+            free_indices: indices of the variables (f,).
 
         Raises:
             OsimliteError: there is no run with these values, or it has no derivatives.
         """
-        here = self._make_neighbour(list(values))
+        center = self._make_neighbour(list(values))
         sizes = [
-            DIFFERENCE_PART * (self._plan.variables[place].high - self._plan.variables[place].low)
-            for place in free
+            DIFFERENCE_PART * (self._plan.variables[index].high - self._plan.variables[index].low)
+            for index in free_indices
         ]
-        changes = np.array([by for size in sizes for by in (size, -size)])
+        changes = np.array([shift for size in sizes for shift in (size, -size)])
         # Two neighbours per variable, above and below.
-        near = [
-            self._make_neighbour([x + by * (number == place) for number, x in enumerate(values)])
-            for by, place in zip(changes.tolist(), np.repeat(free, 2).tolist(), strict=True)
+        neighbours_of_center = [
+            self._make_neighbour([x + shift * (number == index) for number, x in enumerate(values)])
+            for shift, index in zip(
+                changes.tolist(), np.repeat(free_indices, 2).tolist(), strict=True
+            )
         ]
-        if any(item.variant.structure != here.variant.structure for item in near):
+        if any(
+            neighbour.variant.structure != center.variant.structure
+            for neighbour in neighbours_of_center
+        ):
             raise UnsupportedError(
                 "models with other values have other equations, and no derivatives between them"
             )
 
         def differentiate(rows: Sequence[Array] | Array) -> Array:
             """Return central differences (f, n) of values of the neighbours (2 f, n)."""
-            both = np.reshape(rows, (len(free), 2, -1))
-            result: Array = (both[:, 0] - both[:, 1]) / (2.0 * np.array(sizes)[:, None])
+            value_pairs = np.reshape(rows, (len(free_indices), 2, -1))
+            result: Array = (value_pairs[:, 0] - value_pairs[:, 1]) / (
+                2.0 * np.array(sizes)[:, None]
+            )
             return result
 
-        dy = differentiate([item.start for item in near]).T
-        dx = differentiate([item.variant.numbers for item in near]).T
-        runs = self._run(here)
-        steps, (times, states) = self._get_tangent_steps(here.variant), self._record_motion(here)
-        steps.take(here.variant.numbers, dx)
+        dy = differentiate([neighbour.start for neighbour in neighbours_of_center]).T
+        dx = differentiate([neighbour.variant.numbers for neighbour in neighbours_of_center]).T
+        runs = self._run(center)
+        steps, (times, states) = (
+            self._get_tangent_steps(center.variant),
+            self._record_motion(center),
+        )
+        steps.take(center.variant.numbers, dx)
         # Exact derivatives of the states at the report times, given those of the initial state and
         # the numbers.
-        moved = integrate_sensitivities(
-            steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names
+        sensitivities = integrate_sensitivities(
+            steps, times, states, dy, self._times, self._plan.accuracy, center.variant.state.names
         )
-        count = len(near)
-        by = np.repeat(np.arange(len(free)), 2)
+        count = len(neighbours_of_center)
+        shift = np.repeat(np.arange(len(free_indices)), 2)
         reports = np.repeat(runs.reports, count, axis=0)
         if self._plan.interval is not None:
-            reports += changes[:, None, None] * moved[:, :, by].transpose(2, 0, 1)
+            reports += changes[:, None, None] * sensitivities[:, :, shift].transpose(2, 0, 1)
         # Neighbouring runs are extrapolated linearly, so that any measure of states can be evaluated.
-        ends = runs.states + changes[:, None] * moved[-1][:, by].T
+        end_states = runs.states + changes[:, None] * sensitivities[-1][:, shift].T
         neighbours = Runs(
             np.repeat(runs.times, count),
-            ends,
+            end_states,
             np.repeat(runs.endings, count),
             np.repeat(runs.counts, count, axis=0),
             reports,
-            [_UnknownEvents() for _ in near],
+            [_UnknownEvents() for _ in neighbours_of_center],
             # Largest contact forces have no derivatives.
             np.full((count, *runs.peaks.shape[1:]), np.nan),
         )
         batch = Batch(
-            here.variant.engine,
-            lambda number: near[number].variant.engine,
-            np.stack([item.variant.numbers for item in near]),
-            np.stack([item.start for item in near]),
+            center.variant.engine,
+            lambda number: neighbours_of_center[number].variant.engine,
+            np.stack([neighbour.variant.numbers for neighbour in neighbours_of_center]),
+            np.stack([neighbour.start for neighbour in neighbours_of_center]),
             neighbours,
-            np.array([item.values for item in near]),
-            [item.name for item in self._plan.variables],
+            np.array([neighbour.values for neighbour in neighbours_of_center]),
+            [neighbour.name for neighbour in self._plan.variables],
             np.array(self._times if self._plan.interval is not None else []),
         )
         result: Array = differentiate(
@@ -172,9 +182,11 @@ class Gradients:
         )[:, 0]
         # Largest contact forces are NaN above; measures of them end here.
         if not np.isfinite(result).all():
-            worst = self._plan.variables[free[int(np.argmin(np.isfinite(result)))]].name
+            variable_name = self._plan.variables[
+                free_indices[int(np.argmin(np.isfinite(result)))]
+            ].name
             raise SimulationError(
-                f"'{self._measure.name}' has no derivative by '{worst}'; it may look at more than states: take another "
+                f"'{self._measure.name}' has no derivative by '{variable_name}'; it may look at more than states: take another "
                 "measure, or another --method"
             )
         return result
@@ -187,12 +199,12 @@ class Gradients:
             values, variant, self._variants.place_states(variant.engine, [variant], start[None])[0]
         )
 
-    def _run(self, here: _Neighbour) -> Runs:
+    def _run(self, neighbour: _Neighbour) -> Runs:
         """Simulate one model from its initial state."""
         plan = self._plan
         return run_many(
-            here.variant.engine,
-            here.start[None],
+            neighbour.variant.engine,
+            neighbour.start[None],
             plan.to,
             **plan.integration_choices(),
             report_times=self._times if plan.interval is not None else [],
@@ -200,16 +212,16 @@ class Gradients:
             threads=1,
         )
 
-    def _record_motion(self, here: _Neighbour) -> tuple[list[float], Array]:
+    def _record_motion(self, neighbour: _Neighbour) -> tuple[list[float], Array]:
         """Return times (s,) and states (s, y) at the ends of all integrator steps of a run."""
-        times, states = [0.0], [here.start.tolist()]
+        times, states = [0.0], [neighbour.start.tolist()]
 
         def note(t: float, y: list[float]) -> None:
             times.append(t)
             states.append(y)
 
-        stepper = here.variant.engine.make_stepper(
-            0.0, here.start.tolist(), EngineSettings(**self._plan.integration_choices()), note
+        stepper = neighbour.variant.engine.make_stepper(
+            0.0, neighbour.start.tolist(), EngineSettings(**self._plan.integration_choices()), note
         )
         stepper.tabulate([self._plan.to])
         stepper.catch_up()

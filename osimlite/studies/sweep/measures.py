@@ -61,13 +61,13 @@ class Batch:
         """Quantities of the runs by name, for expressions."""
         return list_quantities(self.engine)
 
-    def select_run(self, place: int) -> Batch:
+    def select_run(self, run_index: int) -> Batch:
         """Return a batch with one of the runs."""
         # A list of one index keeps the axis of the runs.
-        rows = [place]
+        rows = [run_index]
         return replace(
             self,
-            engine_of=lambda _: self.engine_of(place),
+            engine_of=lambda _: self.engine_of(run_index),
             numbers=None if self.numbers is None else self.numbers[rows],
             starts=self.starts[rows],
             runs=self.runs.select(rows),
@@ -104,8 +104,8 @@ class State(Mapping[str, float]):
         self._engine, self._y = engine, y
 
     def __getitem__(self, name: str) -> float:
-        place, locked = _find_state(self._engine, name)
-        return locked if place is None else float(self._y[place])
+        offset, locked = _find_state(self._engine, name)
+        return locked if offset is None else float(self._y[offset])
 
     def __iter__(self) -> Iterator[str]:
         names = [info.name for info in self._engine.mechanism.coordinates]
@@ -179,8 +179,8 @@ def make_measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> R
         return RunMeasure(
             name, partial(_call_for_each_run, spec), event_count=_estimate_event_count
         )
-    if (known := registry.find_measure(name)) is not None:
-        return known.make(engine, feet)
+    if (registered := registry.find_measure(name)) is not None:
+        return registered.make(engine, feet)
     # Expressions contain no colon, paths of Python functions do.
     if ":" in name:
         return RunMeasure(
@@ -192,10 +192,10 @@ def make_measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> R
         return RunMeasure(name, partial(_measure_expression, ExpressionMeasure(name, engine)))
     if "/" in name:
         try:
-            place, locked = _find_state(engine, name)
+            offset, locked = _find_state(engine, name)
         except ModelError as error:
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
-        return RunMeasure(name, partial(_read_end_states, place, locked))
+        return RunMeasure(name, partial(_read_end_states, offset, locked))
     raise SettingError(
         f"there is no measure '{name}'{suggest_or_list(name, registry.list_measure_names(), 'module:function')}"
     )
@@ -234,15 +234,15 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
         SettingError: the model has no such coordinate.
     """
     infos = engine.mechanism.coordinates
-    place = next(
+    offset = next(
         (k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None
     )
-    if place is None:
+    if offset is None:
         raise SettingError(
             "no coordinate of the model slides, so that it has no distance; take another measure"
         )
     return RunMeasure(
-        "distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place]
+        "distance", lambda batch: batch.runs.states[:, offset] - batch.starts[:, offset]
     )
 
 
@@ -272,34 +272,44 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
     def compute_change(batch: Batch) -> Floats:
         runs = batch.runs
-        ends = zip(runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True)
+        end_points = zip(
+            runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True
+        )
         result = []
-        for number, (t, start, end) in enumerate(ends):
-            one = batch.engine_of(number)
+        for number, (t, start, end) in enumerate(end_points):
+            engine = batch.engine_of(number)
             # Each run has its own masses and springs.
-            result.append(sum(one.compute_energies(t, end)) - sum(one.compute_energies(0.0, start)))
+            result.append(
+                sum(engine.compute_energies(t, end)) - sum(engine.compute_energies(0.0, start))
+            )
         return np.array(result)
 
     return RunMeasure("energy", compute_change)
 
 
-def _read_end_states(place: int | None, locked: float, batch: Batch) -> Floats:
+def _read_end_states(offset: int | None, locked: float, batch: Batch) -> Floats:
     """Return an entry of the last states (W,), or the value of a locked coordinate."""
-    return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
+    return np.full(len(batch.starts), locked) if offset is None else batch.runs.states[:, offset]
 
 
 def _measure_expression(expression: ExpressionMeasure, batch: Batch) -> list[float]:
     """Return the value of an expression for each run, from its saved states and its last one."""
     result = []
     runs, times = batch.runs, batch.report_times
-    for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):
+    for run_index, (end, state) in enumerate(
+        zip(runs.times.tolist(), runs.states.tolist(), strict=True)
+    ):
         # The state at the end is appended, so that a report at the same time is left out.
-        kept = int(np.searchsorted(times, end))
+        report_count = int(np.searchsorted(times, end))
         moments = [
-            *zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True),
+            *zip(
+                times[:report_count].tolist(),
+                runs.reports[run_index, :report_count].tolist(),
+                strict=True,
+            ),
             (end, state),
         ]
-        result.append(expression.evaluate(batch.engine_of(k), moments))
+        result.append(expression.evaluate(batch.engine_of(run_index), moments))
     return result
 
 
@@ -307,19 +317,21 @@ def _call_for_each_run(function: Callable[[Run], float], batch: Batch) -> list[f
     """Return the value of a function of the user for each run."""
     result = []
     names, contacts = batch.names, batch.engine.contacts
-    for k in range(len(batch.starts)):
-        engine = batch.engine_of(k)
-        kept = int(np.searchsorted(batch.report_times, batch.runs.times[k], side="right"))
+    for run_index in range(len(batch.starts)):
+        engine = batch.engine_of(run_index)
+        report_count = int(
+            np.searchsorted(batch.report_times, batch.runs.times[run_index], side="right")
+        )
         run = Run(
-            dict(zip(names, batch.values[k].tolist(), strict=True)),
-            State(engine, batch.starts[k]),
-            State(engine, batch.runs.states[k]),
-            float(batch.runs.times[k]),
-            batch.report_times[:kept],
-            batch.runs.events[k],
-            dict(zip(contacts, batch.runs.peaks[k, :, 0].tolist(), strict=True)),
+            dict(zip(names, batch.values[run_index].tolist(), strict=True)),
+            State(engine, batch.starts[run_index]),
+            State(engine, batch.runs.states[run_index]),
+            float(batch.runs.times[run_index]),
+            batch.report_times[:report_count],
+            batch.runs.events[run_index],
+            dict(zip(contacts, batch.runs.peaks[run_index, :, 0].tolist(), strict=True)),
             engine,
-            batch.runs.reports[k, :kept],
+            batch.runs.reports[run_index, :report_count],
             batch.quantities,
         )
         # numpy would turn None, of a function without a return, into NaN; float() raises.
@@ -340,24 +352,30 @@ def _find_state(engine: Any, name: str) -> tuple[int | None, float]:
     # Other states, such as activations, come after the values and speeds of the coordinates.
     if name in engine.state.paths:
         return 2 * len(engine.order) + engine.state.paths.index(name), 0.0
-    front, _, last = name.rpartition("/")
-    if last not in ("value", "speed"):
+    coordinate_name, _, quantity = name.rpartition("/")
+    if quantity not in ("value", "speed"):
         # The name of a coordinate alone means its value.
-        front, last = name, "value"
-    place = engine.mechanism.coordinate_index(front)
+        coordinate_name, quantity = name, "value"
+    coordinate_index = engine.mechanism.coordinate_index(coordinate_name)
     count = len(engine.order)
-    if place not in engine.order:
-        return None, 0.0 if last == "speed" else engine.mechanism.coordinates[place].default_value
-    return engine.order.index(place) + (count if last == "speed" else 0), 0.0
+    if coordinate_index not in engine.order:
+        return None, 0.0 if quantity == "speed" else engine.mechanism.coordinates[
+            coordinate_index
+        ].default_value
+    return engine.order.index(coordinate_index) + (count if quantity == "speed" else 0), 0.0
 
 
 def _import_function(name: str) -> Callable[[Run], float]:
     """Return the function that `module:function` or `file.py:function` names."""
-    place, _, function = name.rpartition(":")
-    module = run_python_file(Path(place)) if place.endswith(".py") else import_user_module(place)
+    module_name, _, function = name.rpartition(":")
+    module = (
+        run_python_file(Path(module_name))
+        if module_name.endswith(".py")
+        else import_user_module(module_name)
+    )
     result = getattr(module, function, None)
     if not callable(result):
         raise SettingError(
-            f"'{place}' has no function '{function}'{suggest_name(function, vars(module))}"
+            f"'{module_name}' has no function '{function}'{suggest_name(function, vars(module))}"
         )
     return result

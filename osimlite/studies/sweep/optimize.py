@@ -71,9 +71,11 @@ class Objective:
     @property
     def sign(self) -> float:
         """Factor that makes a cost of the measure: -1 to maximize, 1 to minimize."""
-        known = registry.find_measure(get_measure_name(self.measure))
+        registered = registry.find_measure(get_measure_name(self.measure))
         is_maximized = (
-            bool(known and known.is_maximized) if self.is_maximized is None else self.is_maximized
+            bool(registered and registered.is_maximized)
+            if self.is_maximized is None
+            else self.is_maximized
         )
         return -1.0 if is_maximized else 1.0
 
@@ -158,8 +160,8 @@ def optimize(
     """
     minimize = find_method(method)
     refuse_counts(plan.variables)
-    free = [index for index, item in enumerate(plan.variables) if not item.is_fixed]
-    if not free:
+    free_indices = [index for index, variable in enumerate(plan.variables) if not variable.is_fixed]
+    if not free_indices:
         raise SettingError("there is nothing to search: every variable has one value only")
     if budget < 1 or (popsize is not None and popsize < 2):
         raise SettingError(
@@ -176,8 +178,8 @@ def optimize(
     measures = tuple(dict(zip(names, (objective.measure, *plan.measures), strict=True)).values())
     plan = replace(plan, measures=measures)
     variants = Variants(plan)
-    point = _resolve_start(plan, variants, free, start, is_bounded)
-    wanted = {
+    point = _resolve_start(plan, variants, free_indices, start, is_bounded)
+    settings = {
         **plan.settings(),
         "objective": names[0],
         "sign": objective.sign,
@@ -190,20 +192,20 @@ def optimize(
         "start": point.tolist(),
     }
     with (
-        prepare_folder(folder) as where,
+        prepare_folder(folder) as output_folder,
         make_pool(plan, workers=workers, cluster=cluster) as workforce,
     ):
         evaluations = _Evaluations(
-            plan, free, objective.sign, is_bounded, budget, workforce, progress
+            plan, free_indices, objective.sign, is_bounded, budget, workforce, progress
         )
         partial = _open_history(
-            where / HISTORY_FILE,
-            make_schema(plan.columns("evaluation", "batch"), wanted),
+            output_folder / HISTORY_FILE,
+            make_schema(plan.columns("evaluation", "batch"), settings),
             resume,
             force,
             evaluations,
         )
-        evaluations.partial, ended = partial, ""
+        evaluations.partial, ending = partial, ""
         try:
             with suppress(OutOfBudget):
                 slopes = (
@@ -212,21 +214,21 @@ def optimize(
                     else None
                 )
                 search = Search(point, sigma, popsize, seed, is_bounded, budget, tolerance, slopes)
-                ended = minimize(evaluations.evaluate, search)
+                ending = minimize(evaluations.evaluate, search)
             # The table becomes a Parquet file only when the search has ended by itself.
             partial.finish()
         except KeyboardInterrupt:
             raise describe_interruption(partial, format_count(partial.rows, "run")) from None
         finally:
             partial.close()
-    ended = ended or f"as many runs as were allowed: {evaluations.count}"
-    return _finish_search(where, plan, variants, evaluations, wanted, ended)
+    ending = ending or f"as many runs as were allowed: {evaluations.count}"
+    return _finish_search(output_folder, plan, variants, evaluations, settings, ending)
 
 
 def _resolve_start(
     plan: Plan,
     variants: Variants,
-    free: Sequence[int],
+    free_indices: Sequence[int],
     start: Sequence[float] | Mapping[str, float] | None,
     is_bounded: bool,
 ) -> Floats:
@@ -236,20 +238,20 @@ def _resolve_start(
             raise SettingError(
                 f"the start has one number for each of the {len(plan.variables)} variables, not {len(start)}"
             )
-        start = dict(zip((item.name for item in plan.variables), start or (), strict=False))
-    result, present = [], variants.list_current_values()
-    for place in free:
-        item = plan.variables[place]
-        value = start.get(item.name, present[place])
-        within = value is not None and (item.low <= value <= item.high or not is_bounded)
-        if item.name in start and not within:
+        start = dict(zip((variable.name for variable in plan.variables), start or (), strict=False))
+    result, current_values = [], variants.list_current_values()
+    for index in free_indices:
+        variable = plan.variables[index]
+        value = start.get(variable.name, current_values[index])
+        is_within = value is not None and (variable.low <= value <= variable.high or not is_bounded)
+        if variable.name in start and not is_within:
             raise SettingError(
-                f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}"
+                f"'{variable.name}' cannot start at {value}, outside {variable.low:g} to {variable.high:g}"
             )
         # A logarithmic range cannot express this value, even for an unbounded search.
-        if value is not None and item.is_log and value <= 0.0:
-            within = False
-        result.append(item.compute_fraction(value) if value is not None and within else 0.5)
+        if value is not None and variable.is_log and value <= 0.0:
+            is_within = False
+        result.append(variable.compute_fraction(value) if value is not None and is_within else 0.5)
     return np.array(result)
 
 
@@ -283,17 +285,19 @@ def _open_history(
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
         with report_damage(path), open_file(path) as stream:
             # If the program ends while pyarrow's threads still run, C++ sometimes aborts it.
-            before = pq.ParquetFile(stream, page_checksum_verification=True).read(use_threads=False)
+            earlier_table = pq.ParquetFile(stream, page_checksum_verification=True).read(
+                use_threads=False
+            )
         if resume:
             partial = PartialTable(path, table)
-            for batch in before.to_batches():
+            for batch in earlier_table.to_batches():
                 partial.add(batch.columns)
                 evaluations.add_history(batch)
             return partial
         # A smaller budget must not discard finished evaluations.
-        if before.num_rows > evaluations.budget:
+        if earlier_table.num_rows > evaluations.budget:
             raise SettingError(
-                f"'{path}' has {before.num_rows} runs of this search, more than are asked for now; keep them with "
+                f"'{path}' has {earlier_table.num_rows} runs of this search, more than are asked for now; keep them with "
                 "--resume, or replace them with --force"
             )
     if not force and not path.exists() and not get_partial_path(path).exists():
@@ -328,7 +332,7 @@ class _Evaluations:
     def __init__(
         self,
         plan: Plan,
-        free: Sequence[int],
+        free_indices: Sequence[int],
         sign: float,
         is_bounded: bool,
         budget: int,
@@ -336,7 +340,7 @@ class _Evaluations:
         progress: Progress | None,
     ) -> None:
         self.plan = plan
-        self.free = list(free)
+        self.free = list(free_indices)
         self.sign = sign
         self.is_bounded = is_bounded
         self.budget = budget
@@ -352,7 +356,7 @@ class _Evaluations:
     def add_history(self, batch: Any) -> None:
         """Add rows of an earlier session."""
         columns = batch.to_pydict()
-        values = [columns[item.name] for item in self.plan.variables]
+        values = [columns[variable.name] for variable in self.plan.variables]
         result = zip(
             zip(*values, strict=True), columns["status"], columns[self.objective], strict=True
         )
@@ -363,7 +367,11 @@ class _Evaluations:
 
     def _note(self, status: Sequence[str], reasons: Sequence[str | None]) -> None:
         """Keep the first reason of a failure."""
-        failed = (why for word, why in zip(status, reasons, strict=True) if word == FAILED)
+        failed = (
+            reason
+            for run_status, reason in zip(status, reasons, strict=True)
+            if run_status == FAILED
+        )
         self.reason = self.reason or next(failed, None)
 
     def evaluate(self, points: Floats) -> Floats:
@@ -380,20 +388,23 @@ class _Evaluations:
             raise OutOfBudget
         values = self._compute_values(points)
         # A deterministic method requests the same points again when it is resumed.
-        known = self._history[self.count : self.count + len(points)]
+        evaluated = self._history[self.count : self.count + len(points)]
         # Even a rounding difference means that the method takes another course than in the history.
-        if any(row != list(new) for (row, _, _), new in zip(known, values.tolist(), strict=False)):
+        if any(
+            row != list(requested_row)
+            for (row, _, _), requested_row in zip(evaluated, values.tolist(), strict=False)
+        ):
             raise SettingError(
                 "the search takes another way than before, so that it cannot go on; another version of its library "
                 "may be installed, so start it anew in another folder"
             )
         # Points beyond the history are simulated.
-        rest = values[len(known) :]
-        if len(rest):
-            known = known + self._run(rest, self.count + len(known))
-        costs = [self._compute_cost(status, value) for _, status, value in known]
+        new_values = values[len(evaluated) :]
+        if len(new_values):
+            evaluated = evaluated + self._run(new_values, self.count + len(evaluated))
+        costs = [self._compute_cost(status, value) for _, status, value in evaluated]
         for number, (cost, row) in enumerate(zip(costs, values.tolist(), strict=True)):
-            _, status, value = known[number]
+            _, status, value = evaluated[number]
             # Only finished runs can be the best; penalties of failures only guide the method.
             if status != FAILED and isfinite(value) and (self.best is None or cost < self.best[0]):
                 self.best = cost, self.count + number, row
@@ -416,20 +427,20 @@ class _Evaluations:
         def at(point: Floats) -> Floats:
             (values,) = self._compute_values(point[None])
             stretched = [
-                self.plan.variables[place].differentiate(values[place]) for place in self.free
+                self.plan.variables[index].differentiate(values[index]) for index in self.free
             ]
-            found: Floats = gradients.evaluate(values.tolist(), self.free)
-            return self.sign * found * stretched
+            slopes: Floats = gradients.evaluate(values.tolist(), self.free)
+            return self.sign * slopes * stretched
 
         return at
 
     def _compute_values(self, points: Floats) -> Floats:
         """Return the values of all variables (k, v) at points (k, d) of the cube of the free ones."""
         # Fixed variables have equal bounds.
-        values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
-        for column, place in enumerate(self.free):
-            item = self.plan.variables[place]
-            values[:, place] = (item.interpolate if self.is_bounded else item.extrapolate)(
+        values = np.tile([variable.low for variable in self.plan.variables], (len(points), 1))
+        for column, index in enumerate(self.free):
+            variable = self.plan.variables[index]
+            values[:, index] = (variable.interpolate if self.is_bounded else variable.extrapolate)(
                 points[:, column]
             )
         return values
@@ -445,7 +456,7 @@ class _Evaluations:
         self.worst = max(self.worst, cost)
         return cost
 
-    def _run(self, values: Floats, first: int) -> list[tuple[list[float], str, float]]:
+    def _run(self, values: Floats, first_number: int) -> list[tuple[list[float], str, float]]:
         """Run samples (k, v) on the pool, and save them.
 
         Returns:
@@ -454,11 +465,14 @@ class _Evaluations:
         # Two tasks per worker balance runs of different duration.
         size = max(1, -(-len(values) // (2 * self.pool.workers)))
         starts = range(0, len(values), size)
-        for place in starts:
-            self.pool.submit(place, values[place : place + size])
+        for start in starts:
+            self.pool.submit(start, values[start : start + size])
         blocks: dict[int, Block] = dict(self.pool.result() for _ in starts)
-        block = Block.join([blocks[place] for place in starts])
-        numbers = np.arange(first, first + len(values)), np.full(len(values), self.batches)
+        block = Block.join([blocks[start] for start in starts])
+        numbers = (
+            np.arange(first_number, first_number + len(values)),
+            np.full(len(values), self.batches),
+        )
         self.partial.add([*numbers, *values.T, *block.columns])
         self._note(block.status, block.reasons)
         return list(
@@ -467,35 +481,41 @@ class _Evaluations:
 
 
 def _finish_search(
-    where: Path,
+    output_folder: Path,
     plan: Plan,
     variants: Variants,
     evaluations: _Evaluations,
-    wanted: dict[str, Any],
-    ended: str,
+    settings: dict[str, Any],
+    ending: str,
 ) -> Optimum:
     """Write the best model, parameters and summary."""
     if evaluations.best is None:
         if evaluations.reason:
             raise SimulationError(f"no run came to its end: {evaluations.reason}")
-        raise SimulationError(f"'{wanted['objective']}' is not a finite number in any run")
+        raise SimulationError(f"'{settings['objective']}' is not a finite number in any run")
     cost, number, row = evaluations.best
-    write(variants.build_model(row), where / BEST_FILE)
+    write(variants.build_model(row), output_folder / BEST_FILE)
     if plan.controller is not None:
-        write_atomically(where / PAR_FILE, variants.make_controller(row).par())
+        write_atomically(output_folder / PAR_FILE, variants.make_controller(row).par())
     value = evaluations.sign * cost
-    named = {item.name: x for item, x in zip(plan.variables, row, strict=True)}
+    values_by_name = {variable.name: x for variable, x in zip(plan.variables, row, strict=True)}
     result = Optimum(
-        value, named, evaluations.count, number, ended, where / BEST_FILE, where / HISTORY_FILE
+        value,
+        values_by_name,
+        evaluations.count,
+        number,
+        ending,
+        output_folder / BEST_FILE,
+        output_folder / HISTORY_FILE,
     )
     summary = {
-        "objective": wanted["objective"],
+        "objective": settings["objective"],
         "value": value,
-        "values": named,
+        "values": values_by_name,
         "evaluation": number,
         "evaluations": evaluations.count,
-        "ended": ended,
-        "settings": wanted,
+        "ended": ending,
+        "settings": settings,
     }
-    write_atomically(where / SUMMARY_FILE, json.dumps(summary, indent=2) + "\n")
+    write_atomically(output_folder / SUMMARY_FILE, json.dumps(summary, indent=2) + "\n")
     return result

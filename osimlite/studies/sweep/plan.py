@@ -152,11 +152,11 @@ class Plan(IntegrationOptions):
         """
         return pickle.loads(zlib.decompress(data))
 
-    def columns(self, *first: str) -> dict[str, str]:
+    def columns(self, *integer_names: str) -> dict[str, str]:
         """Return the columns of the table of results.
 
         Args:
-            first: names of columns of whole numbers that come first.
+            integer_names: names of columns of whole numbers that come first.
 
         Returns:
             Type of each column by name: "int64", "float64" or "string".
@@ -164,16 +164,18 @@ class Plan(IntegrationOptions):
         Raises:
             SettingError: two columns have the same name.
         """
-        result = dict.fromkeys(first, "int64")
-        rest = [(item.name, "float64") for item in self.variables]
-        rest += [("status", "string"), ("reason", "string"), ("time", "float64")]
-        rest += [(get_measure_name(spec), "float64") for spec in dict.fromkeys(self.measures)]
-        for name, kind in rest:
+        result = dict.fromkeys(integer_names, "int64")
+        other_columns = [(variable.name, "float64") for variable in self.variables]
+        other_columns += [("status", "string"), ("reason", "string"), ("time", "float64")]
+        other_columns += [
+            (get_measure_name(spec), "float64") for spec in dict.fromkeys(self.measures)
+        ]
+        for name, column_type in other_columns:
             if name in result:
                 raise SettingError(
                     f"the results would have two columns '{name}'; call a coordinate by its path, a function otherwise"
                 )
-            result[name] = kind
+            result[name] = column_type
         return result
 
     def settings(self) -> dict[str, Any]:
@@ -189,11 +191,11 @@ class Plan(IntegrationOptions):
         return {
             "osimlite": __version__,
             "model": hashlib.sha256(self.text.encode()).hexdigest(),
-            "vary": [item.settings() for item in self.variables],
-            "measures": [get_measure_name(item) for item in self.measures],
+            "vary": [setting.settings() for setting in self.variables],
+            "measures": [get_measure_name(setting) for setting in self.measures],
             "to": self.to,
             "engine": self.engine,
-            "stops": [item.words for item in self.stops],
+            "stops": [setting.words for setting in self.stops],
             "planted": self.is_planted,
             "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
@@ -236,61 +238,73 @@ def plan(
     """
     # The wrapper adds the controller also to models that a function makes anew.
     if controls:
-        maker = partial(_parse_model, to_text(source)) if isinstance(source, Model) else source
-        source = partial(_make_controlled_model, maker, controls)
+        make_model = partial(_parse_model, to_text(source)) if isinstance(source, Model) else source
+        source = partial(_make_controlled_model, make_model, controls)
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
     gains: list[Gain] = []
     if (controller := options.get("controller")) is not None:
-        own = {
+        simulation_options = {
             name: options[name]
             for name in ("skip_unsupported", "wrapping", "folder")
             if options.get(name)
         }
-        gains = controller.gains(model, Simulation(model, **own).engine)
+        gains = controller.gains(model, Simulation(model, **simulation_options).engine)
         if not (vary or gains):
             raise SettingError(
                 "say what to vary; the controller has no parameters, which are written as ~2<0,20>"
             )
     result = resolve_variables(vary, model, mechanism, parameters, gains)
     # Nothing varies by name: all other parameters of the controller do.
-    if all(item.is_fixed for item in result):
-        held = {
-            name for item in result if isinstance(item.target, Gains) for name in item.target.parts
+    if all(variable.is_fixed for variable in result):
+        varied_gains = {
+            name
+            for variable in result
+            if isinstance(variable.target, Gains)
+            for name in variable.target.parts
         }
-        rest = {gain.name: _read_bounds(gain) for gain in gains if gain.name not in held}
-        result = resolve_variables({**vary, **rest}, model, mechanism, parameters, gains)
-    for item in result:
-        warn_of_unit(item.warning)
+        other_gains = {
+            gain.name: _read_bounds(gain) for gain in gains if gain.name not in varied_gains
+        }
+        result = resolve_variables({**vary, **other_gains}, model, mechanism, parameters, gains)
+    for variable in result:
+        warn_of_unit(variable.warning)
     # The function is pickled only if needed: those of scripts often cannot be.
-    needs_maker = any(isinstance(item.target, FunctionParameter) for item in result)
-    make = source if needs_maker and not isinstance(source, Model) else None
-    made = Plan(to_text(model), result, make=make)
+    needs_maker = any(isinstance(variable.target, FunctionParameter) for variable in result)
+    make_function = source if needs_maker and not isinstance(source, Model) else None
+    made_plan = Plan(to_text(model), result, make=make_function)
     if not any(
         info.motion_type == "translational" and not info.locked for info in mechanism.coordinates
     ):
         # The default measures leave out the distance if the model has none; a selected one is an error.
-        made = replace(made, measures=tuple(name for name in made.measures if name != "distance"))
-    made = replace(made, **{name: value for name, value in options.items() if value is not None})
+        made_plan = replace(
+            made_plan, measures=tuple(name for name in made_plan.measures if name != "distance")
+        )
+    made_plan = replace(
+        made_plan, **{name: value for name, value in options.items() if value is not None}
+    )
     for name, value in (
-        ("to", made.to),
-        ("accuracy", made.accuracy),
-        ("report_interval", made.report_interval),
+        ("to", made_plan.to),
+        ("accuracy", made_plan.accuracy),
+        ("report_interval", made_plan.report_interval),
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
     # The accuracy is a relative error.
-    if made.accuracy >= 1.0:
-        raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
-    made.check_integration()
-    targets = {place: item.target for place, item in enumerate(result)}
-    nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
-    check_nodes(nodes, made.interpolation, made.to)
-    named = (*_make_stops(mechanism, below, True), *_make_stops(mechanism, above, False))
+    if made_plan.accuracy >= 1.0:
+        raise SettingError(f"'accuracy' is less than 1, not {made_plan.accuracy:g}")
+    made_plan.check_integration()
+    targets = {index: variable.target for index, variable in enumerate(result)}
+    nodes = {index: target for index, target in targets.items() if isinstance(target, Control)}
+    check_nodes(nodes, made_plan.interpolation, made_plan.to)
+    stops_by_name = (*_make_stops(mechanism, below, True), *_make_stops(mechanism, above, False))
     prescribed = (
-        _make_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops
+        _make_stop(mechanism, stop.coordinate, stop.level, stop.is_below)
+        for stop in made_plan.stops
     )
-    return replace(made, engine=engine_name(made.engine), stops=(*prescribed, *named))
+    return replace(
+        made_plan, engine=engine_name(made_plan.engine), stops=(*prescribed, *stops_by_name)
+    )
 
 
 def _read_bounds(gain: Gain) -> tuple[float, float]:
@@ -323,7 +337,7 @@ def _make_stops(
     return [_make_stop(mechanism, name, level, is_below) for name, level in levels.items()]
 
 
-def _make_stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -> Stop:
+def _make_stop(mechanism: Mechanism, name: str, level_text: float | str, is_below: bool) -> Stop:
     """Return the stop at a level (rad, m, or text with a unit) of a coordinate that moves."""
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     if name not in infos:
@@ -333,8 +347,8 @@ def _make_stop(mechanism: Mechanism, name: str, given: float | str, is_below: bo
         raise SettingError(
             f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"
         )
-    level = convert_value(mechanism, name, given)
+    level = convert_value(mechanism, name, level_text)
     if not isfinite(level):
-        raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")
-    warn_of_unit(describe_suspect_value(infos[name], name, given))
+        raise SettingError(f"the level of '{name}' that stops a run is a number, not {level_text}")
+    warn_of_unit(describe_suspect_value(infos[name], name, level_text))
     return Stop(name, level, is_below)

@@ -39,8 +39,8 @@ def make_pool(
     Runner(plan)
     with open_process_pool(
         partial(run_packed, plan.pack()), workers=workers, cluster=cluster
-    ) as made:
-        yield made
+    ) as pool:
+        yield pool
 
 
 class ThreadPool(LocalPool):
@@ -53,11 +53,11 @@ class ThreadPool(LocalPool):
 
     def __init__(self, plan: Plan, count: int) -> None:
         # An invalid plan fails here; otherwise this runner serves the first thread.
-        spare = [Runner(plan)]
+        unused_runners = [Runner(plan)]
 
         def begin() -> None:
             try:
-                _local.runner = spare.pop()
+                _local.runner = unused_runners.pop()
             except IndexError:
                 _local.runner = Runner(plan)
 
@@ -70,11 +70,11 @@ _local = threading.local()
 
 def _thread_runner(plan: Plan) -> Runner:
     """Return the runner of this thread, which is cached."""
-    kept: Runner | None = getattr(_local, "runner", None)
+    cached: Runner | None = getattr(_local, "runner", None)
     # A thread of a process may serve another plan later.
-    if kept is None or kept.plan is not plan:
-        kept = _local.runner = Runner(plan)
-    return kept
+    if cached is None or cached.plan is not plan:
+        cached = _local.runner = Runner(plan)
+    return cached
 
 
 def run_packed(packed: bytes, values: Floats) -> Block:

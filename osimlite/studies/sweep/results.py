@@ -55,8 +55,8 @@ def make_schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
     pa = _load_arrow()
     fields = [
         # Numbers of runs are always known; measures of failed runs are missing.
-        pa.field(name, getattr(pa, kind)(), nullable=kind != "int64")
-        for name, kind in columns.items()
+        pa.field(name, getattr(pa, column_type)(), nullable=column_type != "int64")
+        for name, column_type in columns.items()
     ]
     return pa.schema(fields, metadata={SETTINGS_KEY: json.dumps(settings).encode()})
 
@@ -115,46 +115,48 @@ def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list
     """
     result = []
     for name in {**old, **new}:
-        a, b = old.get(name), new.get(name)
-        if a != b:
+        old_value, new_value = old.get(name), new.get(name)
+        if old_value != new_value:
             # Lists, and the digest of the model, are too long for a message.
             is_brief = (
-                not isinstance(a, list | dict)
-                and not isinstance(b, list | dict)
+                not isinstance(old_value, list | dict)
+                and not isinstance(new_value, list | dict)
                 and name != "model"
             )
-            result.append(f"{name} ({a} before, {b} now)" if is_brief else name)
+            result.append(f"{name} ({old_value} before, {new_value} now)" if is_brief else name)
     return result
 
 
-def protect_results(path: Path, wanted: Mapping[str, Any]) -> None:
+def protect_results(path: Path, settings: Mapping[str, Any]) -> None:
     """Refuse to overwrite finished results of other settings.
 
     Args:
         path: Parquet file that would be overwritten.
-        wanted: settings of the present run.
+        settings: settings of the present run.
 
     Raises:
         SettingError: the results have other settings.
         OsimliteError: the file is not a table of results.
     """
-    refuse_other_settings(path, settings_of(path), wanted)
+    refuse_other_settings(path, settings_of(path), settings)
 
 
-def refuse_other_settings(path: Path, before: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+def refuse_other_settings(
+    path: Path, old_settings: Mapping[str, Any], settings: Mapping[str, Any]
+) -> None:
     """Refuse settings that differ from those of existing results.
 
     Args:
         path: file of the results, for the message.
-        before: settings of the results.
-        wanted: settings of the present run.
+        old_settings: settings of the results.
+        settings: settings of the present run.
 
     Raises:
         SettingError: they differ.
     """
-    if unlike := describe_differences(before, wanted):
+    if differences := describe_differences(old_settings, settings):
         raise SettingError(
-            f"'{path}' has results of other settings: {join_words(unlike)}; name another place with -o, or replace them "
+            f"'{path}' has results of other settings: {join_words(differences)}; name another place with -o, or replace them "
             "with --force"
         )
 
@@ -243,21 +245,21 @@ class PartialTable:
                 ) from None
             self.rows += batch.num_rows
 
-    def read(self, take: Callable[[Any], object]) -> None:
+    def read(self, process_batch: Callable[[Any], object]) -> None:
         """Call a function with each batch of rows.
 
         Raises:
             OsimliteError: another program has damaged the file in the meantime.
         """
-        end = _read_batches(self.partial, take)
+        end = _read_batches(self.partial, process_batch)
         if end < self.partial.stat().st_size:
             raise OsimliteError(
                 "the file was damaged meanwhile; go on with --resume", file=str(self.partial)
             )
 
-    def _write_batch(self, item: Any) -> None:
+    def _write_batch(self, batch: Any) -> None:
         """Append a record of rows with its length and checksum."""
-        body = item.serialize().to_pybytes()
+        body = batch.serialize().to_pybytes()
         self.stream.write(RECORD_HEAD.pack(_MARK, len(body), _compute_checksum(body)) + body)
         self.stream.flush()
 
@@ -279,9 +281,9 @@ class PartialTable:
                 pq.ParquetWriter(stream, self.schema, write_page_checksum=True) as writer,
             ):
 
-                def write_groups(least: int) -> None:
+                def write_groups(minimum_rows: int) -> None:
                     table = pa.Table.from_batches(waiting, self.schema)
-                    while table.num_rows >= least:
+                    while table.num_rows >= minimum_rows:
                         # Groups of fixed size make the file independent of the sizes of batches.
                         writer.write_table(table.slice(0, ROWS_PER_GROUP).combine_chunks())
                         table = table.slice(ROWS_PER_GROUP)
@@ -289,7 +291,7 @@ class PartialTable:
 
                 def take(batch: Any) -> None:
                     waiting.append(batch)
-                    if sum(item.num_rows for item in waiting) >= ROWS_PER_GROUP:
+                    if sum(waiting_batch.num_rows for waiting_batch in waiting) >= ROWS_PER_GROUP:
                         write_groups(ROWS_PER_GROUP)
 
                 self.read(take)
@@ -326,19 +328,23 @@ class PartialTable:
     def _reopen(self) -> None:
         """Check the settings, count the rows, and cut off damaged records."""
         pa = _load_arrow()
-        first = next(_read_records(self.partial), None)
+        first_record = next(_read_records(self.partial), None)
         try:
-            result = pa.ipc.read_schema(pa.py_buffer(b"" if first is None else first[0]))
-            before = _parse_settings(result)
+            result = pa.ipc.read_schema(
+                pa.py_buffer(b"" if first_record is None else first_record[0])
+            )
+            old_settings = _parse_settings(result)
         except (ValueError, OSError):
             raise SettingError(
                 f"'{self.partial}' is no interrupted sweep, or is damaged at its beginning; remove it, or take another "
                 "name"
             ) from None
-        unlike = describe_differences(before, json.loads(self.schema.metadata[SETTINGS_KEY]))
-        if unlike or not result.equals(self.schema):
+        differences = describe_differences(
+            old_settings, json.loads(self.schema.metadata[SETTINGS_KEY])
+        )
+        if differences or not result.equals(self.schema):
             raise SettingError(
-                f"the interrupted work in '{self.partial}' has other settings: {join_words(unlike) or 'its columns'}; "
+                f"the interrupted work in '{self.partial}' has other settings: {join_words(differences) or 'its columns'}; "
                 "ask for the same as before, or remove that file"
             )
         end = _read_batches(self.partial, self._count)
@@ -382,10 +388,10 @@ def _lock_file(path: Path) -> Any:
 def _read_records(path: Path) -> Iterator[tuple[bytes, int]]:
     """Yield the intact records of a partial file, with the offset after each."""
     with open_file(path) as stream:
-        while len(head := stream.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
-            mark, length, checksum = RECORD_HEAD.unpack(head)
+        while len(header := stream.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
+            record_mark, length, checksum = RECORD_HEAD.unpack(header)
             # A damaged length could exceed the memory.
-            if mark != _MARK or length > path.stat().st_size:
+            if record_mark != _MARK or length > path.stat().st_size:
                 return
             body = stream.read(length)
             if len(body) < length or _compute_checksum(body) != checksum:
@@ -398,15 +404,15 @@ def _compute_checksum(body: bytes) -> bytes:
     return blake2b(body, digest_size=16).digest()
 
 
-def _read_batches(path: Path, take: Callable[[Any], object]) -> int:
+def _read_batches(path: Path, process_batch: Callable[[Any], object]) -> int:
     """Call a function with each intact batch, and return the offset after the last one."""
     pa = _load_arrow()
     records = _read_records(path)
-    head, end = next(records)
-    schema = pa.ipc.read_schema(pa.py_buffer(head))
-    for body, after in records:
-        take(pa.ipc.read_record_batch(pa.py_buffer(body), schema))
-        end = after
+    schema_record, end = next(records)
+    schema = pa.ipc.read_schema(pa.py_buffer(schema_record))
+    for body, offset in records:
+        process_batch(pa.ipc.read_record_batch(pa.py_buffer(body), schema))
+        end = offset
     return end
 
 
@@ -504,26 +510,36 @@ def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, ColumnRa
             runs = batch.column("run").to_numpy()
             for name in names:
                 column = batch.column(name).to_numpy(zero_copy_only=False)
-                good = np.isfinite(column)
-                if not good.any():
+                is_finite = np.isfinite(column)
+                if not is_finite.any():
                     continue
-                column, numbers = column[good], runs[good]
-                low, high = int(column.argmin()), int(column.argmax())
-                new = ColumnRange(
-                    float(column[low]),
-                    int(numbers[low]),
-                    float(column[high]),
-                    int(numbers[high]),
+                column, numbers = column[is_finite], runs[is_finite]
+                index_of_least, index_of_most = int(column.argmin()), int(column.argmax())
+                batch_range = ColumnRange(
+                    float(column[index_of_least]),
+                    int(numbers[index_of_least]),
+                    float(column[index_of_most]),
+                    int(numbers[index_of_most]),
                     float(column.mean()),
                 )
-                old, before = result.get(name, new), counts[name]
-                counts[name] = before + len(column)
-                lower = min((old, new), key=lambda item: item.least)
-                upper = max((old, new), key=lambda item: item.most)
+                earlier_range, earlier_count = result.get(name, batch_range), counts[name]
+                counts[name] = earlier_count + len(column)
+                range_of_least = min(
+                    (earlier_range, batch_range), key=lambda column_range: column_range.least
+                )
+                range_of_most = max(
+                    (earlier_range, batch_range), key=lambda column_range: column_range.most
+                )
                 # Batches have different numbers of finite values, so that means are weighted by
                 # them.
-                mean = (old.mean * before + new.mean * len(column)) / counts[name]
+                mean = (
+                    earlier_range.mean * earlier_count + batch_range.mean * len(column)
+                ) / counts[name]
                 result[name] = ColumnRange(
-                    lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean
+                    range_of_least.least,
+                    range_of_least.run_of_least,
+                    range_of_most.most,
+                    range_of_most.run_of_most,
+                    mean,
                 )
     return result

@@ -63,17 +63,17 @@ class SweepInterruption(OsimliteError):
     exit_code = 130
 
 
-def describe_interruption(partial: PartialTable, runs: str) -> SweepInterruption:
+def describe_interruption(partial: PartialTable, runs_text: str) -> SweepInterruption:
     """Return the error for an interrupted sweep or search.
 
     Args:
         partial: table with the rows so far.
-        runs: number of runs as text.
+        runs_text: number of runs as text.
     """
     if partial.rows == 0:
         return SweepInterruption("interrupted before any run was saved")
     return SweepInterruption(
-        f"interrupted after {runs}, which are in '{partial.partial}'; go on with --resume"
+        f"interrupted after {runs_text}, which are in '{partial.partial}'; go on with --resume"
     )
 
 
@@ -155,15 +155,15 @@ def sweep(
     """
     path, started = Path(output), time.perf_counter()
     if path.suffix.lower() in OTHER_TABLE_ENDINGS:
-        better = path.with_suffix(".parquet").name
+        parquet_name = path.with_suffix(".parquet").name
         raise SettingError(
-            f"the results are a Parquet file, not '{path.name}'; name the file '{better}'"
+            f"the results are a Parquet file, not '{path.name}'; name the file '{parquet_name}'"
         )
-    wanted = collect_settings(plan, samples)
-    table = make_schema(plan.columns("run"), wanted)
+    settings = collect_settings(plan, samples)
+    table = make_schema(plan.columns("run"), settings)
     # With a partial file, finished results of other settings were confirmed before the interruption.
     if path.is_file() and not force and not (resume and get_partial_path(path).exists()):
-        protect_results(path, wanted)
+        protect_results(path, settings)
         # The sweep is complete already.
         if resume:
             return Outcome(path, samples.count, samples.count)
@@ -220,9 +220,9 @@ class _Dispatcher:
             self._report_progress()
             while self.saved < self.samples.count:
                 self._submit_tasks()
-                first, block = self.pool.result()
+                first_sample, block = self.pool.result()
                 self.under_way -= 1
-                self.done[first] = self.values.pop(first), block
+                self.done[first_sample] = self.values.pop(first_sample), block
                 self._record_block(block)
                 is_last = not self.under_way and self.next >= self.samples.count
                 if is_last or time.monotonic() - self.last_saved > SAVE_SECONDS:
@@ -252,12 +252,14 @@ class _Dispatcher:
         The last tasks are smaller, so that all workers end at about the same time.
         """
         # The clock may not advance during very short tasks.
-        each = max(block.seconds, 1e-6) / max(len(block.status), 1)
-        left = self.samples.count - self.next
-        fair = -(-left // (TASKS_PER_WORKER * self.pool.workers)) if left else 1
-        suitable = int(self.pool.task_seconds / each)
+        seconds_per_run = max(block.seconds, 1e-6) / max(len(block.status), 1)
+        remaining_count = self.samples.count - self.next
+        fair_size = (
+            -(-remaining_count // (TASKS_PER_WORKER * self.pool.workers)) if remaining_count else 1
+        )
+        timed_size = int(self.pool.task_seconds / seconds_per_run)
         self.size = max(
-            1, min(suitable, 4 * self.size, MAX_TASK_SIZE, max(fair, INITIAL_TASK_SIZE))
+            1, min(timed_size, 4 * self.size, MAX_TASK_SIZE, max(fair_size, INITIAL_TASK_SIZE))
         )
         self.outcome.status.update(block.status)
         self.outcome.reasons.update(
@@ -273,22 +275,22 @@ class _Dispatcher:
     def _report_progress(self) -> None:
         """Report how many runs are finished, those of earlier sessions included."""
         if self.progress is not None:
-            there = self.outcome.before + sum(self.outcome.status.values())
-            self.progress(there, self.samples.count)
+            finished_count = self.outcome.before + sum(self.outcome.status.values())
+            self.progress(finished_count, self.samples.count)
 
     @defer_sigint()
     def _save(self) -> None:
         """Write the rows before which no row is missing."""
         values: list[Floats] = []
         blocks: list[Block] = []
-        first = self.saved
+        first_row = self.saved
         # Only rows without a gap before them are written.
         while self.saved in self.done:
-            own, block = self.done.pop(self.saved)
-            values.append(own)
+            block_values, block = self.done.pop(self.saved)
+            values.append(block_values)
             blocks.append(block)
-            self.saved += len(own)
+            self.saved += len(block_values)
         self.last_saved = time.monotonic()
         if blocks:
-            numbers = np.arange(first, self.saved)
+            numbers = np.arange(first_row, self.saved)
             self.partial.add([numbers, *np.concatenate(values).T, *Block.join(blocks).columns])

@@ -58,8 +58,8 @@ class Block:
     def join(cls, blocks: Sequence[Block]) -> Block:
         """Return several blocks as one."""
         return cls(
-            [word for block in blocks for word in block.status],
-            [words for block in blocks for words in block.reasons],
+            [run_status for block in blocks for run_status in block.status],
+            [reason for block in blocks for reason in block.reasons],
             np.concatenate([block.times for block in blocks]),
             {
                 name: np.concatenate([block.measures[name] for block in blocks])
@@ -120,14 +120,18 @@ class _Observers:
             for stop in plan.stops
         ]
         self.watches = (
-            list({item.name: item for made in self.measures for item in made.watches}.values())
+            list(
+                {
+                    watch.name: watch for measure in self.measures for watch in measure.watches
+                }.values()
+            )
             + stops
         )
         # Only the compiled engine stops runs at events.
         if self.watches and plan.engine != "compiled":
             raise SettingError("what stops a run needs --engine compiled")
         # The engine detects no events unless it may record at least one.
-        rooms = [made.event_count(plan.to) for made in self.measures]
+        rooms = [measure.event_count(plan.to) for measure in self.measures]
         self.most_events = max([*rooms, 1 if self.watches else 0])
 
 
@@ -144,8 +148,10 @@ class Runner:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.variants = Variants(plan)
-        given = self.variants.given
-        self._looks: dict[bytes, _Observers] = {given.structure: _Observers(plan, given.engine)}
+        base_variant = self.variants.given
+        self._looks: dict[bytes, _Observers] = {
+            base_variant.structure: _Observers(plan, base_variant.engine)
+        }
         moments = [] if plan.interval is None else compute_report_times(plan.to, plan.interval)
         self._report_times = np.array(moments)
 
@@ -185,36 +191,38 @@ class Runner:
     def _run_group(self, group: Sequence[_Sample], values: Floats, block: Block) -> None:
         """Run samples whose models have one structure, in one call of the engine."""
         # Any engine of the same structure works, and making one takes time.
-        given, first = self.variants.given, group[0].variant
-        engine = (given if first.structure == given.structure else first).engine
-        look = self._get_observers(first.structure, engine)
+        base_variant, first_variant = self.variants.given, group[0].variant
+        engine = (
+            base_variant if first_variant.structure == base_variant.structure else first_variant
+        ).engine
+        observers = self._get_observers(first_variant.structure, engine)
         variants = [sample.variant for sample in group]
         starts = self.variants.place_states(
             engine, variants, np.stack([sample.start for sample in group])
         )
-        runs, why = self._simulate(engine, look, variants, starts)
+        runs, endings = self._simulate(engine, observers, variants, starts)
         for number, sample in enumerate(group):
-            block.status[sample.place], block.reasons[sample.place] = why[number]
+            block.status[sample.place], block.reasons[sample.place] = endings[number]
             block.times[sample.place] = runs.times[number]
-        good = np.array(
-            [number for number, (status, _) in enumerate(why) if status != FAILED], dtype=int
+        successful = np.array(
+            [number for number, (status, _) in enumerate(endings) if status != FAILED], dtype=int
         )
-        if len(good) == 0:
+        if len(successful) == 0:
             return
-        selected = [group[number].variant for number in good]
-        rows = np.array([group[number].place for number in good])
+        selected = [group[number].variant for number in successful]
+        rows = np.array([group[number].place for number in successful])
         batch = Batch(
             engine,
             lambda number: selected[number].engine,
             self._stack_numbers(selected),
-            starts[good],
-            runs.select(good),
+            starts[successful],
+            runs.select(successful),
             values[rows],
-            [item.name for item in self.plan.variables],
+            [variable.name for variable in self.plan.variables],
             self._report_times,
         )
-        for made in look.measures:
-            self._apply_measure(made, batch, rows, block)
+        for measure in observers.measures:
+            self._apply_measure(measure, batch, rows, block)
 
     def _get_observers(self, structure: bytes, engine: Any) -> _Observers:
         """Return the measures and watches for a structure of the model, from a cache."""
@@ -226,27 +234,27 @@ class Runner:
             result = self._looks[structure] = _Observers(self.plan, engine)
         return result
 
-    def _apply_measure(self, made: RunMeasure, batch: Batch, rows: Any, block: Block) -> None:
+    def _apply_measure(self, measure: RunMeasure, batch: Batch, rows: Any, block: Block) -> None:
         """Compute a measure of some runs.
 
         An exception of a user's function becomes the reason of a failed run.
         """
         try:
-            block.measures[made.name][rows] = made.compute(batch)
+            block.measures[measure.name][rows] = measure.compute(batch)
         except Exception as error:
             if len(rows) > 1:
                 # Repeat run by run, to find the one that fails.
                 for number, row in enumerate(rows):
-                    self._apply_measure(made, batch.select_run(number), np.array([row]), block)
+                    self._apply_measure(measure, batch.select_run(number), np.array([row]), block)
             else:
                 block.status[rows[0]] = FAILED
                 block.reasons[rows[0]] = (
-                    f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
+                    f"the measure '{measure.name}' failed with {type(error).__name__}: {error}"
                 )
 
     # --------------------------------------------------------------------------------------------- motions
     def _simulate(
-        self, engine: Any, look: _Observers, variants: Sequence[Variant], starts: Floats
+        self, engine: Any, observers: _Observers, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
         """Simulate a batch of models of one structure from their initial states (W, y)."""
         if self.plan.engine != "compiled":
@@ -260,39 +268,41 @@ class Runner:
             numbers=self._stack_numbers(variants),
             **self.plan.integration_choices(),
             report_times=self._report_times.tolist(),
-            watches=look.watches,
-            most_events=look.most_events,
+            watches=observers.watches,
+            most_events=observers.most_events,
             # States at events take memory; they are recorded only if a measure needs them.
-            event_states=any(made.event_states for made in look.measures),
+            event_states=any(measure.event_states for measure in observers.measures),
             most_tries=MAX_INTEGRATOR_STEPS,
             threads=1,
             held=[variant.held for variant in variants if variant.held is not None],
         )
-        why: Endings = []
+        endings: Endings = []
         for number, (ending, state) in enumerate(
             zip(runs.endings.tolist(), runs.states, strict=True)
         ):
             # An integrator that ends normally may still have overflowed.
-            words, t = ENDINGS[ending], runs.times[number]
-            if words == "done" and np.isfinite(state).all():
-                why.append((DONE, None))
-            elif words == "stopped":
-                why.append((STOPPED, self._find_stop(engine, look, runs.events[number], state)))
-            elif words == "too many steps":
-                why.append(
+            ending_name, t = ENDINGS[ending], runs.times[number]
+            if ending_name == "done" and np.isfinite(state).all():
+                endings.append((DONE, None))
+            elif ending_name == "stopped":
+                endings.append(
+                    (STOPPED, self._find_stop(engine, observers, runs.events[number], state))
+                )
+            elif ending_name == "too many steps":
+                endings.append(
                     (
                         FAILED,
                         f"{MAX_INTEGRATOR_STEPS} steps came no further than t = {t:.9g} s; ask for less accuracy",
                     )
                 )
             else:
-                why.append(
+                endings.append(
                     (
                         FAILED,
                         f"the motion cannot be computed beyond t = {t:.9g} s; ask for more accuracy",
                     )
                 )
-        return runs, why
+        return runs, endings
 
     def _stack_numbers(self, variants: Sequence[Variant]) -> Floats | None:
         """Return the numbers of the compiled engines (W, m); None if no number varies."""
@@ -303,7 +313,7 @@ class Runner:
     def _find_stop(
         self,
         engine: Any,
-        look: _Observers,
+        observers: _Observers,
         events: Sequence[tuple[float, str, bool]],
         state: Floats,
     ) -> str:
@@ -311,11 +321,13 @@ class Runner:
 
         It is the last event if this was recorded, else the level nearest to the state.
         """
-        last = events[-1][1] if events else ""
-        if any(watch.stops and watch.name == last for watch in look.watches):
-            return last
-        y = State(engine, state)
-        names = {stop.words: abs(y[stop.coordinate] - stop.level) for stop in self.plan.stops}
+        last_event = events[-1][1] if events else ""
+        if any(watch.stops and watch.name == last_event for watch in observers.watches):
+            return last_event
+        end_state = State(engine, state)
+        names = {
+            stop.words: abs(end_state[stop.coordinate] - stop.level) for stop in self.plan.stops
+        }
         return min(names, key=lambda name: names[name])
 
     def _simulate_one_by_one(
@@ -323,7 +335,7 @@ class Runner:
     ) -> tuple[Runs, Endings]:
         """Run samples with an engine that simulates one motion at a time."""
         plan = self.plan
-        why: Endings = []
+        endings: Endings = []
         order, contacts = engine.order, engine.contacts
         count, size = len(order), len(starts)
         times, states = np.zeros(size), starts.copy()
@@ -333,8 +345,12 @@ class Runner:
         for number, variant in enumerate(variants):
             simulation = variant.simulation
             assert simulation is not None
-            infos = [simulation.mechanism.coordinates[place] for place in order]
-            may = [k for k, info in enumerate(infos) if info.prescribed is None and not info.locked]
+            infos = [
+                simulation.mechanism.coordinates[coordinate_index] for coordinate_index in order
+            ]
+            free_indices = [
+                k for k, info in enumerate(infos) if info.prescribed is None and not info.locked
+            ]
             row = starts[number].tolist()
             auxiliary = dict(
                 zip(simulation.state.paths, simulation.state.auxiliary(row), strict=True)
@@ -346,13 +362,13 @@ class Runner:
                     report_interval=plan.interval or plan.to,
                     controller=variant.controller,
                     # Locked and prescribed coordinates have their values from the model.
-                    initial={infos[k].path: row[k] for k in may} | auxiliary,
-                    initial_speeds={infos[k].path: row[count + k] for k in may},
+                    initial={infos[k].path: row[k] for k in free_indices} | auxiliary,
+                    initial_speeds={infos[k].path: row[count + k] for k in free_indices},
                 )
             except OsimliteError as error:
-                why.append((FAILED, str(error)))
+                endings.append((FAILED, str(error)))
                 continue
-            why.append((DONE, None))
+            endings.append((DONE, None))
             history = simulation.state.pack_rows(
                 trajectory.values, trajectory.speeds, trajectory.auxiliary
             )
@@ -366,7 +382,7 @@ class Runner:
             ]
             for name, largest in summary["largest_contact_forces"].items():
                 peaks[number, contacts.index(name)] = largest["force_N"], largest["time_s"]
-        still = np.zeros(size, dtype=np.int64)
+        zero_codes = np.zeros(size, dtype=np.int64)
         return Runs(
-            times, states, still, np.zeros((size, 3), dtype=np.int64), reports, events, peaks
-        ), why
+            times, states, zero_codes, np.zeros((size, 3), dtype=np.int64), reports, events, peaks
+        ), endings

@@ -56,41 +56,48 @@ class Samples:
             first: index of the first sample.
             count: number of samples; fewer are returned at the end.
         """
-        last = min(first + count, self.count)
-        fractions = np.zeros((max(last - first, 0), len(self.variables)))
-        varied = [index for index, item in enumerate(self.variables) if not item.is_fixed]
-        if len(fractions) and varied:
-            fractions[:, varied] = self._compute_fractions(first, last, varied)
+        end = min(first + count, self.count)
+        fractions = np.zeros((max(end - first, 0), len(self.variables)))
+        varied_indices = [
+            index for index, variable in enumerate(self.variables) if not variable.is_fixed
+        ]
+        if len(fractions) and varied_indices:
+            fractions[:, varied_indices] = self._compute_fractions(first, end, varied_indices)
         columns = [
-            item.interpolate(fractions[:, index]) for index, item in enumerate(self.variables)
+            variable.interpolate(fractions[:, index])
+            for index, variable in enumerate(self.variables)
         ]
         return np.stack(columns, axis=1) if columns else fractions
 
-    def _compute_fractions(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+    def _compute_fractions(self, first: int, end: int, varied_indices: Sequence[int]) -> Floats:
         """Return samples as fractions of the ranges (last - first, d), by the selected method."""
         if self.sampler == "grid":
-            return self._compute_grid(first, last, varied)
+            return self._compute_grid(first, end, varied_indices)
         if self.sampler == "sobol":
-            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).draw_points(
-                first, last
-            )
-        numbers = _draw_uniform(self.seed, first, last, len(varied))
+            return self.memory.setdefault(
+                "sobol", Sobol(self.seed, len(varied_indices))
+            ).draw_points(first, end)
+        numbers = _draw_uniform(self.seed, first, end, len(varied_indices))
         if self.sampler == "random":
             return numbers
         # Latin hypercube: each column visits its N layers in a random order of its own.
         layers = [
-            _permute_indices(first, last, self.count, self.seed, column)
-            for column in range(len(varied))
+            _permute_indices(first, end, self.count, self.seed, column)
+            for column in range(len(varied_indices))
         ]
         # A uniform offset within the layer.
         return (np.stack(layers, axis=1) + numbers) / self.count
 
-    def _compute_grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+    def _compute_grid(self, first: int, end: int, varied_indices: Sequence[int]) -> Floats:
         """Return fractions of a grid, in which the last variable changes fastest."""
-        counts = [self.variables[place].count or 1 for place in varied]
-        places = np.unravel_index(np.arange(first, last), counts)
+        counts = [self.variables[grid_index].count or 1 for grid_index in varied_indices]
+        grid_indices = np.unravel_index(np.arange(first, end), counts)
         return np.stack(
-            [place / (count - 1) for place, count in zip(places, counts, strict=True)], axis=1
+            [
+                grid_index / (count - 1)
+                for grid_index, count in zip(grid_indices, counts, strict=True)
+            ],
+            axis=1,
         )
 
 
@@ -112,8 +119,8 @@ def choose_samples(
     Raises:
         SettingError: the arguments contradict each other, or one is missing.
     """
-    varied = [item for item in variables if not item.is_fixed]
-    with_values = [item.name for item in varied if item.count]
+    varied_variables = [variable for variable in variables if not variable.is_fixed]
+    with_values = [variable.name for variable in varied_variables if variable.count]
     # Both would fix the number of runs, in different ways.
     if sampler is None and count is not None and with_values:
         raise SettingError(
@@ -121,23 +128,28 @@ def choose_samples(
             "a grid has; leave out one of the two, or name the --sampler"
         )
     if sampler is None:
-        sampler = "grid" if count is None and all(item.count for item in varied) else "sobol"
+        sampler = (
+            "grid"
+            if count is None and all(variable.count for variable in varied_variables)
+            else "sobol"
+        )
     if sampler not in SAMPLERS:
         raise SettingError(f"there is no sampler '{sampler}'{suggest_or_list(sampler, SAMPLERS)}")
     if seed < 0:
         raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
     if sampler == "grid":
-        bare = [item.name for item in varied if item.count is None]
-        if bare:
+        uncounted = [variable.name for variable in varied_variables if variable.count is None]
+        if uncounted:
             raise SettingError(
-                f"a grid needs the number of values of {join_words(bare)}, as in {bare[0]}=LOW:HIGH:COUNT"
+                f"a grid needs the number of values of {join_words(uncounted)}, as in "
+                f"{uncounted[0]}=LOW:HIGH:COUNT"
             )
-        whole = prod(item.count or 1 for item in varied)
-        if count not in (None, whole):
+        grid_size = prod(variable.count or 1 for variable in varied_variables)
+        if count not in (None, grid_size):
             raise SettingError(
-                f"the grid has {whole} points, not {count}; leave out the number of samples"
+                f"the grid has {grid_size} points, not {count}; leave out the number of samples"
             )
-        return Samples(tuple(variables), sampler, whole, seed)
+        return Samples(tuple(variables), sampler, grid_size, seed)
     if count is None:
         raise SettingError("say how many samples are wanted, as in --samples 1000")
     if count < 1:
@@ -171,7 +183,7 @@ class Sobol:
             first: index of the first point.
             last: index after the last point.
         """
-        head = np.zeros((0, self._width))
+        first_point = np.zeros((0, self._width))
         if self._points is None or first < self._next:
             qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
             self._points = qmc.Sobol(
@@ -179,12 +191,12 @@ class Sobol:
             )
             # scipy warns if the first request is not a power of two, so request one point.
             start, self._next = self._points.random(1), 1
-            head = start if first == 0 else head
-        first = max(first, 1) if len(head) else first
+            first_point = start if first == 0 else first_point
+        first = max(first, 1) if len(first_point) else first
         if first > self._next:
             # Skipping points is much cheaper than drawing them.
             self._points.fast_forward(first - self._next)
-        result: Floats = np.concatenate((head, self._points.random(last - first)))
+        result: Floats = np.concatenate((first_point, self._points.random(last - first)))
         self._next = last
         return result
 
@@ -209,19 +221,19 @@ def _permute_indices(first: int, last: int, count: int, seed: int, column: int) 
     through it again until they are (cycle walking).
     """
     # Both halves of a Feistel network have the same number of bits.
-    half = max(1, -(-(count - 1).bit_length() // 2))
-    mask = np.uint64((1 << half) - 1)
+    half_bits = max(1, -(-(count - 1).bit_length() // 2))
+    mask = np.uint64((1 << half_bits) - 1)
     # Six rounds mix the bits well enough for a shuffle.
     keys = np.random.default_rng((seed, column)).integers(0, 2**64, 6, dtype=np.uint64)
     result: Counts = np.arange(first, last, dtype=np.uint64)
-    beyond = np.ones(len(result), dtype=bool)
-    while beyond.any():
-        left = result[beyond] >> np.uint64(half)
-        right = result[beyond] & mask
+    is_beyond = np.ones(len(result), dtype=bool)
+    while is_beyond.any():
+        left = result[is_beyond] >> np.uint64(half_bits)
+        right = result[is_beyond] & mask
         for key in keys:
             left, right = right, left ^ (_mix_bits(right + key) & mask)
-        result[beyond] = (left << np.uint64(half)) | right
-        beyond = result >= count
+        result[is_beyond] = (left << np.uint64(half_bits)) | right
+        is_beyond = result >= count
     return result.astype(np.float64)
 
 

@@ -50,11 +50,11 @@ class Search(NamedTuple):
     gradient: Callable[[Floats], Floats] | None = None
 
 
-def run_cma(ask: CostFunction, search: Search, *, keeps_best: bool = False) -> str:
+def run_cma(compute_costs: CostFunction, search: Search, *, keeps_best: bool = False) -> str:
     """Minimize with covariance matrix adaptation (CMA-ES, Hansen's pycma); return why it ended.
 
     Args:
-        ask: cost function.
+        compute_costs: cost function.
         search: settings.
         keeps_best: whether the first population contains the first point, and each later one the
             best point so far as a parent.
@@ -84,11 +84,11 @@ def run_cma(ask: CostFunction, search: Search, *, keeps_best: bool = False) -> s
         es.inject([search.start], force=True)
     while not es.stop():
         points = es.ask()
-        es.tell(points, ask(np.array(points)).tolist())
+        es.tell(points, compute_costs(np.array(points)).tolist())
     return "converged: " + ", ".join(str(reason) for reason in es.stop())
 
 
-def run_sobol_cma(ask: CostFunction, search: Search) -> str:
+def run_sobol_cma(compute_costs: CostFunction, search: Search) -> str:
     """Run CMA-ES from the best of two populations of Sobol points and the start.
 
     The function returns why it ended.
@@ -99,7 +99,7 @@ def run_sobol_cma(ask: CostFunction, search: Search) -> str:
     a search can continue with a larger one.
 
     Args:
-        ask: cost function.
+        compute_costs: cost function.
         search: settings.
     """
     _require_two_variables(search)
@@ -109,17 +109,17 @@ def run_sobol_cma(ask: CostFunction, search: Search) -> str:
     # With the start among the points the search never ends worse than it began.
     points[0] = search.start
     costs = np.concatenate(
-        [ask(points[first : first + size]) for first in range(0, len(points), size)]
+        [compute_costs(points[offset : offset + size]) for offset in range(0, len(points), size)]
     )
-    best = points[int(np.argmin(costs))]
-    return run_cma(ask, search._replace(start=best, popsize=size), keeps_best=True)
+    best_point = points[int(np.argmin(costs))]
+    return run_cma(compute_costs, search._replace(start=best_point, popsize=size), keeps_best=True)
 
 
-def run_differential_evolution(ask: CostFunction, search: Search) -> str:
+def run_differential_evolution(compute_costs: CostFunction, search: Search) -> str:
     """Minimize with differential evolution (scipy); return why it ended.
 
     Args:
-        ask: cost function.
+        compute_costs: cost function.
         search: settings.
 
     Raises:
@@ -135,13 +135,13 @@ def run_differential_evolution(ask: CostFunction, search: Search) -> str:
     rng = np.random.default_rng(search.seed)
     size = len(search.start)
     # scipy needs a population of at least five.
-    first = rng.random((max(5, search.popsize or 10 * size), size))
-    first[0] = search.start
+    first_population = rng.random((max(5, search.popsize or 10 * size), size))
+    first_population[0] = search.start
     result = optimize.differential_evolution(
         # A vectorized function receives the points as columns.
-        lambda points: ask(np.atleast_2d(points.T)),
+        lambda points: compute_costs(np.atleast_2d(points.T)),
         [(0.0, 1.0)] * size,
-        init=first,
+        init=first_population,
         # A generation has several evaluations, so that the budget ends the search first.
         maxiter=search.budget,
         tol=search.tolerance if search.tolerance is not None else 0.01,
@@ -155,13 +155,13 @@ def run_differential_evolution(ask: CostFunction, search: Search) -> str:
     return f"converged: {result.message}"
 
 
-def run_nelder_mead(ask: CostFunction, search: Search) -> str:
+def run_nelder_mead(compute_costs: CostFunction, search: Search) -> str:
     """Minimize with the simplex method of Nelder and Mead (scipy); return why it ended.
 
     It evaluates one point at a time.
 
     Args:
-        ask: cost function.
+        compute_costs: cost function.
         search: settings.
     """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by Nelder and Mead")
@@ -174,7 +174,7 @@ def run_nelder_mead(ask: CostFunction, search: Search) -> str:
             search.sigma if simplex[k + 1, k] + search.sigma <= 1.0 else -search.sigma
         )
     result = optimize.minimize(
-        lambda point: float(ask(point[None])[0]),
+        lambda point: float(compute_costs(point[None])[0]),
         search.start,
         method="Nelder-Mead",
         bounds=[(0.0, 1.0)] * size if search.is_bounded else None,
@@ -190,19 +190,19 @@ def run_nelder_mead(ask: CostFunction, search: Search) -> str:
     return f"converged: {result.message}"
 
 
-def run_lbfgs(ask: CostFunction, search: Search) -> str:
+def run_lbfgs(compute_costs: CostFunction, search: Search) -> str:
     """Minimize with L-BFGS-B (scipy) and exact gradients, one point at a time; return why it ended.
 
     It finds a local minimum, which may be far from the global one.
 
     Args:
-        ask: cost function.
+        compute_costs: cost function.
         search: settings with a gradient.
     """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by gradients")
     tolerance = 1e-9 if search.tolerance is None else search.tolerance
     result = optimize.minimize(
-        lambda point: float(ask(point[None])[0]),
+        lambda point: float(compute_costs(point[None])[0]),
         search.start,
         jac=search.gradient,
         method="L-BFGS-B",

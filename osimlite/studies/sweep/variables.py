@@ -168,8 +168,8 @@ class Variable:
     def extrapolate(self, fraction: Floats) -> Floats:
         """Return the values at fractions of the range, which may be below 0 or above 1."""
         if self.is_log:
-            a, b = math.log(self.low), math.log(self.high)
-            return np.exp(a + fraction * (b - a))
+            log_low, log_high = math.log(self.low), math.log(self.high)
+            return np.exp(log_low + fraction * (log_high - log_low))
         return self.low + fraction * (self.high - self.low)
 
     def compute_fraction(self, value: float) -> float:
@@ -201,7 +201,7 @@ class Variable:
         return {**row, "log": True} if self.is_log else row
 
 
-def parse_ranges(words: Sequence[str]) -> dict[str, Range]:
+def parse_ranges(arguments: Sequence[str]) -> dict[str, Range]:
     """Parse ranges from words `NAME=LOW:HIGH[:COUNT][:log]` or `NAME=VALUE`.
 
     Returns:
@@ -211,10 +211,12 @@ def parse_ranges(words: Sequence[str]) -> dict[str, Range]:
         SettingError: a word is malformed, or a name occurs twice.
     """
     result: dict[str, Range] = {}
-    for word in words:
-        name, equals, text = (part.strip() for part in word.partition("="))
+    for argument in arguments:
+        name, equals, text = (text_part.strip() for text_part in argument.partition("="))
         if not (name and equals and text):
-            raise SettingError(f"--vary takes NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT, got '{word}'")
+            raise SettingError(
+                f"--vary takes NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT, got '{argument}'"
+            )
         if name in result:
             raise SettingError(f"'{name}' is varied twice; give it once")
         result[name] = text
@@ -245,45 +247,47 @@ def resolve_variables(
             unit does not fit, or two variables are the same number.
     """
     result: list[Variable] = []
-    for names, given in ranges.items():
-        known = [
+    for names, value_range in ranges.items():
+        meanings = [
             (name, _resolve_target(name, model, mechanism, parameters, gains))
-            for word in expand_braces(names, model)
-            for name in expand_nodes(word)
+            for expanded_name in expand_braces(names, model)
+            for name in expand_nodes(expanded_name)
         ]
-        for name, meaning in known:
+        for name, meaning in meanings:
             if meaning is not None:
-                made = _make_variable(name, *meaning, given)
+                variable = _make_variable(name, *meaning, value_range)
                 # Radians and degrees are easily confused in initial angles.
-                if isinstance(made.target, Start) and not made.target.is_speed:
-                    made = replace(made, warning=_describe_suspect_range(made, given, mechanism))
-                result.append(made)
-        if all(meaning is None for _, meaning in known):
+                if isinstance(variable.target, Start) and not variable.target.is_speed:
+                    variable = replace(
+                        variable, warning=_describe_suspect_range(variable, value_range, mechanism)
+                    )
+                result.append(variable)
+        if all(meaning is None for _, meaning in meanings):
             raise _describe_unknown_name(
                 names, model, mechanism, [*parameters, *(gain.name for gain in gains)]
             )
-    taken: dict[object, str] = {}
-    for item in result:
-        for part in getattr(item.target, "parts", (item.target,)):
+    name_by_target: dict[object, str] = {}
+    for resolved in result:
+        for single_target in getattr(resolved.target, "parts", (resolved.target,)):
             # Two variables of one number would depend on the order of application.
-            if part in taken:
+            if single_target in name_by_target:
                 raise SettingError(
-                    f"'{taken[part]}' and '{item.name}' are the same number; vary one of them"
+                    f"'{name_by_target[single_target]}' and '{resolved.name}' are the same number; vary one of them"
                 )
-            taken[part] = item.name
+            name_by_target[single_target] = resolved.name
     return tuple(result)
 
 
-def refuse_counts(found: Sequence[Variable]) -> None:
+def refuse_counts(variables: Sequence[Variable]) -> None:
     """Refuse ranges with a number of values, which make no sense in a search.
 
     Raises:
         SettingError: a variable has a number of values.
     """
-    for item in found:
-        if item.count is not None and not item.is_fixed:
+    for variable in variables:
+        if variable.count is not None and not variable.is_fixed:
             raise SettingError(
-                f"the range of '{item.name}' is to have {item.count} values, which is for the grid of a sweep; "
+                f"the range of '{variable.name}' is to have {variable.count} values, which is for the grid of a sweep; "
                 "a search takes any value of it: leave the number out"
             )
 
@@ -300,33 +304,37 @@ def _resolve_target(
     The first match counts, in the order of the table above: coordinate, parameter of the function,
     parameter of the controller, control, property, slope.
     """
-    front, _, last = name.rpartition("/")
+    stem, _, ending = name.rpartition("/")
     # The complete name first: a coordinate may have a name that ends like a suffix.
-    for key, is_speed in ((name, False), (front, last == "speed")):
-        if (key == name or last in ("value", "speed")) and (
-            meant := match_components(key, mechanism.coordinates)
+    for key, is_speed in ((name, False), (stem, ending == "speed")):
+        if (key == name or ending in ("value", "speed")) and (
+            matches := match_components(key, mechanism.coordinates)
         ):
-            return _list_coordinates(name, meant, is_speed, model)
+            return _list_coordinates(name, matches, is_speed, model)
     if name in parameters:
         default = parameters[name]
         return FunctionParameter(
             name, float(default) if type(default) in (int, float) else None
         ), "parameter"
-    if own := match_components(name, gains):
-        return Gains(tuple(gain.name for gain in own), own[0].value), "parameter"
-    route, _, word = name.partition("@")
-    front, _, last = route.rpartition("/")
-    if last == "control" and (driven := match_components(front, model.components(Actuator))):
-        made = parse_control(name, [item.path for item in driven], word)
-        return made, made.unit
-    if word in ("", SCALE) and (result := find_properties(model, route)):
+    if matched_gains := match_components(name, gains):
+        return Gains(
+            tuple(gain.name for gain in matched_gains), matched_gains[0].value
+        ), "parameter"
+    route, _, suffix = name.partition("@")
+    stem, _, ending = route.rpartition("/")
+    if ending == "control" and (
+        matched_actuators := match_components(stem, model.components(Actuator))
+    ):
+        control = parse_control(name, [actuator.path for actuator in matched_actuators], suffix)
+        return control, control.unit
+    if suffix in ("", SCALE) and (result := find_properties(model, route)):
         unit = result[0].unit
         # The unit of such a property depends on the motion type of its coordinate.
         if unit.startswith("rad | m") and (
             infos := match_components(result[0].component, mechanism.coordinates)
         ):
             unit = infos[0].unit or "rad | m"
-        return Property(result, bool(word)), "" if word else unit
+        return Property(result, bool(suffix)), "" if suffix else unit
     if name == "slope":
         return Slope(), "rad"
     return None
@@ -341,19 +349,25 @@ def _describe_unknown_name(
         return SettingError(
             f"'{name}' is an actuator: vary '{route}/control', or one of its properties"
         )
-    known = [f"{info.name}{what}" for info in mechanism.coordinates for what in ("", "/speed")] + [
+    known_names = [
+        f"{info.name}{ending}" for info in mechanism.coordinates for ending in ("", "/speed")
+    ] + [
         *parameters,
         "slope",
     ]
-    known += [f"{info.path}{what}" for info in mechanism.coordinates for what in ("", "/speed")]
-    known += [
-        f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)
+    known_names += [
+        f"{info.path}{ending}" for info in mechanism.coordinates for ending in ("", "/speed")
+    ]
+    known_names += [
+        f"{key}/control"
+        for actuator in model.components(Actuator)
+        for key in (actuator.name, actuator.path)
     ]
     # Properties are many; they are searched only if the name is a path.
-    known += list_property_paths(model) if "/" in name else []
-    near = suggest_name(name, known)
+    known_names += list_property_paths(model) if "/" in name else []
+    suggestion = suggest_name(name, known_names)
     return SettingError(
-        f"there is no coordinate, parameter, control or number '{name}' to vary{near}"
+        f"there is no coordinate, parameter, control or number '{name}' to vary{suggestion}"
     )
 
 
@@ -379,104 +393,119 @@ def _list_coordinates(
     ), unit
 
 
-def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variable:
+def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> Variable:
     """Return the variable of a target with its range.
 
     Args:
         name: name of the variable.
         target: what it changes.
         unit: unit of the number.
-        given: range as the user wrote it.
+        value_range: range as the user wrote it.
     """
-    parts = (
-        given.split(":")
-        if isinstance(given, str)
-        else [given]
-        if isinstance(given, int | float)
-        else list(given)
+    fields = (
+        value_range.split(":")
+        if isinstance(value_range, str)
+        else [value_range]
+        if isinstance(value_range, int | float)
+        else list(value_range)
     )
     count, is_log = None, False
-    if len(parts) > 1 and parts[-1] == "log":
+    if len(fields) > 1 and fields[-1] == "log":
         is_log = True
-        parts.pop()
-    if len(parts) == 3:
-        text = str(parts.pop())
+        fields.pop()
+    if len(fields) == 3:
+        text = str(fields.pop())
         if not text.strip().isdigit() or int(text) < 1:
             raise SettingError(
                 f"the number of values of '{name}' is a whole number above zero, not '{text}'"
             )
         count = int(text)
-    if len(parts) not in (1, 2):
-        raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
-    low, high = (_parse_number(name, part, unit) for part in (parts[0], parts[-1]))
-    _refuse_mixed_units(name, parts, unit)
+    if len(fields) not in (1, 2):
+        raise SettingError(
+            f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{value_range}'"
+        )
+    lower, upper = (_parse_number(name, bound_text, unit) for bound_text in (fields[0], fields[-1]))
+    _refuse_mixed_units(name, fields, unit)
     # A single value is a fixed variable.
-    if len(parts) == 1:
+    if len(fields) == 1:
         count = 1
-    if low > high:
+    if lower > upper:
         raise SettingError(
-            f"the range of '{name}' ends below its start: {low:g} to {high:g}; turn it round"
+            f"the range of '{name}' ends below its start: {lower:g} to {upper:g}; turn it round"
         )
-    if is_log and low <= 0.0:
+    if is_log and lower <= 0.0:
         raise SettingError(
-            f"'{name}' is spread by its logarithm, so that it must be above zero, not {low:g}"
+            f"'{name}' is spread by its logarithm, so that it must be above zero, not {lower:g}"
         )
-    if count is not None and count > 1 and low == high:
+    if count is not None and count > 1 and lower == upper:
         raise SettingError(
-            f"'{name}' cannot have {count} values between {low:g} and {high:g}; give it one"
+            f"'{name}' cannot have {count} values between {lower:g} and {upper:g}; give it one"
         )
-    if count == 1 and low != high:
+    if count == 1 and lower != upper:
         raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
-    return Variable(name, target, low, high, count, is_log)
+    return Variable(name, target, lower, upper, count, is_log)
 
 
-def _refuse_mixed_units(name: str, ends: Sequence[object], unit: str) -> None:
+def _refuse_mixed_units(name: str, bound_texts: Sequence[object], unit: str) -> None:
     """Refuse a range such as `20deg:40` in rad; 0 needs no unit."""
-    read = [parse_quantity(str(part)) for part in ends]
-    with_unit = [each.unit for each in read if each is not None and each.unit is not None]
-    bare = [
-        each.number
-        for each in read
-        if each is not None and each.unit is None and each.number != 0.0
+    quantities = [parse_quantity(str(bound_text)) for bound_text in bound_texts]
+    with_unit = [
+        quantity.unit
+        for quantity in quantities
+        if quantity is not None and quantity.unit is not None
     ]
-    if with_unit and bare and not unit.startswith(f"{with_unit[0]}"):
+    numbers_without_unit = [
+        quantity.number
+        for quantity in quantities
+        if quantity is not None and quantity.unit is None and quantity.number != 0.0
+    ]
+    if with_unit and numbers_without_unit and not unit.startswith(f"{with_unit[0]}"):
         raise SettingError(
-            f"the range of '{name}' has a unit at one end only: {ends[0]}:{ends[-1]}; "
-            f"write it at both, as in {bare[0]:g}{with_unit[0]}"
+            f"the range of '{name}' has a unit at one end only: {bound_texts[0]}:{bound_texts[-1]}; "
+            f"write it at both, as in {numbers_without_unit[0]:g}{with_unit[0]}"
         )
 
 
-def _describe_suspect_range(made: Variable, given: Range, mechanism: Mechanism) -> str:
+def _describe_suspect_range(variable: Variable, value_range: Range, mechanism: Mechanism) -> str:
     """Return a sentence if an initial angle seems to be written in degrees without a unit, else ""."""
-    assert isinstance(made.target, Start)
-    ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
+    assert isinstance(variable.target, Start)
+    bounds = (
+        value_range.split(":")[:2]
+        if isinstance(value_range, str)
+        else [variable.low, variable.high]
+    )
     infos = [
-        mechanism.coordinates[mechanism.coordinate_index(path)] for path in made.target.coordinates
+        mechanism.coordinates[mechanism.coordinate_index(path)]
+        for path in variable.target.coordinates
     ]
-    odd = (describe_suspect_value(info, made.name, end) for info in infos for end in ends)
-    return next((words for words in odd if words), "")
+    messages = (
+        describe_suspect_value(info, variable.name, end) for info in infos for end in bounds
+    )
+    return next((message for message in messages if message), "")
 
 
-def _parse_number(name: str, part: object, unit: str) -> float:
+def _parse_number(name: str, number_or_text: object, unit: str) -> float:
     """Return a number in the unit of the variable; `30deg` is converted."""
-    if isinstance(part, int | float):
-        given: Quantity | None = Quantity(float(part), None)
+    if isinstance(number_or_text, int | float):
+        quantity: Quantity | None = Quantity(float(number_or_text), None)
     else:
-        given = parse_quantity(str(part))
-    if given is None or not math.isfinite(given.number):
-        raise SettingError(f"'{part}' is no number for '{name}'; give one such as 0.5 or 30deg")
+        quantity = parse_quantity(str(number_or_text))
+    if quantity is None or not math.isfinite(quantity.number):
+        raise SettingError(
+            f"'{number_or_text}' is no number for '{name}'; give one such as 0.5 or 30deg"
+        )
     # A plain number is in the unit of the variable.
-    if given.unit is None:
-        return given.number
+    if quantity.unit is None:
+        return quantity.number
     # Some properties of OpenSim, such as limits of CoordinateLimitForce, are in degrees.
-    if given.is_angle and unit.startswith("deg"):
-        return given.number if given.unit == "deg" else math.degrees(given.number)
-    if given.is_angle and unit.startswith("rad"):
-        return given.value
-    if not given.is_angle and unit in ("m", "m/s", "rad | m", "rad/s | m/s"):
-        return given.value
+    if quantity.is_angle and unit.startswith("deg"):
+        return quantity.number if quantity.unit == "deg" else math.degrees(quantity.number)
+    if quantity.is_angle and unit.startswith("rad"):
+        return quantity.value
+    if not quantity.is_angle and unit in ("m", "m/s", "rad | m", "rad/s | m/s"):
+        return quantity.value
     if unit == "parameter":
         raise SettingError(
             f"'{name}' is a parameter of a function or a controller, whose unit only that knows; give a plain number"
         )
-    raise SettingError(f"'{name}' is in {unit or 'no unit'}, which '{part}' does not fit")
+    raise SettingError(f"'{name}' is in {unit or 'no unit'}, which '{number_or_text}' does not fit")

@@ -95,14 +95,16 @@ class Variants:
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        targets = [item.target for item in plan.variables]
+        targets = [variable.target for variable in plan.variables]
         starts = [
-            (k, part)
+            (k, single_start)
             for k, target in enumerate(targets)
             if isinstance(target, Start)
-            for part in target.parts
+            for single_start in target.parts
         ]
-        self._starts = [(k, part.coordinates[0], part.is_speed) for k, part in starts]
+        self._starts = [
+            (k, single_start.coordinates[0], single_start.is_speed) for k, single_start in starts
+        ]
         self._changes = [k for k, target in enumerate(targets) if not isinstance(target, Start)]
         self._gains = [k for k, target in enumerate(targets) if isinstance(target, Gains)]
         self._controller = plan.controller
@@ -130,7 +132,7 @@ class Variants:
         """
         if not self._changes:
             return self.given
-        key = tuple(values[place] for place in self._changes)
+        key = tuple(values[index] for index in self._changes)
         result = self._kept.get(key)
         if result is None:
             try:
@@ -162,16 +164,16 @@ class Variants:
         if simulation is not None and simulation.constraints:
             # Assembly computes the dependent coordinates from those that are set.
             selected: tuple[dict[str, float], dict[str, float]] = {}, {}
-            for place, path, is_speed in self._starts:
-                selected[is_speed][path] = float(values[place])
+            for index, path, is_speed in self._starts:
+                selected[is_speed][path] = float(values[index])
             row = np.array(simulation.initial_state(*selected))
         else:
-            for place, path, is_speed in self._starts:
+            for index, path, is_speed in self._starts:
                 coordinate = engine.mechanism.coordinate_index(path)
                 if coordinate not in engine.order:
                     raise SettingError(f"'{path}' is locked in this model, so that it has no start")
                 number = engine.order.index(coordinate)
-                row[number + (len(engine.order) if is_speed else 0)] = values[place]
+                row[number + (len(engine.order) if is_speed else 0)] = values[index]
         return self.prepare_states(engine, [variant], row[None])[0]
 
     def prepare_states(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
@@ -196,11 +198,13 @@ class Variants:
         if self._plan.equilibrate:
             for row, variant in zip(rows, variants, strict=True):
                 # A new engine is made only if the update fails, then also for its error message.
-                y, result = row.tolist(), None
+                values, result = row.tolist(), None
                 if len(variant.numbers):
                     with suppress(SimulationError):
-                        result = engine.equilibrate_muscles(0.0, y, variant.numbers)
-                row[:] = variant.engine.equilibrate_muscles(0.0, y) if result is None else result
+                        result = engine.equilibrate_muscles(0.0, values, variant.numbers)
+                row[:] = (
+                    variant.engine.equilibrate_muscles(0.0, values) if result is None else result
+                )
         return rows
 
     def place_states(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
@@ -216,39 +220,45 @@ class Variants:
         """
         if not self._plan.is_planted:
             return starts
-        place = find_start("planted")(engine, self._plan.feet)
+        plant_states = find_start("planted")(engine, self._plan.feet)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
-        return place(starts, numbers, lambda states: self.prepare_states(engine, variants, states))
+        return plant_states(
+            starts, numbers, lambda states: self.prepare_states(engine, variants, states)
+        )
 
     def list_current_values(self) -> list[float | None]:
         """Return the values of the variables in the given model; None where it has no value."""
         result: list[float | None] = []
         engine = self.given.engine
         setters = dict(self._setters)
-        for index, item in enumerate(self._plan.variables):
-            if isinstance(item.target, Start):
+        for index, variable in enumerate(self._plan.variables):
+            if isinstance(variable.target, Start):
                 info = engine.mechanism.coordinates[
-                    engine.mechanism.coordinate_index(item.target.coordinates[0])
+                    engine.mechanism.coordinate_index(variable.target.coordinates[0])
                 ]
-                result.append(info.default_speed if item.target.is_speed else info.default_value)
-            elif isinstance(item.target, Property):
-                result.append(1.0 if item.target.is_scaled else setters[index][0].get_value())
-            elif isinstance(item.target, Control | Gains):
-                result.append(item.target.current_value)
+                result.append(
+                    info.default_speed if variable.target.is_speed else info.default_value
+                )
+            elif isinstance(variable.target, Property):
+                result.append(1.0 if variable.target.is_scaled else setters[index][0].get_value())
+            elif isinstance(variable.target, Control | Gains):
+                result.append(variable.target.current_value)
             else:
                 result.append(
-                    item.target.default if isinstance(item.target, FunctionParameter) else 0.0
+                    variable.target.default
+                    if isinstance(variable.target, FunctionParameter)
+                    else 0.0
                 )
         return result
 
     def set_default_state(self, values: Sequence[float]) -> None:
         """Make the initial state of a sample the default state of `model`."""
         coordinates: Any = self.model.tree().by_path
-        for place, path, is_speed in self._starts:
+        for index, path, is_speed in self._starts:
             setattr(
                 coordinates[path],
                 "default_speed_value" if is_speed else "default_value",
-                float(values[place]),
+                float(values[index]),
             )
         if self._plan.is_planted:
             variant = self.make_variant(values)
@@ -256,8 +266,8 @@ class Variants:
             (row,) = self.place_states(
                 engine, [variant], self.make_start(variant, values)[None]
             ).tolist()
-            for number, place in enumerate(engine.order):
-                coordinate = coordinates[engine.mechanism.coordinates[place].path]
+            for number, index in enumerate(engine.order):
+                coordinate = coordinates[engine.mechanism.coordinates[index].path]
                 coordinate.default_value = row[number]
                 coordinate.default_speed_value = row[number + len(engine.order)]
 
@@ -265,12 +275,14 @@ class Variants:
         """Return the controller with the gains of a sample."""
         assert self._plan.controller is not None
         variables = self._plan.variables
-        parts = (
+        named_values = (
             (name, values[k])
             for k in self._gains
             for name in getattr(variables[k].target, "parts", ())
         )
-        return self._plan.controller.with_values({name: float(value) for name, value in parts})
+        return self._plan.controller.with_values(
+            {name: float(value) for name, value in named_values}
+        )
 
     def build_model(self, values: Sequence[float]) -> Model:
         """Return the model of a sample for writing.
@@ -292,19 +304,23 @@ class Variants:
         if self._parameters:
             assert self._plan.make is not None
             names = {
-                self._plan.variables[place].name: float(values[place]) for place in self._parameters
+                self._plan.variables[index].name: float(values[index]) for index in self._parameters
             }
             self._set_model(self._plan.make(names))
         if self._gains:
             self._controller = self.make_controller(values)
-        for place, setters in self._setters:
+        for index, setters in self._setters:
             for setter in setters:
-                setter.set_value(float(values[place]))
+                setter.set_value(float(values[index]))
         self._controls.apply(values)
-        for place in self._slopes:
-            angle, g = float(values[place]), self._gravity
+        for index in self._slopes:
+            angle, gravity = float(values[index]), self._gravity
             # Tilting gravity about z is equivalent to a slope of the floor.
-            self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
+            self.model.gravity = (
+                gravity * math.sin(angle),
+                -gravity * math.cos(angle),
+                self.model.gravity[2],
+            )
 
     # ------------------------------------------------------------------------------------------------ helpers
     def _set_model(self, model: Model) -> None:
@@ -312,37 +328,42 @@ class Variants:
         self.model = model
         self._gravity = math.hypot(*model.gravity[:2])
         self._slopes, self._setters = [], []
-        owners: list[Component] = []
-        for place in self._changes:
-            target = self._plan.variables[place].target
+        changed_components: list[Component] = []
+        for index in self._changes:
+            target = self._plan.variables[index].target
             if isinstance(target, Property):
-                setters = [item.make_setter(model) for item in target.places]
+                setters = [element.make_setter(model) for element in target.places]
                 self._setters.append(
                     (
-                        place,
-                        [item.make_factor_setter() for item in setters]
+                        index,
+                        [element.make_factor_setter() for element in setters]
                         if target.is_scaled
                         else setters,
                     )
                 )
-                owners += [model.tree().by_path[item.component] for item in target.places]
+                changed_components += [
+                    model.tree().by_path[element.component] for element in target.places
+                ]
             elif isinstance(target, Slope):
-                self._slopes.append(place)
-                owners.append(model)
-        targets = ((place, self._plan.variables[place].target) for place in self._changes)
-        controls = {place: target for place, target in targets if isinstance(target, Control)}
+                self._slopes.append(index)
+                changed_components.append(model)
+        targets = ((index, self._plan.variables[index].target) for index in self._changes)
+        controls = {index: target for index, target in targets if isinstance(target, Control)}
         self._controls = VariedControls(model, controls, self._plan.interpolation)
-        owners += self._controls.controllers
+        changed_components += self._controls.controllers
         if self._plan.controller is not None:
             # The controller adds its controls to these constants of 0, after all other controllers.
             self._open = model.add(
-                make_controller(model, {item.path: 0.0 for item in model.components(Actuator)})
+                make_controller(
+                    model, {element.path: 0.0 for element in model.components(Actuator)}
+                )
             )
         # A function with other parameters may return any model.
         can_renew = self._plan.engine == "compiled" and not self._parameters
         self._owners = (
-            owners
-            if can_renew and all(isinstance(item, UPDATABLE_TYPES) for item in owners)
+            changed_components
+            if can_renew
+            and all(isinstance(element, UPDATABLE_TYPES) for element in changed_components)
             else None
         )
 
@@ -358,10 +379,12 @@ class Variants:
         )
         engine: Any = simulation.engine
         infos = engine.mechanism.coordinates
-        kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
+        structure_key = (*(info.path for info in infos), *engine.order, *engine.contacts)
         # Coordinates, their order in the state and contacts, besides the structure of the compiled
         # engine.
-        structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
+        structure = (
+            repr(structure_key).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
+        )
         numbers = getattr(engine, "numbers", np.zeros(0))
         return self._add_controls(
             Variant(simulation.state, structure, numbers, lambda: engine, simulation)
@@ -377,20 +400,22 @@ class Variants:
     def _make_variant(self, values: Sequence[float]) -> Variant:
         """Make the model of a sample, by an update if possible."""
         self.apply_sample(values)
-        given = self.given
+        base_variant = self.given
         # Gains change the controller only; the engine stays.
         if self._changes == self._gains:
-            return self._add_controls(replace(given))
+            return self._add_controls(replace(base_variant))
         if self._owners is None:
             return self._make_complete_variant()
         if self._renewal is None:
-            self._renewal = given.engine.make_updater(
+            self._renewal = base_variant.engine.make_updater(
                 self.model, Path(self._plan.folder or "."), self._plan.wrapping
             )
-        made = self._renewal.update(self._owners)
+        updated = self._renewal.update(self._owners)
         # The numbers change the structure, which needs a new engine.
-        if made is None:
+        if updated is None:
             return self._make_complete_variant()
         # The start values of auxiliary states may depend on the numbers.
-        state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
-        return self._add_controls(Variant(state, given.structure, made.numbers, made.make_engine))
+        state = StateLayout(updated.mechanism, base_variant.state.order, updated.forces.elements)
+        return self._add_controls(
+            Variant(state, base_variant.structure, updated.numbers, updated.make_engine)
+        )
