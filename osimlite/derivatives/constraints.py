@@ -139,7 +139,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     accelerations by each equation's force.
     """
 
-    def law(
+    def solve_dynamics(
         model: RecordedVector,
         reals: RecordedVector,
         data: RecordedVector,
@@ -147,6 +147,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
         f: RecordedVector,
         unused: int,
     ) -> int:
+        """Return OK after storing the accelerations under all constraints in the derivative `f`."""
         h = model.rest(model[MODEL.CONSTRAINED])
         size = model[MODEL.DOFS]
         right_side = f.rest(size)
@@ -181,4 +182,4 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
             right_side[k] += constraint_accelerations[k]
         return OUTCOME.OK
 
-    return law  # type: ignore[return-value]
+    return solve_dynamics  # type: ignore[return-value]

@@ -56,17 +56,26 @@ class Parameters:
         base = numbers_of(model)
         self.slopes: dict[int, list[tuple[int, float]]] = {}
 
-        def numbers_at(values: Array, what: str) -> Array:
+        def compute_numbers(values: Array, description: str) -> Array:
+            """Return the numbers of the kernels (k,) for values of the parameters.
+
+            Args:
+                values: values of the parameters (p,).
+                description: the changed parameters, for messages.
+
+            Raises:
+                UnsupportedError: the model is invalid with these values, or has another structure.
+            """
             self._set_values(values)
             try:
                 result = numbers_of(model)
             except OsimliteError as error:
-                raise UnsupportedError(f"{what} cannot be a parameter: {error}") from error
+                raise UnsupportedError(f"{description} cannot be a parameter: {error}") from error
             finally:
                 self._set_values(self.values)
             if len(result) != len(base):
                 raise UnsupportedError(
-                    f"{what} cannot be a parameter: the structure of the model depends on it"
+                    f"{description} cannot be a parameter: the structure of the model depends on it"
                 )
             return result
 
@@ -76,11 +85,11 @@ class Parameters:
             first_change, second_change = (
                 self._change_values(number, [index]) for number in range(2)
             )
-            columns[:, index] = _subtract_base(numbers_at(first_change, f"'{name}'"), base) / (
+            columns[:, index] = _subtract_base(compute_numbers(first_change, f"'{name}'"), base) / (
                 first_change[index] - initial_values[index]
             )
             _check_linear(
-                numbers_at(second_change, f"'{name}'"),
+                compute_numbers(second_change, f"'{name}'"),
                 base,
                 columns[:, [index]],
                 (second_change - self.values)[[index]],
@@ -95,8 +104,14 @@ class Parameters:
             # Products of parameters are linear in each but not in all together.
             for number in range(2):
                 values = self._change_values(number, range(len(initial_values)))
-                what = f"{names_text} together"
-                _check_linear(numbers_at(values, what), base, columns, values - self.values, what)
+                description = f"{names_text} together"
+                _check_linear(
+                    compute_numbers(values, description),
+                    base,
+                    columns,
+                    values - self.values,
+                    description,
+                )
         self.base = base - columns @ self.values if len(initial_values) else base
         for row, number in zip(*np.nonzero(columns), strict=True):
             self.slopes.setdefault(int(row), []).append((int(number), float(columns[row, number])))

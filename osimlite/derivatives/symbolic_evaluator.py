@@ -95,7 +95,7 @@ class SymbolicEvaluator:
                     else "it is computed in Python"
                 )
                 raise UnsupportedError(
-                    f"'{self._path(offset)}' has no formula for CasADi: {reason}"
+                    f"'{self._find_force_path(offset)}' has no formula for CasADi: {reason}"
                 )
         self.structure: list[int] = Program(packed, PYTHON_CODE).ints.tolist()
         for offset, law_address in registered_laws.items():
@@ -108,7 +108,7 @@ class SymbolicEvaluator:
                 register_symbolic(make_constrained_dynamics(equations))
             )
 
-    def _path(self, item: int) -> str:
+    def _find_force_path(self, item: int) -> str:
         """Return the path of the force that an item belongs to."""
         return self._elements[self._packed.owners[item]].path
 
@@ -135,18 +135,19 @@ class SymbolicEvaluator:
         """
         probe_offsets = list_probe_items(self._packed, self._elements)
 
-        def law(
+        def evaluate_all(
             model: RecordedVector,
             reals: RecordedVector,
             data: RecordedVector,
             y: RecordedVector,
             f: RecordedVector,
         ) -> None:
+            """Evaluate the accelerations, then each probe."""
             make_symbolic(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
             for offset in probe_offsets:
                 make_symbolic(call)(model[offset + ITEM.LAW], model, reals, data, y, f, offset)
 
-        return self.run(law)
+        return self.run(evaluate_all)
 
     def compute_missing_forces(
         self, udot: Sequence[Any], pushing: Container[str] | None = None
@@ -169,7 +170,7 @@ class SymbolicEvaluator:
             acting_items = [
                 item
                 for item in structure[first_item : first_item + count]
-                if self._path(item) in pushing
+                if self._find_force_path(item) in pushing
             ]
             structure[MODEL.ITEMS] = len(acting_items)
             structure[first_item : first_item + len(acting_items)] = acting_items
@@ -179,7 +180,7 @@ class SymbolicEvaluator:
             structure[run_offset + RUN.FIRST] = 0
             structure[run_offset + RUN.END] = len(acting_items)
 
-        def law(
+        def compute_inverse(
             model: RecordedVector,
             reals: RecordedVector,
             data: RecordedVector,
@@ -190,7 +191,7 @@ class SymbolicEvaluator:
                 f[size + k] = udot[k]
             make_symbolic(inverse)(model, reals, data, y, f, 0)
 
-        return self.run(law, structure)
+        return self.run(compute_inverse, structure)
 
     def evaluate_constraints(self) -> SymbolicWorkspace:
         """Evaluate the constraint equations.
@@ -203,13 +204,14 @@ class SymbolicEvaluator:
         rows_offset = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
 
-        def law(
+        def collect_wrenches(
             model: RecordedVector,
             reals: RecordedVector,
             data: RecordedVector,
             y: RecordedVector,
             f: RecordedVector,
         ) -> dict[tuple[int, int], list[Any]]:
+            """Return the wrenches (6,) of unit multipliers by equation and link."""
             wrenches: dict[tuple[int, int], list[Any]] = {}
             kernel = make_symbolic(add_wrench_row)
 
@@ -221,6 +223,7 @@ class SymbolicEvaluator:
                 force: Any,
                 row: RecordedVector,
             ) -> None:
+                """Add a wrench to a row of the equations, and record it."""
                 # The place of the row in the work vector tells the equation.
                 key = (row.first - rows_offset) // size, link
                 present_wrench = wrenches.get(key, [0.0] * 6)
@@ -236,7 +239,7 @@ class SymbolicEvaluator:
                 make_symbolic(evaluate_constraints)(model, reals, data, y, f)
             return wrenches
 
-        return self.run(law)
+        return self.run(collect_wrenches)
 
     def run(
         self,
@@ -259,6 +262,7 @@ class SymbolicEvaluator:
         """
 
         def run_once() -> SymbolicWorkspace:
+            """Return the workspace in which the function has run on new vectors."""
             # New vectors for each attempt: a rerun must not see values of the one before.
             model = RecordedVector(self.structure if structure is None else structure)
             reals = RecordedVector(list(self.numbers))
@@ -276,7 +280,12 @@ class SymbolicEvaluator:
             return branches.run_until_mergeable(run_once)
         except branches.NoFormula as error:
             path = next(
-                (self._path(item) for item in error.items if item in self._packed.owners), ""
+                (
+                    self._find_force_path(item)
+                    for item in error.items
+                    if item in self._packed.owners
+                ),
+                "",
             )
             subject = f"'{path}'" if path else "the model"
             raise UnsupportedError(

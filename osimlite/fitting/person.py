@@ -291,7 +291,7 @@ class _PersonFit:
     def start_from_model(self, mechanism: Mechanism) -> _Estimate:
         """Return the estimate of the model as it is."""
         starts = np.tile(compute_first_pose(mechanism, 0.0, True), (len(self._chosen.times), 1))
-        return self._evaluate(
+        return self._evaluate_estimate(
             np.ones(self._sizes), np.zeros((len(self._chosen.markers), 3)), starts
         )
 
@@ -302,7 +302,7 @@ class _PersonFit:
             start: estimate to start from.
             tolerance: largest change of a size or offset (m) by the last step.
         """
-        estimate = self._evaluate(start.sizes, start.offsets, start.values)
+        estimate = self._evaluate_estimate(start.sizes, start.offsets, start.values)
         damping = 1e-6
         first_change = 0.0
         for _ in range(MAX_STEPS):
@@ -315,7 +315,7 @@ class _PersonFit:
                 sizes = np.clip(estimate.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
                 offsets = estimate.offsets.copy()
                 offsets[self._free] += step[self._sizes :].reshape(-1, 3)
-                trial_estimate = self._evaluate(sizes, offsets, estimate.values)
+                trial_estimate = self._evaluate_estimate(sizes, offsets, estimate.values)
                 if trial_estimate.cost <= estimate.cost or np.abs(step).max() < tolerance:
                     break
                 damping = 10.0 * max(damping, 1e-9)
@@ -341,7 +341,7 @@ class _PersonFit:
             : self._sizes
         ]
 
-    def _evaluate(self, sizes: Array, offsets: Array, starts: Array) -> _Estimate:
+    def _evaluate_estimate(self, sizes: Array, offsets: Array, starts: Array) -> _Estimate:
         """Fit the poses for sizes and offsets, and compute the cost.
 
         Args:

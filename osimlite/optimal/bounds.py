@@ -56,11 +56,13 @@ class Bounds:
             Bounds; those at the ends lie within those over the motion.
         """
         return cls(
-            motion_range, _intersect(start_range, motion_range), _intersect(end_range, motion_range)
+            motion_range,
+            _intersect_ranges(start_range, motion_range),
+            _intersect_ranges(end_range, motion_range),
         )
 
 
-def _intersect(range_to_limit: Range, limits: Range) -> Range:
+def _intersect_ranges(range_to_limit: Range, limits: Range) -> Range:
     """Return the part of one range within another; its ends are reversed if both have nothing in common."""
     return max(range_to_limit[0], limits[0]), min(range_to_limit[1], limits[1])
 

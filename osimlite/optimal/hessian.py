@@ -29,7 +29,7 @@ class Hessian:
         width = len(program.layout.lower)
         for group in program.groups:
             group.make_hessian()
-        rows, columns = program._entries("hessian_rows", "hessian_columns")
+        rows, columns = program._list_entries("hessian_rows", "hessian_columns")
         # E depends on the variables at both ends (`direct` of them), then on the integrals.
         direct = len(program.end_columns)
         pattern = program._end_hessian_pattern
@@ -86,7 +86,7 @@ class Hessian:
         program = self.program
         direct = len(self.program.end_columns)
         totals = program._compute_rows(w)[program._row_count :]
-        end_arguments = program._end_arguments(w, totals)
+        end_arguments = program._make_end_arguments(w, totals)
         multipliers_of_points = multipliers[: program._row_count]
         at_ends = multipliers[program._row_count :]
         cost, end_slopes = (array.T for array in program._end_slope(*end_arguments))
@@ -101,7 +101,7 @@ class Hessian:
             count = group.rows * len(group.numbers)
             entry_groups.append(
                 group.curvature(
-                    *program._point_arguments(group, w),
+                    *program._make_point_arguments(group, w),
                     row_multipliers[first_row : first_row + count],
                 )[0].ravel()
             )

@@ -358,16 +358,19 @@ class _SearchCallbacks:
         self._values_at = cache_last(lambda x: program.compute_values(self.unscale(x)))
         self._slopes_at = cache_last(lambda x: program.compute_slopes(self.unscale(x)))
         self.objective = _ArrayCallback(
-            "nlp", inputs, {"f": scalar, "g": _make_dense_column(rows)}, self._values
+            "nlp", inputs, {"f": scalar, "g": _make_dense_column(rows)}, self._compute_values
         )
         self.gradient = _ArrayCallback(
-            "nlp_grad_f", inputs, {"f": scalar, "grad_f_x": gradient_sparsity}, self._gradient
+            "nlp_grad_f",
+            inputs,
+            {"f": scalar, "grad_f_x": gradient_sparsity},
+            self._compute_gradient,
         )
         self.jacobian = _ArrayCallback(
             "nlp_jac_g",
             inputs,
             {"g": _make_dense_column(rows), "jac_g_x": program.jacobian_sparsity},
-            self._jacobian,
+            self._compute_jacobian,
         )
         # CasADi passes all results of its solver to the callback of an iteration, so that it has
         # one argument for each.
@@ -385,15 +388,15 @@ class _SearchCallbacks:
         """Return Ipopt's variables x of the variables w."""
         return (w - self.offsets) / self.factors
 
-    def _values(self, x: Array, *_: Array) -> tuple[Any, ...]:
+    def _compute_values(self, x: Array, *_: Array) -> tuple[Any, ...]:
         costs, rows = self._values_at(x)
         return costs.sum(), rows
 
     # The first result of CasADi's signature is f again, or g below: Ipopt gets both from `objective`.
-    def _gradient(self, x: Array, *_: Array) -> tuple[Any, ...]:
+    def _compute_gradient(self, x: Array, *_: Array) -> tuple[Any, ...]:
         return 0.0, self._slopes_at(x)[0] * self.factors
 
-    def _jacobian(self, x: Array, *_: Array) -> tuple[Any, ...]:
+    def _compute_jacobian(self, x: Array, *_: Array) -> tuple[Any, ...]:
         return 0.0, self._slopes_at(x)[1] * self._column_factors
 
     # ---------------------------------------------------------------------------------------- after an iteration
@@ -462,7 +465,7 @@ def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
         "lam_g": _make_dense_column(len(program.labels)),
     }
 
-    def law(x: Array, *multiplier_arguments: Array) -> tuple[Any, ...]:
+    def compute_hessian(x: Array, *multiplier_arguments: Array) -> tuple[Any, ...]:
         return (
             hessian.compute_entries(
                 search.unscale(x), float(multiplier_arguments[-2][0]), multiplier_arguments[-1]
@@ -471,4 +474,6 @@ def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
             * column_factors,
         )
 
-    return _ArrayCallback("nlp_hess_l", inputs, {"hess_gamma_x_x": hessian.sparsity}, law)
+    return _ArrayCallback(
+        "nlp_hess_l", inputs, {"hess_gamma_x_x": hessian.sparsity}, compute_hessian
+    )

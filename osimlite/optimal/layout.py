@@ -193,7 +193,7 @@ class VariableLayout:
                 column = trajectory.columns.get(name.removesuffix(PROJECTION_SUFFIX))
                 if column is not None:
                     indices = self.indices[kind][:, number]
-                    result[indices[indices >= 0]] = _resample(times, column, grid_times)[
+                    result[indices[indices >= 0]] = _resample_column(times, column, grid_times)[
                         indices >= 0
                     ]
         for number, name in enumerate(self.problem.parameters):
@@ -212,7 +212,7 @@ class VariableLayout:
         return ""
 
 
-def _resample(times: Array, column: Array, new_times: Array) -> Array:
+def _resample_column(times: Array, column: Array, new_times: Array) -> Array:
     """Interpolate a column: by a natural spline of fifth degree as Moco, linearly with few times.
 
     Args:

@@ -36,7 +36,7 @@ class TimeFunction:
     factor: int | None = None
 
     def expand(self, t: Formula, time_data: Formula) -> Formula:
-        """Return the value by a Taylor expansion about the time ``known[0]``.
+        """Return the value by a Taylor expansion about the time ``time_data[0]``.
 
         The expansion is renewed for each time, so that value and both derivatives are exact there.
 

@@ -265,7 +265,7 @@ class PointGroup:
         Returns:
             Results of F (k, rows).
         """
-        arguments = program._arguments_at(w, fractions, z)
+        arguments = program._make_arguments(w, fractions, z)
         return BufferedFunction(self.formula.value.map(len(fractions)))(*arguments)[0]
 
     def make_hessian(self) -> None:

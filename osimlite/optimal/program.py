@@ -83,7 +83,7 @@ class Program:
             groups = [[0], groups[0][1:], groups[1]]
         self.groups = [PointGroup(self, numbers) for numbers in groups if numbers]
         self._offsets = np.cumsum([0, *(group.rows * len(group.numbers) for group in self.groups)])
-        self._assemble()
+        self._assemble_matrices()
         self._make_ends()
         self._map_jacobian()
         self._map_ends()
@@ -224,7 +224,7 @@ class Program:
         return value / self.problem.functions.mechanism.total_mass if goal.divide_by_mass else value
 
     # ------------------------------------------------------------------------------------------ constant parts
-    def _assemble(self) -> None:
+    def _assemble_matrices(self) -> None:
         """Assemble A and B and the labels of their rows; the rows of the integrals follow those of g."""
         grid = self.problem.grid
         layout = self.layout
@@ -364,7 +364,7 @@ class Program:
                 rows = np.full(len(results), self._row_count + k)
                 entries_b.append((rows, results, weights))
 
-    def _entries(self, rows: str, columns: str) -> tuple[Array, Array]:
+    def _list_entries(self, rows: str, columns: str) -> tuple[Array, Array]:
         """Return rows and columns of the derivatives of all points.
 
         Args:
@@ -395,7 +395,7 @@ class Program:
     def _map_jacobian(self) -> None:
         """Make the sparse map from the Jacobians of the points to that of A w + B F, and the part of A."""
         width = len(self.layout.lower)
-        rows, columns = self._entries("jacobian_rows", "jacobian_columns")
+        rows, columns = self._list_entries("jacobian_rows", "jacobian_columns")
         # An entry of a point's Jacobian appears once in each row of B F that contains its result of
         # F.
         point_entries = self._b.select_columns(rows.astype(np.int64))
@@ -459,11 +459,11 @@ class Program:
             self._time_data[key] = np.vstack([times[None], *values]).T
         return self._time_data[key]
 
-    def _point_arguments(self, group: PointGroup, w: Array) -> list[Array]:
+    def _make_point_arguments(self, group: PointGroup, w: Array) -> list[Array]:
         """Return the arguments of F for a group of points, one row per point."""
-        return self._arguments_at(w, self.problem.grid.fractions[group.numbers], w[group.columns])
+        return self._make_arguments(w, self.problem.grid.fractions[group.numbers], w[group.columns])
 
-    def _arguments_at(self, w: Array, fractions: Array, z: Array) -> list[Array]:
+    def _make_arguments(self, w: Array, fractions: Array, z: Array) -> list[Array]:
         """Return the arguments of F at fractions of time (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + fractions * (w[1] - w[0])
@@ -483,12 +483,12 @@ class Program:
         """
         return np.concatenate(
             [
-                getattr(group, name)(*self._point_arguments(group, w))[0].ravel()
+                getattr(group, name)(*self._make_point_arguments(group, w))[0].ravel()
                 for group in self.groups
             ]
         )
 
-    def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
+    def _make_end_arguments(self, w: Array, totals: Array) -> list[Array]:
         """Return the arguments of E for variables w and integrals `totals`."""
         time_data = self._sample_time_functions(w[:2])
         first_variables = self.layout.point_indices[0]
@@ -512,7 +512,7 @@ class Program:
             Parts of f in the order of `costs`, and g (m,).
         """
         rows = self._compute_rows(w)
-        costs, end_rows = self._end_value(*self._end_arguments(w, rows[self._row_count :]))
+        costs, end_rows = self._end_value(*self._make_end_arguments(w, rows[self._row_count :]))
         return costs.ravel(), np.concatenate([rows[: self._row_count], end_rows.ravel()])
 
     def compute_slopes(self, w: Array) -> tuple[Array, Array]:
@@ -545,7 +545,9 @@ class Program:
             self._jacobian_rows[is_integral] - self._row_count, self._jacobian_columns[is_integral]
         ] = numbers[is_integral]
         totals = self._compute_rows(w)[self._row_count :]
-        cost, end_slopes = (matrix.T for matrix in self._end_slope(*self._end_arguments(w, totals)))
+        cost, end_slopes = (
+            matrix.T for matrix in self._end_slope(*self._make_end_arguments(w, totals))
+        )
         # The chain rule: E depends on variables directly, and by the integrals.
         gradient = cost.ravel()[direct:] @ integrals
         gradient[self.end_columns] += cost.ravel()[:direct]

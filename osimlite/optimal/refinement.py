@@ -298,7 +298,9 @@ class _SolutionPolynomials:
         count = len(layout.names["states"])
         rates = np.zeros((len(grid.fractions), count))
         for group in program.groups:
-            rates[group.numbers] = group.value(*program._point_arguments(group, w))[0][:, :count]
+            rates[group.numbers] = group.value(*program._make_point_arguments(group, w))[0][
+                :, :count
+            ]
         self.rates = rates[points[:, node_indices]]
         self._lines = program.problem.solver.interpolate_control_mesh_interior_points
         self._values = {

@@ -195,7 +195,7 @@ def _read_coordinate_motion(
         strict=True,
     )
 
-    def states() -> Iterator[tuple[float, list[float]]]:
+    def yield_states() -> Iterator[tuple[float, list[float]]]:
         for number, (t, q, u) in enumerate(rows):
             y = simulation.state.pack(q.tolist(), u.tolist())
             for index, column in auxiliary_columns.items():
@@ -205,7 +205,7 @@ def _read_coordinate_motion(
     first_row = int(np.searchsorted(complete_motion.times, recorded.times[0]))
     return (
         first_row,
-        states(),
+        yield_states(),
         lambda: (
             (complete_motion.times, complete_motion.rates[0]) if speeds_path is None else record
         ),

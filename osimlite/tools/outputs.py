@@ -68,7 +68,8 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
 def _create_frame_reader(quantity: str) -> Reader:
     """Return a reader of the position, velocity or acceleration of a frame."""
 
-    def read(motion: Motion, frame: Frame, path: str) -> Array:
+    def read_frame(motion: Motion, frame: Frame, path: str) -> Array:
+        """Return the quantity of a frame (t, k) in ground."""
         body, placed = motion.mechanism.placement(path)
         turning = motion.links.get_angular_motion(body)
         moving = motion.links.compute_point_motion(body, placed[:3, 3])
@@ -82,7 +83,7 @@ def _create_frame_reader(quantity: str) -> Reader:
             "acceleration": lambda: np.hstack((turning[1], moving[2])),
         }[quantity]()
 
-    return read
+    return read_frame
 
 
 def _create_station_reader(derivative_order: int) -> Reader:
@@ -92,7 +93,7 @@ def _create_station_reader(derivative_order: int) -> Reader:
         derivative_order: 0 for the position, 1 for the velocity, 2 for the acceleration.
     """
 
-    def read(motion: Motion, station: Station | PathPoint, path: str) -> Array:
+    def read_station(motion: Motion, station: Station | PathPoint, path: str) -> Array:
         tree = motion.model.tree()
         holder = tree.parent_of(station)
         if isinstance(holder, PathPoint):
@@ -103,7 +104,7 @@ def _create_station_reader(derivative_order: int) -> Reader:
         point = placed[:3, :3] @ np.array(station.location, dtype=float) + placed[:3, 3]
         return motion.links.compute_point_motion(body, point)[derivative_order]
 
-    return read
+    return read_station
 
 
 def _create_momentum_reader(about_origin: bool, components: slice) -> Reader:
@@ -114,7 +115,8 @@ def _create_momentum_reader(about_origin: bool, components: slice) -> Reader:
         components: components to return, angular part first.
     """
 
-    def read(motion: Motion, body: Body, path: str) -> Array:
+    def read_momentum(motion: Motion, body: Body, path: str) -> Array:
+        """Return the momentum of a body (t, k), N m s and N s."""
         index, _ = motion.mechanism.placement(path)
         mass = motion.mechanism.bodies[index].mass_properties
         rotation, origin = motion.links.locate_frame(index, np.eye(4))
@@ -131,20 +133,20 @@ def _create_momentum_reader(about_origin: bool, components: slice) -> Reader:
             angular = angular + np.cross(center - origin, linear)
         return np.hstack((angular, linear))[:, components]
 
-    return read
+    return read_momentum
 
 
 def _create_system_reader(name: str) -> Reader:
     """Return a reader of a quantity of all bodies together."""
 
-    def read(motion: Motion, model: Model, path: str) -> Array:
+    def read_total(motion: Motion, model: Model, path: str) -> Array:
         mechanism = motion.mechanism
         rows = []
         for q, u, udot in zip(motion.values, motion.speeds, motion.accelerations, strict=True):
             rows.append(np.atleast_1d(SYSTEM_OUTPUTS[name](mechanism, q, u, udot)))
         return np.array(rows)
 
-    return read
+    return read_total
 
 
 def _compute_central_momentum(mechanism: Any, q: Array, u: Array) -> Array:
@@ -200,15 +202,15 @@ def _read_potential_energy(motion: Motion, model: Model, path: str) -> Array:
 def _read_force_energy(motion: Motion, force: Force, path: str) -> Array:
     """Return the potential energy of a force, J."""
 
-    def compute(part: Motion) -> Array:
+    def compute_energies(part_motion: Motion) -> Array:
         # A muscle without equilibrium stores an unknown energy.
-        if path in part.left_out:
-            return np.full((len(part.times), 1), np.nan)
+        if path in part_motion.left_out:
+            return np.full((len(part_motion.times), 1), np.nan)
         return np.array(
-            [part.system.compute_stored_energy(path, t, y) for t, y in part.moments]
+            [part_motion.system.compute_stored_energy(path, t, y) for t, y in part_motion.moments]
         ).reshape(-1, 1)
 
-    return motion.compute_by_parts(compute)
+    return motion.compute_by_parts(compute_energies)
 
 
 def _create_record_reader(name: str) -> Reader:
@@ -219,10 +221,10 @@ def _create_record_reader(name: str) -> Reader:
 def _create_path_reader(name: str) -> Reader:
     """Return a reader of the length (m) or lengthening speed (m/s) of an actuator's path."""
 
-    def read(motion: Motion, geometry: GeometryPath, path: str) -> Array:
+    def read_path(motion: Motion, geometry: GeometryPath, path: str) -> Array:
         return motion.read_records([path.rpartition("/")[0]], name)[name]
 
-    return read
+    return read_path
 
 
 def _read_power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
@@ -236,25 +238,25 @@ def _read_power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
 def _read_excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
     """Return the excitation of a muscle; NaN while the muscle is off."""
 
-    def compute(part: Motion) -> Array:
-        names = part.simulation.forces.controls.names
+    def compute_excitations(part_motion: Motion) -> Array:
+        names = part_motion.simulation.forces.controls.names
         # A muscle that is off has no control.
         if path not in names:
-            return np.full((len(part.times), 1), np.nan)
-        return part.evaluate_kernels([part.system.control_offsets[names.index(path)]])
+            return np.full((len(part_motion.times), 1), np.nan)
+        return part_motion.evaluate_kernels([part_motion.system.control_offsets[names.index(path)]])
 
-    return motion.compute_by_parts(compute)
+    return motion.compute_by_parts(compute_excitations)
 
 
 def _create_reaction_reader(side: str) -> Reader:
     """Return a reader of moment and force on one side of a joint, at the joint's frame there."""
 
-    def read(motion: Motion, joint: Joint, path: str) -> Array:
+    def read_reaction(motion: Motion, joint: Joint, path: str) -> Array:
         force, moment, _ = JointWrenches.compute_along(motion).get_reaction(joint, side)
         # OpenSim's SpatialVec has the moment first.
         return np.hstack((moment, force))
 
-    return read
+    return read_reaction
 
 
 def _read_joint_power(motion: Motion, joint: Joint, path: str) -> Array:

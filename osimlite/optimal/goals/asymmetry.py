@@ -41,6 +41,7 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
     feet = [_find_foot(goal, problem, group) for group in groups]
 
     def integrand(point: PointSymbols) -> Formula:
+        """Return -1 in a right step, 1 in a left step, with smooth transitions."""
         forces = point.output("contact_forces")
         contacts = []
         positions = []
@@ -123,7 +124,7 @@ def get_component(direction: str, vector: Sequence[Formula] | Formula) -> Formul
 
 
 def smooth_step(value: Formula, center: float, half_height: float, sharpness: float) -> Formula:
-    """Return ``middle + half * tanh(sharpness * value)``, a smooth step at zero.
+    """Return ``center + half_height * tanh(sharpness * value)``, a smooth step at zero.
 
     Args:
         value: argument of the step.

@@ -167,6 +167,7 @@ def build_output_formula(
         raise problem.invalid_error(owner, f"the output has no component output_index {index}")
 
     def value(point: PointSymbols) -> Formula:
+        """Return the number that the property `operation` makes of the outputs at a point."""
         values = [formula(point, path) for _, (formula, path) in outputs]
         if index >= 0:
             values = [column[index] for column in values]

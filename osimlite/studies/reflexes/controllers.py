@@ -413,6 +413,7 @@ class Reflexes:
         source = node.text("source", target if reflex_type.is_own else None)
 
         def format_name(name: str) -> str:
+            """Return the name of a target or source as SCONE writes it in names of parameters."""
             # SCONE names parameters by target and source: symmetric ones without the side of the
             # reflex, with "_o" for the opposite leg; others with the full name.
             stem = name[:-2] if name.endswith((*SIDES, OTHER_SIDE_SUFFIX)) else name

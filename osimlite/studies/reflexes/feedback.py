@@ -113,7 +113,7 @@ class Feedback:
             model: model that the controller will drive.
             engine: engine of the model.
         """
-        _, _, parameters = self._read(model, engine)
+        _, _, parameters = self._read_controller(model, engine)
         requested = parameters.requested.values()
         values = self._values
         return [
@@ -139,7 +139,9 @@ class Feedback:
             for name, x in self._values.items()
         )
 
-    def _read(self, model: Model, engine: Any) -> tuple[SensedModel, Reflexes, Parameters]:
+    def _read_controller(
+        self, model: Model, engine: Any
+    ) -> tuple[SensedModel, Reflexes, Parameters]:
         """Read the controller for a model; return the sensors, the reflexes and the parameters."""
         sensed = SensedModel(model, engine, 1, self.step, self._legs)
         parameters = Parameters(self._values)
@@ -163,7 +165,7 @@ class Feedback:
             OsimliteError: the model lacks something that a reflex names, or a value belongs to no
                 parameter.
         """
-        sensed, reflexes, parameters = self._read(model, engine)
+        sensed, reflexes, parameters = self._read_controller(model, engine)
         plan, numbers = reflexes.pack()
         # Controls without reflexes are left to other sources, unless there is base noise, which acts
         # on all controls. Proportional noise of a control that is 0 is 0.

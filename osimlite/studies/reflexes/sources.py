@@ -177,6 +177,7 @@ def _select_point_factory(quantity: str, source_type: int) -> SourceFactory:
     """
 
     def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+        """Return the sensor of the position or velocity of a point along a direction."""
         offset = node.vector("offset", "0 0 0")
         direction = node.vector("direction")
         if not direction.any():

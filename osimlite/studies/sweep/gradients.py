@@ -139,7 +139,7 @@ class Gradients:
 
         dy = differentiate([neighbour.start for neighbour in neighbours_of_center]).T
         dx = differentiate([neighbour.variant.numbers for neighbour in neighbours_of_center]).T
-        runs = self._run(center)
+        runs = self._simulate_neighbour(center)
         steps, (times, states) = (
             self._get_tangent_steps(center.variant),
             self._record_motion(center),
@@ -199,7 +199,7 @@ class Gradients:
             values, variant, self._variants.place_states(variant.engine, [variant], start[None])[0]
         )
 
-    def _run(self, neighbour: _Neighbour) -> Runs:
+    def _simulate_neighbour(self, neighbour: _Neighbour) -> Runs:
         """Simulate one model from its initial state."""
         plan = self._plan
         return run_many(

@@ -360,12 +360,12 @@ class _Evaluations:
         result = zip(
             zip(*values, strict=True), columns["status"], columns[self.objective], strict=True
         )
-        self._note(columns["status"], columns["reason"])
+        self._note_failure(columns["status"], columns["reason"])
         self._history += [(list(row), status, value) for row, status, value in result]
         # All rows of the history count, even if the budget is smaller than before.
         self.budget = max(self.budget, len(self._history))
 
-    def _note(self, status: Sequence[str], reasons: Sequence[str | None]) -> None:
+    def _note_failure(self, status: Sequence[str], reasons: Sequence[str | None]) -> None:
         """Keep the first reason of a failure."""
         failed = (
             reason
@@ -401,7 +401,7 @@ class _Evaluations:
         # Points beyond the history are simulated.
         new_values = values[len(evaluated) :]
         if len(new_values):
-            evaluated = evaluated + self._run(new_values, self.count + len(evaluated))
+            evaluated = evaluated + self._run_samples(new_values, self.count + len(evaluated))
         costs = [self._compute_cost(status, value) for _, status, value in evaluated]
         for number, (cost, row) in enumerate(zip(costs, values.tolist(), strict=True)):
             _, status, value = evaluated[number]
@@ -456,7 +456,9 @@ class _Evaluations:
         self.worst = max(self.worst, cost)
         return cost
 
-    def _run(self, values: Floats, first_number: int) -> list[tuple[list[float], str, float]]:
+    def _run_samples(
+        self, values: Floats, first_number: int
+    ) -> list[tuple[list[float], str, float]]:
         """Run samples (k, v) on the pool, and save them.
 
         Returns:
@@ -474,7 +476,7 @@ class _Evaluations:
             np.full(len(values), self.batches),
         )
         self.partial.add([*numbers, *values.T, *block.columns])
-        self._note(block.status, block.reasons)
+        self._note_failure(block.status, block.reasons)
         return list(
             zip(values.tolist(), block.status, block.measures[self.objective].tolist(), strict=True)
         )

@@ -213,13 +213,13 @@ class PartialTable:
             try:
                 self.stream = open_to_append(self.partial)
                 if is_there:
-                    self._reopen()
+                    self._reopen_file()
                 else:
                     # The schema is the first record, so that a resumed sweep can check its
                     # settings.
                     self._write_batch(table)
             except BaseException:
-                self._release()
+                self._release_file()
                 raise
         except OSError as error:
             raise OsimliteError(
@@ -308,9 +308,9 @@ class PartialTable:
 
     def close(self) -> None:
         """Close and unlock the partial file; it is removed if it has no rows."""
-        self._release(removing=self.rows == 0)
+        self._release_file(removing=self.rows == 0)
 
-    def _release(self, *, removing: bool = False) -> None:
+    def _release_file(self, *, removing: bool = False) -> None:
         """Close the file, remove it if requested, and release the lock."""
         with suppress(OSError, AttributeError):
             # The user has been told about a full disk already; and there may be no stream yet.
@@ -325,7 +325,7 @@ class PartialTable:
                 Path(self._lock.lock_file).unlink()
             self._lock.release()
 
-    def _reopen(self) -> None:
+    def _reopen_file(self) -> None:
         """Check the settings, count the rows, and cut off damaged records."""
         pa = _load_arrow()
         first_record = next(_read_records(self.partial), None)
@@ -347,7 +347,7 @@ class PartialTable:
                 f"the interrupted work in '{self.partial}' has other settings: {join_words(differences) or 'its columns'}; "
                 "ask for the same as before, or remove that file"
             )
-        end = _read_batches(self.partial, self._count)
+        end = _read_batches(self.partial, self._count_rows)
         if end < self.partial.stat().st_size:
             _log.warning(
                 "'%s' is damaged or cut off after the first %s; the rest is computed again",
@@ -357,7 +357,7 @@ class PartialTable:
             # New records must follow an intact one, or they could not be read.
             os.truncate(self.partial, end)
 
-    def _count(self, batch: Any) -> None:
+    def _count_rows(self, batch: Any) -> None:
         """Count the rows of a record."""
         self.rows += batch.num_rows
 

@@ -226,10 +226,10 @@ class _Dispatcher:
                 self._record_block(block)
                 is_last = not self.under_way and self.next >= self.samples.count
                 if is_last or time.monotonic() - self.last_saved > SAVE_SECONDS:
-                    self._save()
+                    self._save_rows()
         # Also Ctrl-C: results so far are worth keeping.
         except BaseException:
-            self._save()
+            self._save_rows()
             raise
 
     def _submit_tasks(self) -> None:
@@ -279,7 +279,7 @@ class _Dispatcher:
             self.progress(finished_count, self.samples.count)
 
     @defer_sigint()
-    def _save(self) -> None:
+    def _save_rows(self) -> None:
         """Write the rows before which no row is missing."""
         values: list[Floats] = []
         blocks: list[Block] = []

@@ -200,7 +200,7 @@ class Runner:
         starts = self.variants.place_states(
             engine, variants, np.stack([sample.start for sample in group])
         )
-        runs, endings = self._simulate(engine, observers, variants, starts)
+        runs, endings = self._simulate_batch(engine, observers, variants, starts)
         for number, sample in enumerate(group):
             block.status[sample.place], block.reasons[sample.place] = endings[number]
             block.times[sample.place] = runs.times[number]
@@ -253,7 +253,7 @@ class Runner:
                 )
 
     # --------------------------------------------------------------------------------------------- motions
-    def _simulate(
+    def _simulate_batch(
         self, engine: Any, observers: _Observers, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
         """Simulate a batch of models of one structure from their initial states (W, y)."""

@@ -161,7 +161,7 @@ class TrialFolder:
             model: file of the model.
         """
 
-        def read() -> RecordedMotion:
+        def build_motion() -> RecordedMotion:
             table = self.read_table(file)
             # A repeated time has no slope: splines and filters need increasing times.
             is_later = np.diff(np.maximum.accumulate(table.times), prepend=-np.inf) > 0.0
@@ -170,7 +170,7 @@ class TrialFolder:
             )
             return RecordedMotion.from_table(self.build_mechanism(model), increasing_table)
 
-        return self.compute_once(("motion", file, model), read)
+        return self.compute_once(("motion", file, model), build_motion)
 
     def read_loads(self, file: Path) -> tuple[ExternalLoads, StoTable]:
         """Return measured loads and their data; cached.
@@ -179,14 +179,14 @@ class TrialFolder:
             Document of the loads, and table of their data.
         """
 
-        def read() -> tuple[ExternalLoads, StoTable]:
+        def read_files() -> tuple[ExternalLoads, StoTable]:
             document = read_object(file, ExternalLoads)
             data = self.find_file(file.parent / document.datafile.strip())
             if data is None:
                 raise MissingInput(f"'{document.datafile}' is missing, the data of '{file}'")
             return document, self.read_table(data)
 
-        return self.compute_once(("loads", file), read)
+        return self.compute_once(("loads", file), read_files)
 
     def locate_row(self, file: Path, row: int) -> Position:
         """Return the position of a row of a table in its file."""
