@@ -180,6 +180,18 @@ def test_motions_and_tangents_are_the_same_bits(kernels, tmp_path):
     assert all(other == first for other in others), results
 
 
+@pytest.mark.skipif(len(compilers()) < 1, reason="needs g++ or clang++ on the PATH")
+def test_motions_are_those_of_numba(kernels, tmp_path):
+    pytest.importorskip("numba", reason="needs numba (extra 'jit')")
+    library = build_kernels(kernels, tmp_path, compilers()[0], "-O2")
+    # Numba has no derivatives of kernels.
+    compiled = json.loads(run_module(motions.__name__, library, MOTIONS, 0))["motions"]
+    variables = {"OSIMLITE_KERNELS": "numba", "NUMBA_CACHE_DIR": str(tmp_path)}
+    by_numba = run_module(motions.__name__, "-", MOTIONS, 0, env={**os.environ, **variables})
+    assert len(compiled) >= MOTIONS
+    assert json.loads(by_numba)["motions"] == compiled
+
+
 @pytest.mark.skipif(not shutil.which("g++"), reason="needs g++ on the PATH")
 @pytest.mark.parametrize("name", SANITIZERS)
 def test_motions_have_no_undefined_behaviour(kernels, tmp_path, name):
