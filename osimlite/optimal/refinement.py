@@ -146,7 +146,7 @@ def solve_with_refinement(
         finer = _rebuild_program(program.problem, mesh, refinement.hessian)
         guess = interpolate_solution(program, result.w, finer)
         program = finer
-        result = search(program, guess, tell, near=True)
+        result = search(program, guess, tell, is_warm_start=True)
 
 
 def check_refinable(problem: Problem) -> None:

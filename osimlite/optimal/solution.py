@@ -141,7 +141,9 @@ def build_problem(
     if isinstance(study, MocoStudy):
         return Problem(study, folder=None if folder is None else Path(folder), scaled=scaled)
     with name_file_in_errors(study):
-        study_object: Any = read_document(Source.from_file(Path(study)), of=MocoStudy).top
+        study_object: Any = read_document(
+            Source.from_file(Path(study)), expected_class=MocoStudy
+        ).top
         return Problem(study_object, Path(study), scaled=scaled)
 
 

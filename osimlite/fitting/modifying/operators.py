@@ -306,7 +306,8 @@ def _replace_with_function_paths(
 ) -> None:
     """Replace paths by the function-based paths of a file."""
     path_set = read_document(
-        Source.from_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
+        Source.from_file(folder / operator.paths_file.strip()),
+        expected_class=p.FunctionBasedPathSet,
     ).top
     replace_paths(model, path_set.objects)
 
