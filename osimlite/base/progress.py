@@ -70,7 +70,7 @@ def divide_rows(title: str, count: int, unit: str = " frames") -> Iterator[slice
         unit: what the rows are, with a blank before it.
 
     Yields:
-        Slices that cover all rows; one empty slice if there are none.
+        Slices that cover all rows; one empty slice if there is no row.
     """
     start, size = 0, FIRST_ROWS
     while True:

@@ -77,7 +77,7 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
     for entry in entries:
         if now - entry.used <= UNUSED_DAYS * DAY_S and total <= target_bytes:
             break
-        removed += _remove(entry)
+        removed += _remove_entry(entry)
         total -= entry.size
     return removed
 
@@ -102,7 +102,7 @@ def _leads_elsewhere(parent: str, name: str) -> bool:
     return os.path.realpath(path) != os.path.join(os.path.realpath(parent), name)
 
 
-def _remove(entry: _Entry) -> bool:
+def _remove_entry(entry: _Entry) -> bool:
     """Remove an entry unless its folder has become a link meanwhile; return whether it was removed.
 
     Returns:

@@ -16,7 +16,7 @@ _SIZES = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 class Quantity(NamedTuple):
-    """Number with its unit; the unit is None if the user wrote only a number."""
+    """Number with its unit, or with None if the user wrote no unit."""
 
     number: float
     unit: str | None

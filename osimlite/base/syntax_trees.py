@@ -25,7 +25,7 @@ def parse_module(text: str) -> ast.Module:
     Raises:
         SyntaxError: the text is not Python.
     """
-    return _parse(lambda: ast.parse(text))
+    return _parse_with_retries(lambda: ast.parse(text))
 
 
 def parse_expression(text: str) -> ast.Expression:
@@ -35,12 +35,12 @@ def parse_expression(text: str) -> ast.Expression:
         SyntaxError: the text is not an expression of Python, or nests too deeply.
     """
     try:
-        return _parse(lambda: ast.parse(text, mode="eval"))
+        return _parse_with_retries(lambda: ast.parse(text, mode="eval"))
     except (RecursionError, MemoryError):
         raise SyntaxError("the expression nests too deeply") from None
 
 
-def _parse(parse: Callable[[], _Tree]) -> _Tree:
+def _parse_with_retries(parse: Callable[[], _Tree]) -> _Tree:
     """Return the result of `parse`, one thread at a time, again if it was disturbed."""
     for _ in range(MAX_ATTEMPTS - 1):
         try:

@@ -100,7 +100,7 @@ class BvhMotion:
                 else:
                     # Channels are applied from left to right, each in the axes that the previous
                     # ones have turned.
-                    rotation = rotation @ _rotate(axis, np.radians(self.values[:, column]))
+                    rotation = rotation @ _make_rotations(axis, np.radians(self.values[:, column]))
                 column += 1
             if joint.parent >= 0:
                 above = rotations[:, joint.parent]
@@ -110,7 +110,7 @@ class BvhMotion:
         return rotations, positions
 
 
-def _rotate(axis: int, angles: Array) -> Array:
+def _make_rotations(axis: int, angles: Array) -> Array:
     """Return rotations (n, 3, 3) about a coordinate axis by angles (n,), rad."""
     # The two other axes in cyclic order make a right-handed rotation.
     i, j = ((1, 2), (2, 0), (0, 1))[axis]

@@ -179,7 +179,7 @@ def list_coordinates(model: Model) -> list[Coordinate]:
         edges = children.setdefault(parent, []) if parent in bodies and parent else roots
         edges.append((joint, child))
     # Nimble keeps the largest tree.
-    joints = max((_walk(children, root) for root in roots), key=len, default=[])
+    joints = max((_list_tree_joints(children, root) for root in roots), key=len, default=[])
     if model.document_version < JOINT_SET_VERSION:
         selected = {id(joint) for joint in joints}
         joints = [
@@ -194,7 +194,9 @@ def list_coordinates(model: Model) -> list[Coordinate]:
     ]
 
 
-def _walk(children: dict[str, list[tuple[Joint, str]]], root: tuple[Joint, str]) -> list[Joint]:
+def _list_tree_joints(
+    children: dict[str, list[tuple[Joint, str]]], root: tuple[Joint, str]
+) -> list[Joint]:
     """Return the joints of a tree depth-first."""
     result: list[Joint] = []
     waiting, visited = [root], set[str]()

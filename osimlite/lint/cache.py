@@ -51,7 +51,7 @@ class Cache:
         try:
             # Entries may be damaged or made by someone else, hence each value is checked before it
             # is used.
-            match json.loads(read_file(self._entry(file))):
+            match json.loads(read_file(self._get_entry_path(file))):
                 case {
                     "key": str(cached_key),
                     "text": [*text],
@@ -62,7 +62,7 @@ class Cache:
                 }:
                     stamps = dict(map(_parse_outside, outside_stamps))
                     if cached_key != key or any(
-                        self._stamp(path) != stamp for path, stamp in stamps.items()
+                        self._get_stamp(path) != stamp for path, stamp in stamps.items()
                     ):
                         return None
                     why_not = _check_types(why_not, *[_TEXT] * len(why_not))
@@ -76,7 +76,7 @@ class Cache:
                             return None
                         # With a new stamp, the next check need not read the text.
                         self.store(file, key, text, report, stamps, now)
-                    mark_used(self._entry(file))
+                    mark_used(self._get_entry_path(file))
                     return report
         # A damaged entry is no reason to fail: the file is checked again.
         except (OsimliteError, OSError, ValueError, TypeError, RecursionError):
@@ -102,13 +102,13 @@ class Cache:
             outside_paths: the paths at which the check looked for something.
             since: when the check began, ns.
         """
-        cache_path = self._entry(file)
+        cache_path = self._get_entry_path(file)
         try:
             entry = {
                 "key": key,
                 "file": _stamp_if_settled(file, since),
                 "text": text,
-                "outside": [(path, self._stamp(path)) for path in outside_paths],
+                "outside": [(path, self._get_stamp(path)) for path in outside_paths],
                 "findings": [_dump_finding(finding) for finding in report],
                 "unmeasured": report.unmeasured,
             }
@@ -116,12 +116,12 @@ class Cache:
             return
         write_cached(cache_path, json.dumps(entry, separators=(",", ":")))
 
-    def _entry(self, file: str) -> Path:
+    def _get_entry_path(self, file: str) -> Path:
         # The key contains the path too: of two files with the same checksum, the last one is cached.
         digest = f"{crc32(os.path.abspath(file).encode(errors='surrogateescape')):08x}"
         return self.folder / digest[:2] / f"{digest[2:]}.json"
 
-    def _stamp(self, path: str) -> Stamp:
+    def _get_stamp(self, path: str) -> Stamp:
         # Many models share their meshes.
         if path not in self._stamps:
             try:
@@ -225,6 +225,7 @@ def _parse_outside(values: Any) -> tuple[str, Stamp]:
 
 
 def _dump_finding(finding: Finding) -> list[object]:
+    """Return a finding as a list for JSON, without its file."""
     fix = finding.fix
     return [
         finding.code,

@@ -74,6 +74,7 @@ class Config:
 
 
 def _check_thresholds(thresholds: Mapping[str, float]) -> None:
+    """Raise an error for an unknown threshold, or for a value that is not a number of 0 or more."""
     from osimlite.base.text import suggest_name
     from osimlite.lint.registry import all_rules
 

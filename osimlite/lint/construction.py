@@ -141,7 +141,7 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
             f"{NEEDS_SIM} ({' and '.join(missing)} is not installed); run: pip install "
             "'osimlite[sim]'"
         )
-    key = None if subject.source is None else _digest(subject)
+    key = None if subject.source is None else _compute_digest(subject)
     obstacles = _memory.get(key) if key is not None else None
     if obstacles is None:
         if not anew:
@@ -163,13 +163,14 @@ def obstacles_of(subject: Subject, *stages: Stage) -> list[Obstacle]:
     return [obstacle for obstacle in obstacles if obstacle.stage in stages]
 
 
-def _digest(subject: Subject) -> str:
+def _compute_digest(subject: Subject) -> str:
     # Meshes and tables beside the model may be others in another folder.
     text = f"{subject.folder}\n".encode("utf-8", "replace") + subject.data
     return blake2b(text, digest_size=16).hexdigest()
 
 
 def _try_construction(subject: Subject) -> list[Obstacle]:
+    """Return the obstacles that the builder meets; cache the mechanism that it makes."""
     from osimlite.schema.tree import lend_tree
 
     assert subject.model is not None

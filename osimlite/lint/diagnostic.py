@@ -134,7 +134,7 @@ MAX_LINE_LENGTH = 160
 """Letters of a finding in the text of a report."""
 
 
-def _shorten(line: str) -> str:
+def _shorten_line(line: str) -> str:
     """Return a line without what is beyond the most letters."""
     return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 3]}..."
 
@@ -148,7 +148,7 @@ class Report:
         texts: text of each file with findings, for the snippets of a reporter.
         checked: number of files.
         known: number of findings that a baseline left out.
-        unmeasured: for each file of which some rules were not measured, a sentence with its name, the
+        unmeasured: for each file where some rules were not measured, a sentence with its name, the
             rules and the reason.
         passed: files of a folder that were skipped because they are not OpenSim's.
     """
@@ -168,7 +168,7 @@ class Report:
         lines = [f"Report: {counts} in {format_count(self.checked, 'file')}"]
         # The sort is stable: equal severities keep the order of the files.
         ranked = sorted(self.findings, key=lambda finding: finding.severity.rank)
-        lines += [_shorten(str(finding)) for finding in ranked[:MAX_LISTED]]
+        lines += [_shorten_line(str(finding)) for finding in ranked[:MAX_LISTED]]
         if (hidden_count := len(ranked) - MAX_LISTED) > 0:
             lines.append(f"... and {format_count(hidden_count, 'finding')} more")
         return "\n".join(lines)

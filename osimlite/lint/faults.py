@@ -42,10 +42,10 @@ class RuleFault(NamedTuple):
         return (
             f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is "
             f"one of the group `{group}`.\n\n## Why is this bad\n{reason}\n\n## "
-            f"Example\n{self._example('+')}\n\n## Use instead\n{self._example('-')}"
+            f"Example\n{self._format_example('+')}\n\n## Use instead\n{self._format_example('-')}"
         )
 
-    def _example(self, left_out: str) -> str:
+    def _format_example(self, left_out: str) -> str:
         lines = [line[2:] for line in self.lines if line[0] != left_out]
         before, _, after = self.frame.partition("{}\n")
         before, start, margin = before.rpartition("\n")

@@ -157,7 +157,7 @@ def select_edits(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[
         if fix is None or not (fix.safe or unsafe):
             continue
         # Of overlapping fixes the first wins; a second run of the fixes applies the others.
-        if any(_touches(edit, chosen) for edit in fix.edits):
+        if any(_overlaps_any(edit, chosen) for edit in fix.edits):
             continue
         for edit in fix.edits:
             insort(chosen, edit, key=_get_start)
@@ -169,7 +169,7 @@ def _get_start(edit: Edit) -> int:
     return edit.start
 
 
-def _touches(edit: Edit, chosen: list[Edit]) -> bool:
+def _overlaps_any(edit: Edit, chosen: list[Edit]) -> bool:
     """Return whether an edit overlaps one of some sorted, disjoint edits."""
     # The edits are disjoint and sorted, so only the last one that starts before this edit's end can
     # overlap it.

@@ -112,6 +112,7 @@ def resolve_folder(folder: str) -> Path:
 
 
 def _check_jobs(jobs: list[CheckJob], processes: int | None) -> Iterator[tuple[CheckJob, Report]]:
+    """Yield each job with its report, in the order of the jobs, from one or several processes."""
     if not jobs:
         return
     if processes is None:

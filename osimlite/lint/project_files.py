@@ -96,12 +96,12 @@ def is_root(tag: str) -> bool:
     """Return whether a root tag is OpenSim's: of a document, or of a setup of an old release."""
     if find_misspelt_name(tag, ["OpenSimDocument"]) is not None:
         return True
-    name = _class_name(tag)
+    name = _find_class_name(tag)
     return name is not None and _TOP.fullmatch(name) is not None
 
 
 @cache
-def _class_name(tag: str) -> str | None:
+def _find_class_name(tag: str) -> str | None:
     """Return the class that a tag means, even if it is misspelt or an old name."""
     from osimlite.io.document.upgrade.class_names import RENAMED
     from osimlite.schema.registry import MODULES
@@ -114,7 +114,7 @@ def _class_name(tag: str) -> str | None:
 @cache
 def _is_property(owner: str, tag: str) -> bool:
     """Return whether an element is a property of its parent, and both are unlikely in other programs."""
-    name = _class_name(owner)
+    name = _find_class_name(owner)
     if name is None or not (_COMPOUND.search(name) or _COMPOUND.search(tag)):
         return False
     from osimlite.schema.registry import find_class

@@ -188,7 +188,7 @@ class RowScanner:
                         for index in indices:
                             self.examine_odd_line(lines[index], line + index)
                     elif self.rows.count:
-                        self._note("blank", 0, line + indices[0], 0, b"", times=len(indices))
+                        self._note_fault("blank", 0, line + indices[0], 0, b"", times=len(indices))
             line += len(lines)
         # Without rows every marker would be missing, which is not what is wrong with such a table.
         if not self.rows.count:
@@ -243,7 +243,7 @@ class RowScanner:
         for number, time in enumerate(times):
             # Only NaN differs from itself.
             if time != time:
-                self._note(
+                self._note_fault(
                     "time",
                     1,
                     line + number,
@@ -265,11 +265,11 @@ class RowScanner:
                 marker_cells = [part.strip() for part in cells[number : number + 3]]
                 is_present = [part.lower() not in (b"", b"nan") for part in marker_cells]
                 if any(is_present) and not all(is_present):
-                    self._note("part", number, line, start, cell)
+                    self._note_fault("part", number, line, start, cell)
                 # What is left after removing zeros, points and signs is empty for a marker exactly
                 # at the origin.
                 elif all(is_present) and not b"".join(marker_cells).strip(b"0.-+"):
-                    self._note("zero", number, line, start, cell)
+                    self._note_fault("zero", number, line, start, cell)
             start += len(cell) + 1
 
     def _count_missing_samples(self) -> int:
@@ -290,7 +290,7 @@ class RowScanner:
         text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
         if not text.strip():
             if self.rows.count:
-                self._note("blank", 0, line, 0, b"")
+                self._note_fault("blank", 0, line, 0, b"")
             return
         rows = self.rows
         # Comments in tables are not allowed by OpenSim; these are the signs that other programs
@@ -298,7 +298,7 @@ class RowScanner:
         if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (
             _LETTER.search(text) and not _OF_ROW.search(text)
         ):
-            self._note("comment", 0, line, 0, b"")
+            self._note_fault("comment", 0, line, 0, b"")
             return
         cells, count = self._split_cells(text)
         if count != self.cells:
@@ -310,7 +310,7 @@ class RowScanner:
                 and b"\t" not in text
                 and len(text.split(None, self.cells)) == self.cells
             )
-            self._note(
+            self._note_fault(
                 "row",
                 count,
                 line,
@@ -328,7 +328,7 @@ class RowScanner:
             elif number == time:
                 value = parse_number(cell)
                 if value != value:
-                    self._note("time", time, line, start, cell)
+                    self._note_fault("time", time, line, start, cell)
                 elif not value > self._get_last_time():
                     self._note_order(text, line, value, self._get_last_time())
             elif not (self.markers and cell.lower() in (b"", b"nan")):
@@ -336,7 +336,7 @@ class RowScanner:
                 if len(parts) != self.parts or any(
                     parse_number(part) != parse_number(part) for part in parts
                 ):
-                    self._note("cell", number, line, start, cell)
+                    self._note_fault("cell", number, line, start, cell)
         # A row of the right width counts even if cells are wrong, so that later times and lines
         # stay right.
         if count == self.cells > time:
@@ -381,18 +381,18 @@ class RowScanner:
         # Python refuses to convert integers of more than 4,300 digits.
         number = int(cell) if cell.isdigit() and len(cell) < 20 else None
         if number is None or (self._frame and number != self._frame + 1):
-            self._note("frame", 0, line, 0, cell)
+            self._note_fault("frame", 0, line, 0, cell)
         # After a wrong frame number the count continues from it: one shift is one finding.
         self._frame = number if number is not None else self._frame + 1
 
     def _note_order(self, text: bytes, line: int, time: float, previous_time: float) -> None:
         match = _WORD.search(text, text.find(b"\t") if self.markers else 0)
         start, word = (match.start(), match[0]) if match else (0, b"")
-        self._note(
+        self._note_fault(
             "order", int(time < previous_time), line, start, word, f"{time:.9g} {previous_time:.9g}"
         )
 
-    def _note(
+    def _note_fault(
         self,
         kind: str,
         number: int,
@@ -402,6 +402,7 @@ class RowScanner:
         text: str | None = None,
         times: int = 1,
     ) -> None:
+        """Record the first fault of a kind in a column, and count the later ones."""
         faults = self.rows.faults
         if (kind, number) in faults:
             # A fault in the same column is counted, not reported again.

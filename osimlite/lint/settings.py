@@ -81,6 +81,7 @@ def load_settings(folder: Path) -> Settings:
 
 
 def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
+    """Return the checked settings of a configuration file."""
     parse_max_file_size(file, table)
     for key in table:
         if key not in _SETTINGS:

@@ -53,7 +53,7 @@ class FileReference(NamedTuple):
 
 
 class Setup(Subject):
-    """Document whose top object is not a model. `top` is None if it cannot be read."""
+    """Document whose top object is not a model. An unreadable document has None as `top`."""
 
     about: ClassVar[str] = "document"
 

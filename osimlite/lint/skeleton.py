@@ -128,6 +128,7 @@ def grow_tree(subject: Subject) -> TreeGrowth:
 def _fails_to_build(
     subject: Subject, edges: list[_SkeletonEdge], order: dict[str, _SkeletonEdge]
 ) -> bool:
+    """Return whether OpenSim fails with the joints that it adds, since it adds them too late."""
     paths = [*order]
     last = max(index for index, edge in enumerate(order.values()) if edge.link is None)
     late = {*paths[:last]}

@@ -55,7 +55,7 @@ def cache_per_subject(
 
 
 class Subject(CheckTarget):
-    """Model under check. `source` is None for a model made in Python, `model` for an unreadable text.
+    """Model under check. A model made in Python has no `source`, an unreadable text has no `model`.
 
     `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is
     measured of it. If there was no machine code to measure it with, it `needs_remeasuring`: the next

@@ -45,7 +45,7 @@ def find_differences(old: Object, new: Object) -> list[Difference]:
     if isinstance(old, Model) and isinstance(new, Model):
         # Only models have a tree of components with paths.
         return list(_Comparison(old.tree(), new.tree()).run())
-    return list(_Comparison(None, None)._object(new.name or new.tag, "", old, new))
+    return list(_Comparison(None, None)._compare_objects(new.name or new.tag, "", old, new))
 
 
 class _Comparison:
@@ -56,6 +56,7 @@ class _Comparison:
         self.new = new
 
     def run(self) -> Iterator[Difference]:
+        """Yield the differences of two models: removed, changed, then added components."""
         assert self.old is not None and self.new is not None
         # What only the old model has comes first, then the differences of what both have, then
         # what only the new one has.
@@ -66,11 +67,11 @@ class _Comparison:
             # A component that only the new model has is reported below, once for its whole
             # subtree.
             if before is not None:
-                yield from self._object(path, "", before, component)
+                yield from self._compare_objects(path, "", before, component)
         for path in _find_missing_paths(self.new, self.old):
             yield Difference(path, "", None, _describe_type(self.new.by_path[path]))
 
-    def _object(
+    def _compare_objects(
         self, path: str, property_path: str, old: Object, new: Object
     ) -> Iterator[Difference]:
         """Compare two objects at the same position; `property_path` is the property that leads to them.
@@ -112,8 +113,8 @@ class _Comparison:
                 # References are compared by the components that they lead to: a path and a name
                 # can mean the same one.
                 names = (
-                    self._names(self.old, old, spec, old_value),
-                    self._names(self.new, new, spec, new_value),
+                    self._canonicalize_reference(self.old, old, spec, old_value),
+                    self._canonicalize_reference(self.new, new, spec, new_value),
                 )
                 if names[0] != names[1]:
                     yield Difference(path, child_path, *names)
@@ -140,7 +141,7 @@ class _Comparison:
         ):
             # Outside of models members have no paths, so match them by name.
             for name in dict.fromkeys([*old_names, *new_names]):
-                yield from self._pair(
+                yield from self._compare_pair(
                     path, f"{property_path}[{name}]", old_names.get(name), new_names.get(name)
                 )
             return
@@ -156,27 +157,29 @@ class _Comparison:
                 and old_object.name != new_object.name
             ):
                 yield Difference(path, f"{item_path}.name", old_object.name, new_object.name)
-            yield from self._pair(path, item_path, old_object, new_object)
+            yield from self._compare_pair(path, item_path, old_object, new_object)
 
-    def _pair(
+    def _compare_pair(
         self, path: str, property_path: str, old: Object | None, new: Object | None
     ) -> Iterator[Difference]:
-        """Compare two objects, either of which may be missing.
+        """Compare two objects; one of them may be missing.
 
         Yields:
             Differences of the objects.
         """
         if old is not None and new is not None:
-            yield from self._object(path, property_path, old, new)
+            yield from self._compare_objects(path, property_path, old, new)
         elif old is not None or new is not None:
             yield Difference(
                 path, property_path, old and _describe_type(old), new and _describe_type(new)
             )
 
-    def _names(self, tree: Tree | None, holder: Object, spec: FieldSpec, value: Any) -> Any:
+    def _canonicalize_reference(
+        self, tree: Tree | None, holder: Object, spec: FieldSpec, value: Any
+    ) -> Any:
         """Return a reference in canonical form: the path of its component if it leads to one."""
         if isinstance(value, tuple):
-            return tuple(self._names(tree, holder, spec, word) for word in value)
+            return tuple(self._canonicalize_reference(tree, holder, spec, word) for word in value)
         if value is None:
             return None
         assert isinstance(spec.kind, Reference)

@@ -62,7 +62,7 @@ class Facts(NamedTuple):
             body along its axes: OWN of the frame itself, HOLDER of the frame that holds the object,
             or that of a socket or coordinate, followed by the axis (x, y, z; MEAN; ALONG and ACROSS
             the Z axis of a surface; AXES for all three). PATH is the ratio of path lengths, and an
-            empty text is none. Missing entries are taken from the base.
+            empty text stands for no scaling. Missing entries are taken from the base.
     """
 
     states: str = ""

@@ -187,12 +187,12 @@ class Reference(FieldType):
                 raise ValueError(
                     f"expected a list of {self.target} components or their names, got {value!r}"
                 )
-            return tuple(self._one(item) for item in value)
+            return tuple(self._check_target(item) for item in value)
         if value is None and self.shape == "optional":
             return None
-        return self._one(value)
+        return self._check_target(value)
 
-    def _one(self, value: Any) -> Any:
+    def _check_target(self, value: Any) -> Any:
         if isinstance(value, str):
             return value
         names = {base.__name__ for base in type(value).__mro__}
@@ -366,6 +366,11 @@ def _check_instance(value: Any, accepts: type) -> Any:
 
 
 def _check_scalar(scalar: Scalar, value: Any) -> Any:
+    """Return a value in its stored form.
+
+    Raises:
+        ValueError: the value has another type.
+    """
     if scalar == "string":
         if isinstance(value, str):
             return value

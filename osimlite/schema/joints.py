@@ -102,7 +102,7 @@ class Joint(ModelComponent, abstract=True):
         return self
 
 
-def _coordinates(count: int) -> Any:
+def _make_coordinates_field(count: int) -> Any:
     """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out.
 
     Returns:
@@ -126,7 +126,7 @@ class PinJoint(Joint):
 
     moves = "rz"
 
-    coordinates: Many[Coordinate] = _coordinates(1)
+    coordinates: Many[Coordinate] = _make_coordinates_field(1)
 
 
 class SliderJoint(Joint):
@@ -134,7 +134,7 @@ class SliderJoint(Joint):
 
     moves = "tx"
 
-    coordinates: Many[Coordinate] = _coordinates(1)
+    coordinates: Many[Coordinate] = _make_coordinates_field(1)
 
 
 class PlanarJoint(Joint):
@@ -142,7 +142,7 @@ class PlanarJoint(Joint):
 
     moves = "rz tx ty"
 
-    coordinates: Many[Coordinate] = _coordinates(3)
+    coordinates: Many[Coordinate] = _make_coordinates_field(3)
 
 
 class UniversalJoint(Joint):
@@ -150,7 +150,7 @@ class UniversalJoint(Joint):
 
     moves = "rx ry"
 
-    coordinates: Many[Coordinate] = _coordinates(2)
+    coordinates: Many[Coordinate] = _make_coordinates_field(2)
 
 
 class GimbalJoint(Joint):
@@ -158,7 +158,7 @@ class GimbalJoint(Joint):
 
     moves = "rx ry rz"
 
-    coordinates: Many[Coordinate] = _coordinates(3)
+    coordinates: Many[Coordinate] = _make_coordinates_field(3)
 
 
 class BallJoint(Joint):
@@ -167,7 +167,7 @@ class BallJoint(Joint):
     moves = "rx ry rz"
     speeds_are_rates = False
 
-    coordinates: Many[Coordinate] = _coordinates(3)
+    coordinates: Many[Coordinate] = _make_coordinates_field(3)
 
 
 class FreeJoint(Joint):
@@ -176,7 +176,7 @@ class FreeJoint(Joint):
     moves = "rx ry rz tx ty tz"
     speeds_are_rates = False
 
-    coordinates: Many[Coordinate] = _coordinates(6)
+    coordinates: Many[Coordinate] = _make_coordinates_field(6)
 
 
 class EllipsoidJoint(Joint):
@@ -191,7 +191,7 @@ class EllipsoidJoint(Joint):
     moves = "rx ry rz"
     speeds_are_rates = False
 
-    coordinates: Many[Coordinate] = _coordinates(3)
+    coordinates: Many[Coordinate] = _make_coordinates_field(3)
     radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
     """Half axes of the ellipsoid along the axes of the parent frame."""
     appearance: Unnamed[Appearance] = make_default(Appearance)
@@ -213,7 +213,7 @@ class ScapulothoracicJoint(Joint):
     moves = "r r r r"
     speeds_are_rates = False
 
-    coordinates: Many[Coordinate] = _coordinates(4)
+    coordinates: Many[Coordinate] = _make_coordinates_field(4)
     thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (
         math.nan,
         math.nan,
@@ -235,7 +235,7 @@ class ConstantCurvatureJoint(Joint):
     facts = Facts(scales={"length": "socket_child_frame y"})
     moves = "r r r"
 
-    coordinates: Many[Coordinate] = _coordinates(3)
+    coordinates: Many[Coordinate] = _make_coordinates_field(3)
     neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Added to the coordinates: the shape of the rod where they are 0."""
     length: Annotated[float, real("m", "> 0")] = 1.0

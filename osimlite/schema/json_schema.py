@@ -76,6 +76,7 @@ def _list_classes() -> list[type[Object]]:
 
 
 def _make_definition(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
+    """Return the schema of the objects of one class."""
     properties: dict[str, Any] = {"class": {"const": cls.tag}, "name": {"type": "string"}}
     if cls.tag == "Model":
         properties["$schema"] = {"type": "string"}

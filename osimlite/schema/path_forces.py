@@ -16,7 +16,7 @@ from osimlite.schema.geometry import Appearance
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 
 
-def _green() -> Appearance:
+def _make_green_appearance() -> Appearance:
     return Appearance.build({"color": (0.0, 1.0, 0.0)}, set())
 
 
@@ -30,7 +30,7 @@ class PathSpring(ForceProducer):
     )
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
-        GeometryPath, name="path", appearance=_green
+        GeometryPath, name="path", appearance=_make_green_appearance
     )
     """The line along which the spring pulls."""
     resting_length: Annotated[float, real("m", ">= 0")] = math.nan
@@ -49,7 +49,7 @@ class ExpressionBasedPathForce(ForceProducer):
     )
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
-        GeometryPath, name="path", appearance=_green
+        GeometryPath, name="path", appearance=_make_green_appearance
     )
     """The line along which the force pulls."""
     resting_length: Annotated[float, real("m", ">= 0")] = 0.0

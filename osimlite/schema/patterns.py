@@ -84,7 +84,7 @@ class Pattern:
     def fullmatch(self, name: str) -> bool:
         """Return whether the whole of a name matches."""
         cached_starts: dict[int, list[set[int]]] = {}
-        reached = self._lead_on([self._first], name, 0, cached_starts)
+        reached = self._find_reachable_states([self._first], name, 0, cached_starts)
         for index, character in enumerate(name):
             key = reached, character, index == len(name) - 1
             following = None if self._looks_around else self._steps.get(key)
@@ -95,13 +95,13 @@ class Pattern:
                     for state in states
                     if state.test is not None and state.test(character)
                 ]
-                following = self._lead_on(next_states, name, index + 1, cached_starts)
+                following = self._find_reachable_states(next_states, name, index + 1, cached_starts)
                 if not self._looks_around:
                     self._steps[key] = following
             reached = following
         return self._final in reached
 
-    def _lead_on(
+    def _find_reachable_states(
         self,
         numbers: Iterable[int],
         name: str,
@@ -115,13 +115,13 @@ class Pattern:
             if number in reached:
                 continue
             reached.add(number)
-            if self._states[number].test is None and self._holds(
+            if self._states[number].test is None and self._can_pass(
                 number, name, index, cached_starts
             ):
                 waiting += self._states[number].following
         return frozenset(reached)
 
-    def _holds(
+    def _can_pass(
         self, number: int, name: str, index: int, cached_starts: dict[int, list[set[int]]]
     ) -> bool:
         """Return whether a state that reads no character leads on before a character of a name."""
@@ -168,7 +168,7 @@ class Pattern:
                     source
                     for source in self._sources[number]
                     if self._states[source].test is None
-                    and self._holds(source, name, index, cached_starts)
+                    and self._can_pass(source, name, index, cached_starts)
                 )
         return result
 
@@ -179,11 +179,11 @@ class _Compiler:
     def __init__(self, text: str) -> None:
         self.text, self.index, self.level = text, 0, 0
         self.states: list[_State] = []
-        self.first, self.final = self._alternatives()
+        self.first, self.final = self._compile_alternatives()
         if self.index < len(text):
             raise PatternError(f"a ')' without its '(' at character {self.index + 1}")
 
-    def _add(self, test: CharacterTest | None = None, anchor: str = "") -> int:
+    def _add_state(self, test: CharacterTest | None = None, anchor: str = "") -> int:
         if len(self.states) >= MAX_STATES:
             raise UnsupportedPatternError(
                 f"the pattern has more than {MAX_STATES} states; shorten its repetitions"
@@ -191,41 +191,41 @@ class _Compiler:
         self.states.append(_State(test, anchor))
         return len(self.states) - 1
 
-    def _link(self, source: int, *targets: int) -> None:
+    def _link_states(self, source: int, *targets: int) -> None:
         self.states[source].following.extend(targets)
 
-    def _peek(self) -> str:
+    def _peek_character(self) -> str:
         return self.text[self.index : self.index + 1]
 
-    def _take(self) -> str:
-        character = self._peek()
+    def _take_character(self) -> str:
+        character = self._peek_character()
         if not character:
             raise PatternError("the pattern ends in the middle of something")
         self.index += 1
         return character
 
-    def _takes(self, word: str) -> bool:
+    def _skip_text(self, word: str) -> bool:
         is_there = self.text.startswith(word, self.index)
         self.index += len(word) if is_there else 0
         return is_there
 
-    def _alternatives(self) -> tuple[int, int]:
-        first, last = self._add(), self._add()
+    def _compile_alternatives(self) -> tuple[int, int]:
+        first, last = self._add_state(), self._add_state()
         while True:
-            start, end = self._sequence()
-            self._link(first, start)
-            self._link(end, last)
-            if not self._takes("|"):
+            start, end = self._compile_sequence()
+            self._link_states(first, start)
+            self._link_states(end, last)
+            if not self._skip_text("|"):
                 return first, last
 
-    def _sequence(self) -> tuple[int, int]:
-        first = last = self._add()
-        while self._peek() not in ("", "|", ")"):
+    def _compile_sequence(self) -> tuple[int, int]:
+        first = last = self._add_state()
+        while self._peek_character() not in ("", "|", ")"):
             begin = self.index
-            start, end = self._atom()
-            while self._peek() in ("*", "+", "?", "{") and self._peek():
+            start, end = self._compile_atom()
+            while self._peek_character() in ("*", "+", "?", "{") and self._peek_character():
                 start, end = self._repeat_part(begin, start, end)
-            self._link(last, start)
+            self._link_states(last, start)
             last = end
         return first, last
 
@@ -239,95 +239,120 @@ class _Compiler:
             end: its last state.
         """
         part_end = self.index
-        min_count, max_count = self._quantifier()
-        self._takes("?")  # The shortest or the longest match: of whole names both are the same.
+        min_count, max_count = self._read_quantifier()
+        self._skip_text("?")  # The shortest or the longest match: of whole names both are the same.
         next_index = self.index
-        entry = tail = self._add()
+        entry = tail = self._add_state()
         copies = min_count if max_count is None else max_count
         pieces = [(start, end)]
         for _ in range(max(copies, 1) - 1):
-            pieces.append(self._recompile(begin, part_end))
+            pieces.append(self._recompile_part(begin, part_end))
         self.index = next_index
         skips: list[int] = []
         for number, (piece_start, piece_end) in enumerate(pieces):
             if number >= min_count:
                 skips.append(tail)
             if copies:
-                self._link(tail, piece_start)
+                self._link_states(tail, piece_start)
                 tail = piece_end
-        finish = self._add()
+        finish = self._add_state()
         if max_count is None:
             # The last piece may come again and again; without a least number it may also be left
             # out.
-            self._link(tail, finish, pieces[-1][0])
+            self._link_states(tail, finish, pieces[-1][0])
         else:
-            self._link(tail, finish)
+            self._link_states(tail, finish)
         if max_count is None and min_count == 0:
-            self._link(entry, pieces[0][0], finish)
-            self._link(pieces[0][1], pieces[0][0], finish)
+            self._link_states(entry, pieces[0][0], finish)
+            self._link_states(pieces[0][1], pieces[0][0], finish)
         for skip in skips if max_count is not None else ():
-            self._link(skip, finish)
+            self._link_states(skip, finish)
         return entry, finish
 
-    def _recompile(self, begin: int, end: int) -> tuple[int, int]:
+    def _recompile_part(self, begin: int, end: int) -> tuple[int, int]:
         self.index = begin
-        start, last = self._atom()
+        start, last = self._compile_atom()
         while self.index < end:
             start, last = self._repeat_part(begin, start, last)
         return start, last
 
-    def _quantifier(self) -> tuple[int, int | None]:
-        sign = self._take()
+    def _read_quantifier(self) -> tuple[int, int | None]:
+        """Read a quantifier such as ``*`` or ``{2,3}``.
+
+        Returns:
+            Smallest and largest count; the largest is None without a bound.
+
+        Raises:
+            PatternError: the quantifier is incomplete, or its counts are reversed.
+        """
+        sign = self._take_character()
         if sign != "{":
             return {"*": (0, None), "+": (1, None), "?": (0, 1)}[sign]
-        min_count = self._number()
-        if self._takes("}"):
+        min_count = self._read_number()
+        if self._skip_text("}"):
             return min_count, min_count
-        if not self._takes(","):
+        if not self._skip_text(","):
             raise PatternError(f"a ',' or a '}}' is missing at character {self.index + 1}")
-        max_count = None if self._peek() == "}" else self._number()
-        if not self._takes("}"):
+        max_count = None if self._peek_character() == "}" else self._read_number()
+        if not self._skip_text("}"):
             raise PatternError(f"a '}}' is missing at character {self.index + 1}")
         if max_count is not None and max_count < min_count:
             raise PatternError(f"a repetition of {min_count} to {max_count} times is none")
         return min_count, max_count
 
-    def _number(self) -> int:
+    def _read_number(self) -> int:
         digits = ""
-        while self._peek() in _DIGITS:
-            digits += self._take()
+        while self._peek_character() in _DIGITS:
+            digits += self._take_character()
         if not digits or len(digits) > 4:
             raise PatternError(
                 f"a number of repetitions is missing or too large at character {self.index + 1}"
             )
         return int(digits)
 
-    def _atom(self) -> tuple[int, int]:
-        character = self._take()
+    def _compile_atom(self) -> tuple[int, int]:
+        """Compile a character, a set, a group or an anchor.
+
+        Returns:
+            First and last state of the part.
+
+        Raises:
+            PatternError: a quantifier has nothing to repeat.
+        """
+        character = self._take_character()
         if character == "(":
-            return self._group()
+            return self._compile_group()
         if character in "*+?{":
             raise PatternError(f"'{character}' has nothing to repeat at character {self.index}")
         if character in "^$":
-            state = self._add(anchor=character)
+            state = self._add_state(anchor=character)
         elif character == "[":
-            state = self._add(self._bracket())
+            state = self._add_state(self._compile_bracket())
         elif character == ".":
-            state = self._add(lambda letter: letter not in "\n\r\u2028\u2029")
-        elif character == "\\" and self._peek() in ("b", "B"):
-            return self._assert(self._take())
+            state = self._add_state(lambda letter: letter not in "\n\r\u2028\u2029")
+        elif character == "\\" and self._peek_character() in ("b", "B"):
+            return self._compile_assertion(self._take_character())
         elif character == "\\":
-            state = self._add(self._escape())
+            state = self._add_state(self._compile_escape())
         else:
-            state = self._add(frozenset(character).__contains__)
-        end_state = self._add()
-        self._link(state, end_state)
+            state = self._add_state(frozenset(character).__contains__)
+        end_state = self._add_state()
+        self._link_states(state, end_state)
         return state, end_state
 
-    def _group(self) -> tuple[int, int]:
+    def _compile_group(self) -> tuple[int, int]:
+        """Compile a group or a look-ahead assertion.
+
+        Returns:
+            First and last state of the part.
+
+        Raises:
+            PatternError: the group is not closed, or its kind is unknown.
+            UnsupportedPatternError: groups nest too deeply.
+        """
         assertion = ""
-        if self._takes("?") and not self._takes(":"):
-            assertion = self._take()
+        if self._skip_text("?") and not self._skip_text(":"):
+            assertion = self._take_character()
             if assertion not in "=!":
                 raise PatternError(
                     f"'(?{assertion}' begins no group; OpenSim knows '(?:', '(?=' and '(?!'"
@@ -335,22 +360,24 @@ class _Compiler:
         self.level += 1
         if self.level > MAX_NESTING:
             raise UnsupportedPatternError(f"groups nest more than {MAX_NESTING} levels deep")
-        part = self._alternatives()
+        part = self._compile_alternatives()
         self.level -= 1
-        if not self._takes(")"):
+        if not self._skip_text(")"):
             raise PatternError("a ')' is missing")
-        return self._assert(anchor=assertion, inner_part=part) if assertion else part
+        return self._compile_assertion(anchor=assertion, inner_part=part) if assertion else part
 
-    def _assert(self, anchor: str, inner_part: tuple[int, int] = (0, 0)) -> tuple[int, int]:
+    def _compile_assertion(
+        self, anchor: str, inner_part: tuple[int, int] = (0, 0)
+    ) -> tuple[int, int]:
         """Return a part that reads nothing, and that leads on only where an assertion holds."""
-        state, end_state = self._add(anchor=anchor), self._add()
+        state, end_state = self._add_state(anchor=anchor), self._add_state()
         self.states[state].inside = inner_part
-        self._link(state, end_state)
+        self._link_states(state, end_state)
         return state, end_state
 
-    def _escape(self) -> CharacterTest:
+    def _compile_escape(self) -> CharacterTest:
         characters, is_negated = self._read_escaped_set()
-        return _test(characters, is_negated)
+        return _make_set_test(characters, is_negated)
 
     def _read_escaped_set(self) -> tuple[frozenset[str], bool]:
         """Return the characters that an escape stands for, and whether it stands for all others.
@@ -359,13 +386,13 @@ class _Compiler:
             PatternError: the digits of a code are no hexadecimal number.
             UnsupportedPatternError: this matcher does not know the escape.
         """
-        letter = self._take()
+        letter = self._take_character()
         if letter.lower() in _ESCAPED_CLASSES:
             return _ESCAPED_CLASSES[letter.lower()], letter.isupper()
         if letter in _ESCAPED_CHARACTERS:
             return frozenset(_ESCAPED_CHARACTERS[letter]), False
         if letter in "xu":
-            digits = "".join(self._take() for _ in range(2 if letter == "x" else 4))
+            digits = "".join(self._take_character() for _ in range(2 if letter == "x" else 4))
             if not frozenset(string.hexdigits).issuperset(digits):
                 raise PatternError(f"'\\{letter}{digits}' is no character")
             return frozenset(chr(int(digits, 16))), False
@@ -373,33 +400,41 @@ class _Compiler:
             raise UnsupportedPatternError(f"'\\{letter}' is not supported")
         return frozenset(letter), False
 
-    def _bracket(self) -> CharacterTest:
-        is_negated = self._takes("^")
+    def _compile_bracket(self) -> CharacterTest:
+        """Compile a set in brackets.
+
+        Returns:
+            A test of one character.
+
+        Raises:
+            PatternError: a range in the set is not valid.
+        """
+        is_negated = self._skip_text("^")
         tests: list[CharacterTest] = []
-        while not self._takes("]"):
-            low = self._bracket_item(tests)
+        while not self._skip_text("]"):
+            low = self._read_bracket_item(tests)
             if (
                 low is None
-                or self._peek() != "-"
+                or self._peek_character() != "-"
                 or self.text[self.index + 1 : self.index + 2] in ("]", "")
             ):
                 if low is not None:
                     tests.append(frozenset(low).__contains__)
                 continue
             self.index += 1
-            high = self._bracket_item(tests)
+            high = self._read_bracket_item(tests)
             if high is None or high < low:
                 raise PatternError(f"the range from '{low}' ends nowhere")
             tests.append(_make_range_test(low, high))
         return lambda letter: any(test(letter) for test in tests) != is_negated
 
-    def _bracket_item(self, tests: list[CharacterTest]) -> str | None:
+    def _read_bracket_item(self, tests: list[CharacterTest]) -> str | None:
         """Return the next character of a bracket; of a class, None, and its test is added.
 
         Raises:
             PatternError: a class such as ``[:name:]`` does not exist.
         """
-        if self._takes("[:"):
+        if self._skip_text("[:"):
             end = self.text.find(":]", self.index)
             name = self.text[self.index : max(end, self.index)]
             if name not in _NAMED_CLASSES:
@@ -407,19 +442,19 @@ class _Compiler:
             self.index = end + 2
             tests.append(_NAMED_CLASSES[name].__contains__)
             return None
-        character = self._take()
+        character = self._take_character()
         if character != "\\":
             return character
-        if self._takes("b"):
+        if self._skip_text("b"):
             return "\b"
         characters, is_negated = self._read_escaped_set()
         if len(characters) == 1 and not is_negated:
             return next(iter(characters))
-        tests.append(_test(characters, is_negated))
+        tests.append(_make_set_test(characters, is_negated))
         return None
 
 
-def _test(characters: frozenset[str], is_negated: bool) -> CharacterTest:
+def _make_set_test(characters: frozenset[str], is_negated: bool) -> CharacterTest:
     return (lambda letter: letter not in characters) if is_negated else characters.__contains__
 
 

@@ -257,7 +257,7 @@ def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
         The classes.
     """
     # The word is looked for in the source text, which costs less than importing a module.
-    modules = {module for module in MODULES.values() if _mentions(module, word)}
+    modules = {module for module in MODULES.values() if _mentions_word(module, word)}
     opensim_classes = [
         getattr(import_module(module), name)
         for name, module in MODULES.items()
@@ -266,7 +266,7 @@ def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
     return (*opensim_classes, *_further.values())
 
 
-def _mentions(module: str, word: str) -> bool:
+def _mentions_word(module: str, word: str) -> bool:
     """Return whether the source of a module contains a word; true if the source is not available."""
     text = _read_source(module)
     return text is None or word in text
@@ -276,7 +276,7 @@ def _mentions(module: str, word: str) -> bool:
 def _read_source(module: str) -> str | None:
     spec = find_spec(module)
     loader = None if spec is None else spec.loader
-    # Not every loader can give a source; `_mentions` then assumes that it contains the word.
+    # Not every loader can give a source; `_mentions_word` then assumes that it contains the word.
     read_source: Callable[[str], str | None] | None = getattr(loader, "get_source", None)
     return read_source(module) if read_source is not None else None
 

@@ -76,6 +76,11 @@ def get_last_name(path: str) -> str:
 
 
 def _resolve_socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    """Resolve the path of a socket, relative to its owner or absolute.
+
+    Returns:
+        The component, or the reason of the failure.
+    """
     if _is_illegal_path(text):
         return Resolution(None, "illegal")
     if target == "Frame":

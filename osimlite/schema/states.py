@@ -92,6 +92,7 @@ def find_variables(tree: Tree, kind: str) -> dict[str, Component]:
 
 
 def _iterate_variables(tree: Tree, kind: str) -> Any:
+    """Yield names of a kind with their components: states, controls, outputs, forces, or a class."""
     for component in tree.components:
         path = tree.path_of(component)
         classes = get_class_names(type(component))

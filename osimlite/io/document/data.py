@@ -135,6 +135,7 @@ class _Writer:
         self.tree = model.tree()
 
     def convert_object(self, item: Object, accepts: type[Object] | None) -> dict[str, Any]:
+        """Return an object as a mapping: class, name, and the properties that are set, inherited or have content."""
         data: dict[str, Any] = {}
         # The class is written only where the property does not say it.
         if type(item) is not accepts:
@@ -251,6 +252,7 @@ class _Reader:
     def _find_class(
         self, data: Mapping[str, Any], accepts: type[Object], location: str
     ) -> type[Object]:
+        """Return the class that a mapping names, or the accepted class if it names none."""
         tag = data.get("class")
         if tag is None:
             if accepts.abstract:
@@ -270,6 +272,7 @@ class _Reader:
         return cls
 
     def _convert_value(self, data: Any, spec: FieldSpec, location: str) -> Any:
+        """Return the value of a property from its data: objects, numbers, texts or references."""
         kind = spec.kind
         if isinstance(kind, ObjectField):
             assert spec.accepts is not None
@@ -436,7 +439,7 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
 
 
 def _refuse_repeated_keys(yaml: Any, root: Any, file: str) -> None:
-    """Raise an error if a key stands twice in one mapping, of which PyYAML keeps the last without a word.
+    """Raise an error if a mapping has a key twice, where PyYAML silently keeps the last one.
 
     Raises:
         DocumentError: a key stands twice; with its line.

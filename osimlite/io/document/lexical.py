@@ -195,6 +195,8 @@ def reads_as(raw: str, kind: FieldType, value: Any) -> bool:
 def _make_single_converter(
     parse_word: Callable[[str], Any], optional: bool, legacy: bool
 ) -> Callable[[str], Any]:
+    """Return a function that converts the text of a property with one value."""
+
     def convert(raw: str) -> Any:
         # Fast path: almost every text is one clean number or switch.
         if parse_word is parse_real:
@@ -246,6 +248,8 @@ def _parse_words(
 
 
 def _make_vector_converter(size: int) -> Callable[[str], Any]:
+    """Return a function that converts the text of a property with `size` numbers."""
+
     def convert(raw: str) -> Any:
         words = split_words(raw)
         try:
@@ -273,6 +277,8 @@ def _make_vector_converter(size: int) -> Callable[[str], Any]:
 def _make_list_converter(
     parse_word: Callable[[str], Any], min_count: int, max_count: int | None
 ) -> Callable[[str], Any]:
+    """Return a function that converts the text of a property with a list of values."""
+
     def convert(raw: str) -> Any:
         words = split_words(raw)
         if (
@@ -351,6 +357,7 @@ def make_formatter(kind: FieldType, numbers: str) -> Callable[[Any], str]:
 
 @cache
 def _build_formatter(kind: FieldType, like_opensim: bool) -> Callable[[Any], str]:
+    """Return a function that formats the value of a property as the text of its element."""
     if isinstance(kind, Reference):
         if kind.shape == "list":
             prefix = " " if kind.legacy else ""

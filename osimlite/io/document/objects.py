@@ -190,7 +190,7 @@ class ObjectReader:
         if name:
             values["name"] = name
             present.add("name")
-        inherited = self._inherit(cls, values) if self.defaults else None
+        inherited = self._apply_defaults(cls, values) if self.defaults else None
         built = cls.build(values, present, number, self.home)
         if inherited:
             get_layout(built).inherited = inherited
@@ -448,7 +448,7 @@ class ObjectReader:
             return
         else:
             extra.late.append(("unknown-tag", self.count, tag, None, tagged_class))
-        # What is not read is kept as text, so that writing loses nothing.
+        # Unread elements are kept as text, so that writing loses nothing.
         extra.pending.append(Remark(format_element(child), True))
         self.count += count_elements(child)
 
@@ -503,7 +503,7 @@ class ObjectReader:
         block = self.defaults.get(cls)
         return get_defaults(cls)[0][name] if block is None else getattr(block, name)
 
-    def _inherit(self, cls: type[Object], values: dict[str, Any]) -> frozenset[str]:
+    def _apply_defaults(self, cls: type[Object], values: dict[str, Any]) -> frozenset[str]:
         """Copy properties that the file does not contain from the document's defaults; return their names."""
         block = self.defaults.get(cls)
         if block is None:

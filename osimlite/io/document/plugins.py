@@ -108,6 +108,7 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
 
 @lru_cache(maxsize=16)
 def _load_declarations(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Object]]:
+    """Return the classes that declaration files define, by name."""
     result: dict[str, type[Object]] = {}
     for path, _ in files:
         try:
@@ -156,6 +157,7 @@ class _Declarations:
         self.references: dict[tuple[str, str], Any] = {}
 
     def build(self) -> None:
+        """Make all classes of the file, and check its references."""
         for entry in self.list_rows(self.top, "references"):
             self.check_mapping(entry, _OF_A_REFERENCE, "a reference", "references")
             rule = entry.get("resolution")
@@ -203,6 +205,7 @@ class _Declarations:
         return self.classes[name]
 
     def make_class(self, name: str) -> type[Object]:
+        """Make one class from its entry in the file."""
         entry = self.check_mapping(self.entries[name], _OF_A_CLASS, f"class '{name}'", name)
         if not name.isidentifier():
             raise self.make_error(f"'{name}' is not a legal name of a class", name)
@@ -418,6 +421,7 @@ class _Declarations:
         return accepts, ObjectField(cast("Any", form), legacy), make_default(starts, **named)
 
     def list_properties(self, name: str) -> list[Any]:
+        """Return the checked entries of the properties of a class."""
         rows = self.list_rows(self.entries[name], "properties", name)
         for row in rows:
             description = f"a property of '{name}'"

@@ -193,6 +193,7 @@ class _Printer:
         return get_relative_path(include.path, self.folder)
 
     def _print_property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
+        """Print one property as an element with its value, or with the objects it holds."""
         kind = spec.kind
         indent = "\t" * depth
         if not isinstance(kind, ObjectField):

@@ -303,6 +303,7 @@ def _build_document(
     upgraded: UpgradeResult | None,
     is_known: bool = False,
 ) -> Document:
+    """Make the objects of an element tree, and map notes to the old text after an upgrade."""
     reader = ObjectReader(_make_include_reader(source))
     top = _read_top(source, root if upgraded is None else upgraded.root, reader, expected_class)
     get_layout(top).version, get_layout(top).file = version, source.file

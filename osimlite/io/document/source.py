@@ -140,7 +140,7 @@ class Source:
         spans = self.spans
         return spans.starts if isinstance(spans, PlainSpans) else [span.start for span in spans]
 
-    def _tag(self, number: int) -> str:
+    def _get_tag(self, number: int) -> str:
         spans = self.spans
         return spans.tag(number) if isinstance(spans, PlainSpans) else spans[number].tag
 
@@ -170,7 +170,7 @@ class Source:
             tag: the tag.
         """
         result = next(
-            (child for child in self._iterate_children(number) if self._tag(child) == tag), None
+            (child for child in self._iterate_children(number) if self._get_tag(child) == tag), None
         )
         return self.moved.get((number, tag)) if result is None else result
 
@@ -245,7 +245,7 @@ class Source:
             return self.position(0)
         # Text that ends within a tag has indices beyond the last span.
         number = min(number, len(self.spans) - 1)
-        return self.position(self._starts[number], len(self._tag(number)) + 1)
+        return self.position(self._starts[number], len(self._get_tag(number)) + 1)
 
     def locate_text(self, number: int, word: str | None = None, nth: int = 0) -> Position:
         """Return the position of an element's text or of a word in it; without text, that of the tag.

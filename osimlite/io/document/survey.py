@@ -78,6 +78,7 @@ def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Su
 def _survey_damaged(
     source: Source, fault: NotWellFormedError, expected_class: type[Object]
 ) -> Survey:
+    """Survey a text that is not well-formed, as far as a repaired text can be parsed."""
     result = Survey(source, None, [fault], fault.line)
     unclosed = re.search(r"of line (\d+) is not closed", fault.message)
     if unclosed:

@@ -54,7 +54,7 @@ class MeshFolders:
         """
         elsewhere = None
         for path in _list_candidates(name, self.searched):
-            if self._holds(path):
+            if self._is_trusted(path):
                 return path
             elsewhere = elsewhere or path
         if elsewhere is not None:
@@ -64,7 +64,7 @@ class MeshFolders:
             )
         return None
 
-    def _holds(self, path: Path) -> bool:
+    def _is_trusted(self, path: Path) -> bool:
         roots = (
             self._trusted_elsewhere
             if self.beside is None

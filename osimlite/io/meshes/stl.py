@@ -29,7 +29,7 @@ def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 
         OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a
             place.
     """
-    binary = _from_binary(content, name)
+    binary = _read_binary(content, name)
     triangles = binary if binary is not None else _from_text(content, name)
     if any(sign < 0.0 for sign in signs):
         triangles["corners"] *= np.array(signs, dtype="<f4")
@@ -41,29 +41,34 @@ def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 
 
 def read_stl_corners(content: bytes, name: str) -> Array:
     """The corners (t, 3, 3) of the triangles in a text or binary STL file; errors as those of :func:`format_binary_stl`."""
-    binary = _from_binary(content, name)
-    return _text_corners(content, name) if binary is None else binary["corners"].astype(np.float64)
+    binary = _read_binary(content, name)
+    return (
+        _read_text_corners(content, name)
+        if binary is None
+        else binary["corners"].astype(np.float64)
+    )
 
 
 def is_binary(content: bytes) -> bool:
     """Return whether a file has the binary form."""
-    return 84 < 84 + 50 * _count(content) <= len(content)
+    return 84 < 84 + 50 * _get_declared_count(content) <= len(content)
 
 
-def _count(content: bytes) -> int:
+def _get_declared_count(content: bytes) -> int:
     return int.from_bytes(content[80:84], "little")
 
 
-def _from_binary(content: bytes, name: str) -> _Triangles | None:
+def _read_binary(content: bytes, name: str) -> _Triangles | None:
     """The triangles of a binary file; None if it is no such file."""
     if not is_binary(content):
         return None
-    triangles = np.frombuffer(content, _TRIANGLE, _count(content), 84).copy()
+    triangles = np.frombuffer(content, _TRIANGLE, _get_declared_count(content), 84).copy()
     _require_finite(triangles["corners"], name)
     return triangles
 
 
-def _text_corners(content: bytes, name: str) -> Array:
+def _read_text_corners(content: bytes, name: str) -> Array:
+    """Return the corners (t, 3, 3) of the triangles of a text STL file."""
     if content.lstrip()[:5].lower() != b"solid":
         raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
     numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)
@@ -85,7 +90,7 @@ def _require_finite(numbers: Array, name: str) -> None:
 
 
 def _from_text(content: bytes, name: str) -> _Triangles:
-    corners = _text_corners(content, name)
+    corners = _read_text_corners(content, name)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     triangles = np.zeros(len(corners), _TRIANGLE)

@@ -228,6 +228,7 @@ class _File:
         return corners, ends
 
     def _read_normals(self, piece: etree._Element, count: int) -> Array | None:
+        """Return the normals (n, 3) at the points of a piece; None if it has none that fit."""
         data = piece.find("PointData")
         if data is None:
             return None
@@ -276,7 +277,7 @@ class _File:
                     stream = self._get_appended_array(int(array.get("offset", "0")))
                 case _:
                     raise _Unreadable(f"it has numbers in the format '{form}'")
-            # Whoever asks for the numbers makes eight bytes of each, however few the file has.
+            # Callers convert each number to eight bytes, however few the file uses.
             return np.frombuffer(self._read_block(stream, 8 / dtype.itemsize), dtype)
         except MemoryError:
             raise _Unreadable(

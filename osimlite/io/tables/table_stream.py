@@ -53,7 +53,7 @@ class TableStream:
                 # The fast path: nearly all rows are plain numbers.
                 row = list(map(float, text.split()))
             except ValueError:
-                row = self._odd(text, number)
+                row = self._parse_special_row(text, number)
             if not row:
                 continue
             if len(row) != size:
@@ -69,7 +69,7 @@ class TableStream:
             time = row.pop(time_column)
             yield time, row
 
-    def _odd(self, text: str, number: int) -> list[float]:
+    def _parse_special_row(self, text: str, number: int) -> list[float]:
         """A row that has something else than plain numbers."""
         row = []
         for match in re.finditer(r"\S+", text):
@@ -91,6 +91,7 @@ class TableStream:
         return row
 
     def _read_header(self) -> None:
+        """Read the header, the labels, and the column of the time."""
         beginning = b"".join(self._stream.readlines(MAX_HEADER_BYTES))
         result = StorageHeader(beginning, self.file)
         if not result.end.text:

@@ -46,6 +46,7 @@ def _format_trc(
     rows: Iterable[Sequence[float]],
     units: str,
 ) -> Iterator[str]:
+    """Yield the lines of a marker file; a missing coordinate (NaN) is an empty cell."""
     count = len(times)
     span = times[-1] - times[0] if count > 1 else 0.0
     rate = format_number((count - 1) / span) if span > 0.0 else "1"

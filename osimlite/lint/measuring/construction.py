@@ -72,6 +72,7 @@ class _Construction:
         self.mechanism: Mechanism | None = None
 
     def run(self) -> Iterator[Obstacle]:
+        """Yield the obstacles of all stages: mechanism, forces, assembly, accelerations."""
         try:
             self.mechanism = mechanism = build_mechanism(self.model)
         except OsimliteError as error:

@@ -94,6 +94,7 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
 
 
 def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
+    """Yield the intervals of a sweep in which the length of a path may jump."""
     changes = np.diff(sweep.lengths, axis=0)
     usual = np.full_like(changes, np.nan)
     if len(changes) > 2:

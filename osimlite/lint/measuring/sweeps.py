@@ -112,7 +112,7 @@ def sweep_coordinates(
         ):
             continue
         is_tied = bool(are_tied[index])
-        # Each value of a tied coordinate needs an assembly, of which a check can afford few.
+        # Each value of a tied coordinate needs an assembly; a check can afford only a few.
         if is_tied and remaining_poses < TIED_VALUES:
             continue
         remaining_poses -= is_tied * TIED_VALUES

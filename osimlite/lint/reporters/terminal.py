@@ -294,6 +294,7 @@ def _split_lines(report: Report, file: str | None, last: int) -> list[str] | Non
 
 
 def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str:
+    """Return the text of one finding: position, message, source line and notes."""
     finding = fold.first
     heading = (
         f"{paint(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"

@@ -43,7 +43,7 @@ def report_impossible_mechanism(subject: Subject, report: FindingCollector) -> N
     ```
     """
     for obstacle in _select_unreported(subject, report, Stage.MECHANISM):
-        _report(subject, report, obstacle, obstacle.message)
+        _report_obstacle(subject, report, obstacle, obstacle.message)
 
 
 @rule("OSIM422", "unmet-constraint", severity=ERROR, about=CONSTRUCTION)
@@ -67,7 +67,9 @@ def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for obstacle in _select_unreported(subject, report, Stage.ASSEMBLY):
-        _report(subject, report, obstacle, f"{obstacle.message}: OpenSim cannot start from it")
+        _report_obstacle(
+            subject, report, obstacle, f"{obstacle.message}: OpenSim cannot start from it"
+        )
 
 
 @rule("OSIM423", "range-not-kept", severity=WARNING, about=CONSTRUCTION)
@@ -91,7 +93,7 @@ def report_range_not_kept(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for obstacle in _select_unreported(subject, report, Stage.CLAMP):
-        _report(
+        _report_obstacle(
             subject, report, obstacle, f"{obstacle.message}; OpenSim simulates without the clamp"
         )
 
@@ -127,7 +129,7 @@ def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> N
         return
     for obstacle in _select_unreported(subject, report, Stage.INERTIA):
         message = f"{obstacle.message}: OpenSim computes NaN, or accelerations without meaning"
-        _report(subject, report, obstacle, message)
+        _report_obstacle(subject, report, obstacle, message)
 
 
 @rule("OSIM531", "impossible-force", severity=ERROR, about=CONSTRUCTION)
@@ -160,9 +162,9 @@ def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
             # OpenSim computes with numbers that make no sense, and never asks a force that is
             # disabled; osimlite makes it for its states.
             message = f"osimlite cannot compute this, OpenSim can: {obstacle.message}"
-            _report(subject, report, obstacle, message, severity=WARNING)
+            _report_obstacle(subject, report, obstacle, message, severity=WARNING)
         else:
-            _report(subject, report, obstacle, obstacle.message)
+            _report_obstacle(subject, report, obstacle, obstacle.message)
 
 
 @rule("OSIM532", "no-acceleration", severity=ERROR, about=CONSTRUCTION)
@@ -185,9 +187,9 @@ def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
     """
     for obstacle in _select_unreported(subject, report, Stage.ACCELERATION):
         if obstacle.path or not _has_error(report, "2456"):
-            _report(subject, report, obstacle, obstacle.message)
+            _report_obstacle(subject, report, obstacle, obstacle.message)
     for obstacle in _select_unreported(subject, report, Stage.RATE):
-        _report(subject, report, obstacle, obstacle.message, severity=WARNING)
+        _report_obstacle(subject, report, obstacle, obstacle.message, severity=WARNING)
     for function in _find_infinite_formulas(subject):
         report(
             f"expression of {subject.describe_part(function)} is '{function.expression}', which is "
@@ -266,7 +268,7 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
             reason = reason.removeprefix(f"'{first.path}' (").removesuffix(")")
             reason = f"'{component.name}', a {reason}"
         message = f"osimlite cannot compute this, OpenSim can: {reason}{similar_note}"
-        _report(subject, report, first, message)
+        _report_obstacle(subject, report, first, message)
 
 
 @rule("OSIM534", "impassable-obstacle", severity=ERROR, about=CONSTRUCTION)
@@ -306,7 +308,9 @@ def report_impassable_obstacle(subject: Subject, report: FindingCollector) -> No
     ```
     """
     for obstacle in _select_unreported(subject, report, Stage.CABLE):
-        _report(subject, report, obstacle, f"{obstacle.message}: OpenSim rejects the model")
+        _report_obstacle(
+            subject, report, obstacle, f"{obstacle.message}: OpenSim rejects the model"
+        )
 
 
 def _select_unreported(
@@ -348,7 +352,7 @@ def _has_error(report: FindingCollector, families: str) -> bool:
     return any(item.severity == ERROR and item.code[4] in families for item in report.findings)
 
 
-def _report(
+def _report_obstacle(
     subject: Subject,
     report: FindingCollector,
     obstacle: Obstacle,

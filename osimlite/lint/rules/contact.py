@@ -113,7 +113,7 @@ def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> N
         word_counts: dict[tuple[int, str], int] = {}
         for use in uses:
             target = subject.resolution(use).target
-            # Equal words are told apart by their position in the list.
+            # The position in the list distinguishes equal words.
             nth = word_counts.get((id(use.holder), use.text), 0)
             word_counts[id(use.holder), use.text] = nth + 1
             if target is None:

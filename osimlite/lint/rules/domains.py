@@ -340,6 +340,7 @@ def find_outside_domain(subject: Subject) -> list[_OutsideDomain]:
 
 
 def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
+    """Yield each property with a number outside its domain, and what OpenSim does with it."""
     # A path is laid around them at once, which needs a surface.
     obstacles = {
         id(subject.target_of(obstacle, "socket_contact_geometry"))
@@ -402,6 +403,7 @@ def _report_domain(
     value: Any,
     verdict: DomainVerdict,
 ) -> None:
+    """Report a number outside its domain, or one that is missing."""
     is_given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:

@@ -64,7 +64,7 @@ def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None
         if holder is None or not getattr(holder, "appliesForce", True):
             continue
         for before, point in pairwise(path.path_point_set.objects):
-            if _coincide(subject, before, point):
+            if _are_coincident(subject, before, point):
                 report(
                     f"'{before.name}' and '{point.name}' of the path of {describe_object(holder)} "
                     "are on different bodies and in one place in the default pose: every "
@@ -196,7 +196,7 @@ def _locate_in_ground(subject: Subject, frame: Component | None, point: Any) -> 
     return None if carrier is None else carrier.compose(pose).transform_point(point)
 
 
-def _coincide(subject: Subject, before: Any, point: Any) -> bool:
+def _are_coincident(subject: Subject, before: Any, point: Any) -> bool:
     """Return whether two points of a path are fixed to different bodies and in one place."""
     frames = []
     for item in (before, point):

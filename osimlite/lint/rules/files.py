@@ -248,7 +248,7 @@ class _FolderListings:
 
     def has(self, root: str, name: str) -> bool:
         """Return whether the folder `root` has a file `name`, which may contain folders."""
-        listing, file_name = self._listing(root, name)
+        listing, file_name = self._list_names(root, name)
         # Of ASCII names the listing decides; it saves a call to the system for each mesh.
         if file_name.isascii() and file_name.lower() not in listing:
             return False
@@ -259,7 +259,7 @@ class _FolderListings:
     def find_other_case(self, roots: list[str], name: str) -> str | None:
         """Return the first file that differs from `name` in letter case only; None without one."""
         for root in roots:
-            listing, file_name = self._listing(root, name)
+            listing, file_name = self._list_names(root, name)
             twin = listing.get(file_name.lower(), file_name)
             if twin != file_name and os.path.isfile(
                 os.path.join(root, os.path.dirname(name), twin)
@@ -267,7 +267,7 @@ class _FolderListings:
                 return twin
         return None
 
-    def _listing(self, root: str, name: str) -> tuple[dict[str, str], str]:
+    def _list_names(self, root: str, name: str) -> tuple[dict[str, str], str]:
         """Return the names in the folder of a file by their lower case, and the name of the file."""
         folder, file_name = root or ".", name
         if "/" in name or os.sep in name:

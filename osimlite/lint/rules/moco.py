@@ -384,7 +384,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
                 faults.append(
                     f"{describe_object(joint)} has speeds that are not the rates of its coordinates"
                 )
-            # A weld that an operator puts in the place of the joint removes both obstacles.
+            # An operator that replaces the joint by a weld removes both obstacles.
             for fault in faults if tree.path_of(joint) not in welded else ():
                 report(f"{fault}: Moco rejects the model", processor, tag="filepath")
 

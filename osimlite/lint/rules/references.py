@@ -233,6 +233,7 @@ def find_broken_references(subject: Subject) -> list[BrokenReference]:
 
 
 def _iterate_broken_references(subject: Subject) -> Iterator[BrokenReference]:
+    """Yield each reference that does not resolve, or that is a name where OpenSim needs a path."""
     tree = subject.tree
     for use in _list_uses(subject):
         resolution = subject.resolution(use) if use.value != "" else tree.resolve(use)
@@ -285,6 +286,7 @@ def _list_uses(subject: Subject) -> Iterator[Use]:
 def _explain_reference(
     subject: Subject, use: Use, text: str, resolution: Resolution
 ) -> BrokenReference:
+    """Return why a reference does not resolve, with the text that is probably meant."""
     tree, reference = subject.tree, use.reference
     stripped = text.strip(",;")
     if stripped != text and tree.lookup(reference, stripped, use.owner).target is not None:
@@ -447,6 +449,7 @@ def _list_contacts(subject: Subject, frame: Object) -> list[str]:
 def _report_broken(
     subject: Subject, report: FindingCollector, broken: BrokenReference, message: str
 ) -> None:
+    """Report a broken reference at its word, with the fix if one is known."""
     use = broken.use
     value = getattr(use.holder, use.spec.name)
     earlier_values = value[: use.position] if isinstance(value, tuple) and use.position else ()

@@ -135,6 +135,7 @@ def _make_curve_relation(make: Callable[..., object]) -> _Relation:
 
 
 def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
+    """Yield contradictions between the coordinates of a function-based path and its functions."""
     coordinates = path.coordinate_paths
     if not coordinates:
         yield None, "coordinate_paths is empty"

@@ -122,6 +122,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_other_case(naming: FileReference) -> str | None:
+    """Return the name of a file that differs in letter case only; None without one."""
     folder, last = os.path.split(naming.path)
     # Windows and macOS find files whatever the letter case, Linux does not.
     try:

@@ -110,7 +110,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
     message = f"{describe_object(owner)} has no property <{note.word}>; OpenSim ignores it"
     if suggestion is not None:
         default_text = _format_default(specs[suggestion])
-        # If the correct tag stands beside it, the default is not what OpenSim uses.
+        # If the object also has the correct tag, OpenSim does not use the default.
         message += (
             f" and keeps the default of {suggestion}{default_text}"
             if suggestion not in _list_given(owner)

@@ -109,6 +109,7 @@ def _set_count(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
 
 
 def _check_marker_header(table: Table, header: MarkerHeader, report: FindingCollector) -> None:
+    """Report the faults in the five header lines of a marker file."""
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
         problem = (

@@ -154,6 +154,7 @@ _INPUT = re.compile(
 
 
 def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault | None:
+    """Return why an input does not connect to an output; None if it connects."""
     match = _INPUT.fullmatch(text)
     if match is None or match["path"] is None:
         return _InputFault("; expected the path of a component, a bar and an output")

@@ -37,7 +37,7 @@ _ControlSetFile = Annotated[str, make_input_file("ControlSet", legacy=True)]
 _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
 
 
-def _body(*words: str, consequence: Consequence = "refused") -> Reference:
+def _make_body_reference(*words: str, consequence: Consequence = "refused") -> Reference:
     """Marker of the name of a body, or of a word for something else.
 
     Returns:
@@ -73,9 +73,9 @@ class MuscleStateTrackingTask(StateTrackingTask):
 class CMC_Task(TrackingTask, abstract=True):
     """A point, an orientation or a coordinate that is to be followed."""
 
-    wrt_body: Annotated[Named, _body("center_of_mass", "-1")] = ""
+    wrt_body: Annotated[Named, _make_body_reference("center_of_mass", "-1")] = ""
     """The body whose motion is followed; coordinates do not need it."""
-    express_body: Annotated[Named, _body("ground", "-1")] = ""
+    express_body: Annotated[Named, _make_body_reference("ground", "-1")] = ""
     """The body along whose axes the motion is given; coordinates do not need it."""
     active: Annotated[tuple[bool, ...], Value("bool", "list", legacy=True)] = (False, False, False)
     """Which of the three components count; a coordinate has the first only."""
@@ -96,8 +96,8 @@ class CMC_Task(TrackingTask, abstract=True):
 class CMC_Joint(CMC_Task):
     """A coordinate that is to be followed."""
 
-    wrt_body: Annotated[Named, _body(consequence="ignored")] = ""
-    express_body: Annotated[Named, _body(consequence="ignored")] = ""
+    wrt_body: Annotated[Named, _make_body_reference(consequence="ignored")] = ""
+    express_body: Annotated[Named, _make_body_reference(consequence="ignored")] = ""
     coordinate: LegacyCoordinateName = ""
     """Name of the coordinate."""
     limit: LegacyNumber = 0.0

@@ -44,6 +44,7 @@ def convert_display_geometry(draft: Draft) -> None:
 def _add_mesh(
     draft: Draft, body: Element, visible: Element, attached: Element, geometry: Element, count: int
 ) -> None:
+    """Add a <Mesh> for one <DisplayGeometry> of a body."""
     name = body.get("name", "")
     # The pose of the body's geometry, then that of the piece.
     pose = compose_transforms(
@@ -256,6 +257,7 @@ def _add_appearance(
     representation: str,
     hidden: bool,
 ) -> None:
+    """Add an <Appearance> with colour, opacity and representation to a wrap object."""
     appearance = draft.add(wrap, "Appearance", source=source)
     if hidden:
         draft.add(appearance, "visible", "false", source=source)
