@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.folders import MeshFolders
 from osimlite.lint import Config, Finding, validate
+from osimlite.lint.many import check_files
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -48,16 +50,31 @@ class Shown:
         scene: drawable objects of the model.
         q: coordinate values (n,) at first.
         motion: how it moves, or None.
-        findings: findings of the validator.
         remarks: sentences about parts that cannot be shown.
+        checked: what the validator checks: the file of the model, or the model with all its parts.
+        mesh_folders: absolute paths of the folders with mesh files, for the validator.
     """
 
     model: Model
     scene: Scene
     q: Array
     motion: ShownMotion | None = None
-    findings: Sequence[Finding] = ()
     remarks: tuple[str, ...] = ()
+    checked: Model | Path | None = None
+    mesh_folders: tuple[str, ...] = ()
+
+    @cached_property
+    def findings(self) -> Sequence[Finding]:
+        """The findings of ``osimlite validate``, with the settings of the project.
+
+        The model is checked when they are first asked for, since pictures do without them.
+        """
+        config = Config(mesh_paths=self.mesh_folders)
+        if isinstance(self.checked, Path):
+            return check_files([str(self.checked)], config).findings
+        return validate(
+            self.model if self.checked is None else self.checked, config=config
+        ).findings
 
     @classmethod
     def of(
@@ -94,16 +111,13 @@ class Shown:
                 constraints.
             SettingError: there is no such wrapping.
         """
+        # Parts that cannot be built are missing in the model that is shown, and have findings.
+        checked: Model | Path = model if file is None else file
         if mechanism is None:
             model, mechanism, left_out = build_showable(model)
         mesh_folders = MeshFolders(None if file is None else file.parent, folders)
         scene = build_scene(model, mechanism, mesh_folders, wrapping)
-        # What is measured of paths and muscles takes longer than a page to open.
-        config = Config(
-            ignore=("OSIM63",),
-            mesh_paths=tuple(str(folder.resolve()) for folder in mesh_folders.searched),
-        )
-        findings = validate(model if file is None else file, config=config).findings
+        searched = tuple(str(folder.resolve()) for folder in mesh_folders.searched)
         # What could not be built is said before what could not be drawn.
         if left_out:
             scene = replace(scene, remarks=[*left_out, *scene.remarks])
@@ -114,7 +128,7 @@ class Shown:
         if isinstance(motion, Recording):
             remarks += motion.remarks
         q = mechanism.assemble(values or {})
-        return cls(model, scene, q, motion, findings, tuple(remarks))
+        return cls(model, scene, q, motion, tuple(remarks), checked, searched)
 
     def page_text(self, story: Story | None = None) -> str:
         """Return one self-contained HTML page with the viewer."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.view import incomplete
+from osimlite.view import Shown, incomplete
 from osimlite.view.incomplete import MAX_REMARKS, build_showable, describe_left_out
 from tests.cli.command import run
 
@@ -49,6 +51,42 @@ def test_one_wrong_reference_leaves_the_rest(
         r'id="data">(.*?)</script>', (tmp_path / "m.html").read_text(encoding="utf-8")
     )
     assert "LeftThigh" in json.dumps(json.loads(data))
+
+
+@pytest.mark.parametrize("name", ["whole", "wrong reference", "muscles"])
+def test_the_page_has_the_findings_of_validate(
+    fixtures: Path, text: str, tmp_path: Path, name: str
+) -> None:
+    if name == "muscles":
+        text = gzip.decompress((fixtures / "setups" / "model.osim.gz").read_bytes()).decode()
+    if name == "wrong reference":
+        text = text.replace("/bodyset/RightShank<", "/bodyset/Nowhere<", 1)
+    (tmp_path / "m.osim").write_text(text, encoding="utf-8")
+    # The settings of a project hold for both commands.
+    (tmp_path / "osimlite.toml").write_text('ignore = ["OSIM508"]\n', encoding="utf-8")
+    # Bones are in no folder here, for both commands.
+    checked = run("validate", "m.osim", "--format", "json", folder=tmp_path)
+    done = run("view", "m.osim", "--html", "m.html", folder=tmp_path)
+    assert done.code == 0, done.err
+    page = (tmp_path / "m.html").read_text(encoding="utf-8")
+    (data,) = re.findall(r'id="data">(.*?)</script>', page)
+    shown = _count(json.loads(data)["findings"])
+    assert shown == _count(json.loads(checked.out))
+    assert shown or name == "whole"
+
+
+def _count(rows: list[dict[str, str]]) -> Counter[tuple[str, str, str]]:
+    return Counter((row["code"], row["severity"], row["component"]) for row in rows)
+
+
+def test_a_model_in_memory_has_the_findings_of_its_left_out_parts(
+    text: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "m.osim"
+    path.write_text(text.replace("/bodyset/RightShank<", "/bodyset/Nowhere<", 1), encoding="utf-8")
+    model = osimlite.read(path)
+    codes = [finding.code for finding in Shown.of(model).findings]
+    assert "OSIM301" in codes and codes == [item.code for item in osimlite.validate(model).findings]
 
 
 def test_a_copy_loses_its_part_and_not_the_model(text: str, tmp_path: Path) -> None:

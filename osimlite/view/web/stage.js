@@ -365,6 +365,7 @@
       this.followed = target.clone();
       this.camera.position.add(step);
       this.controls.target.add(step);
+      this.gravity?.position.add(step);
     }
 
     // The middle of the bodies that move.
