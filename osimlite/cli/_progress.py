@@ -25,14 +25,16 @@ ESTIMATE_S = 1.0
 LONG_S = 10.0
 """Work of this duration says in logs and pipes, once, how far it is, and when it ends, s."""
 
-INTERACTIVE = ("demo", "lsp", "view")
+INTERACTIVE = ("lsp", "view")
 """Commands that wait for people or editors."""
 
 ACTIVITIES = {
     "build": "building",
     "check-trial": "checking",
     "convert": "converting",
+    "demo": "making the tour",
     "diff": "comparing",
+    "doctor": "looking at packages",
     "find-gait": "searching",
     "fit": "fitting",
     "format": "formatting",
@@ -196,7 +198,8 @@ class _Line:
                 text = self.tasks[-1].describe(now)[: max(1, count_columns() - 1)]
                 # Padding with blanks overwrites the rest of a longer line.
                 self._write(f"\r{text:{self._shown}}")
-                self._shown = len(text)
+                # The cursor, and ^C with it, stands behind the blanks of a longer line.
+                self._shown = max(self._shown, len(text))
         finally:
             self._lock.release()
 

@@ -95,6 +95,10 @@ MESHES = (".vtp", ".stl", ".obj")
 """File name endings of meshes."""
 
 
+_processes: set[subprocess.Popen[bytes]] = set()
+"""Processes that import a package now."""
+
+
 class Package(NamedTuple):
     """Package that an extra requires.
 
@@ -150,9 +154,16 @@ def doctor(
         ThreadPoolExecutor(2 * count_cores()) as pool,
     ):
         # Each package is imported in a process of its own, several at a time.
-        for count, package in enumerate(pool.map(examine_package, package_names), 1):
-            result[package.name] = package
-            progress(count)
+        try:
+            for count, package in enumerate(pool.map(examine_package, package_names), 1):
+                result[package.name] = package
+                progress(count)
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            # A library that is being loaded does not notice Ctrl-C, and takes seconds.
+            for process in [*_processes]:
+                process.kill()
+            raise
     table = create_table()
     for heading in ("extra", "for", "packages"):
         table.add_column(heading, overflow="fold")
@@ -254,18 +265,21 @@ def examine_package(name: str) -> Package:
         else next(module for module in modules if not module.startswith("_"))
     )
     # -P: do not import from the current folder.
-    completed = subprocess.run(
+    with subprocess.Popen(
         [sys.executable, "-P", "-c", f"import {main}"],
-        capture_output=True,
-        check=False,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         # Some packages start processes or load libraries from the current folder, which may be untrusted.
         cwd=Path(__file__).parent,
         env={**os.environ, SAFE_PATH: "1"},
-    )
-    if completed.returncode == 0:
+    ) as process:
+        _processes.add(process)
+        _, errors = process.communicate()
+        _processes.discard(process)
+    if process.returncode == 0:
         return Package(name, version, "")
-    error_lines = completed.stderr.decode(errors="replace").strip().splitlines() or [
-        f"its process ended with {completed.returncode}"
+    error_lines = errors.decode(errors="replace").strip().splitlines() or [
+        f"its process ended with {process.returncode}"
     ]
     return Package(name, version, error_lines[-1])
 

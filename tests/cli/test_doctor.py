@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import threading
+import time
 import tomllib
 from importlib import metadata
 from importlib.util import find_spec
@@ -228,3 +231,22 @@ def test_where_meshes_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_model_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(MissingFileError, match=r"none.osim: there is no such file or folder"):
         run(str(tmp_path / "none.osim"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a shell script as the program")
+def test_an_interrupt_does_not_wait_for_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow = tmp_path / "python"
+    slow.write_text("#!/bin/sh\nexec sleep 30\n", encoding="utf-8")
+    slow.chmod(0o755)
+    monkeypatch.setattr("osimlite.cli.doctor.list_requirements", lambda: {"": ["lxml", "rich"]})
+    monkeypatch.setattr(sys, "executable", str(slow))
+    main_thread = threading.main_thread().ident
+    assert main_thread is not None
+    interrupt = threading.Timer(0.5, signal.pthread_kill, (main_thread, signal.SIGINT))
+    interrupt.start()
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        doctor()
+    assert time.monotonic() - started < 10.0

@@ -84,6 +84,18 @@ def test_a_narrow_terminal_has_one_line(monkeypatch, clock):
         assert shown(sys.stderr) == "a long title of som"
 
 
+def test_the_line_is_removed_with_what_the_terminal_writes_behind_it(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress_bar("checking", None) as progress:
+        for words in ("a long state", "short"):
+            clock.now += 1.0
+            progress(0.0, None, words)
+        longest = max(map(len, sys.stderr.getvalue().split("\r")))
+        # The terminal wrote ^C behind the blanks that cover the longer line.
+        _progress._line.erase()
+        assert sys.stderr.getvalue().endswith(f"\r{'':{longest + 2}}\r")
+
+
 def test_output_removes_the_line_first(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     _progress.watch_command("static-optimization")
