@@ -51,15 +51,16 @@ COMMANDS = {
     "translate --check": "translate model.osim --to mjcf --check -o checked",
     "convert": "convert model.osim --motion long.mot -o film.glb",
     "convert, screenshot": "convert model.osim --motion long.mot -o picture.png",
-    "view --film": "view model.osim --motion long.mot --film film.mp4",
+    "view --screenshot": "view model.osim long.mot --screenshot view.png",
     "simulate": "simulate jumper.osim --to 60 -o simulated",
     "simulate --plot": "simulate jumper.osim --to 1 --plot -o drawn",
     "sweep": "sweep walker.osim --vary LHip_rz=-10deg:10deg --samples 4000 -o sweep.csv",
-    "optimize": "optimize walker.osim --objective distance --vary LHip_rz=-20deg:20deg",
+    "optimize": "optimize walker.osim --objective distance --vary LHip_rz=-20deg:20deg"
+    " --vary RHip_rz=-20deg:20deg",
     "gait": "gait steady-walker --perturb 0.05 --basin -o gait",
     "find-gait": "find-gait walker.osim --vary LHip_rz=-30deg:30deg --vary LHip_rz/speed=-4:4",
-    "muscles": "muscles model.osim --coordinate knee_angle_r --plot muscles",
-    "modify": "modify model.osim --replace-muscles DeGrooteFregly2016Muscle -o modified.osim",
+    "muscles": "muscles model.osim --coordinate knee_angle_r --plot --points 400",
+    "modify": "modify model.osim --replace paths=polynomial -o modified.osim",
     "scale": "scale model.osim long.trc --mass 72 --place -o scaled.osim",
     "fit": "fit model.osim long.trc -o fitted",
     "ik": "ik model.osim long.trc -o ik",
@@ -73,7 +74,7 @@ COMMANDS = {
     "run, forward": "run forward_long.xml -o run",
     "run, RRA": "run rra.xml -o run",
     "run, CMC": "run cmc.xml -o run",
-    "run, Moco": "run human.omoco -o run",
+    "run, Moco": "run walks.omoco -o run",
     "check-trial": "check-trial .",
     "scone": "scone human-walks",
     "doctor": "doctor",
@@ -183,7 +184,8 @@ def make_inputs(folder: Path) -> None:
         (many / f"model{number}.osim").write_bytes(model + b"<!-- %d -->\n" % number)
     for name in ("human", "jumper"):
         record_command(["build", name, "-o", f"{name}.osim"], folder)
-    record_command(["build", "human-walks", "-o", "human.omoco"], folder)
+    # The study is written beside its model.
+    record_command(["build", "human-walks", "-o", "walks.osim"], folder)
 
 
 def repeat_rows(source: Path, target: Path, time_column: int) -> None:
