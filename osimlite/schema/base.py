@@ -442,6 +442,22 @@ class Unknown(ModelComponent, abstract=True):
         """Empty list, so that an unknown class may replace a set; its members are part of `content`."""
         return ObjectList()
 
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return super().__getattr__(name)
+        except MissingNameError:
+            if not self.class_name:
+                raise
+            # The text of the object may well have this property: what is missing is its class.
+            raise MissingNameError(partial(self._describe_missing, name)) from None
+
+    def _describe_missing(self, name: str) -> str:
+        """Return the message for a property that code expects of the class that should stand here."""
+        return (
+            f"'{self.name}' is a {self.class_name}, a class that osimlite does not know, so that its '{name}' "
+            "cannot be read; run 'osimlite validate' for its line"
+        )
+
 
 # For every class pydantic evaluates all annotations of its bases again, unless they are evaluated
 # already. Annotations that are not fields it remembers, so they can be dropped.

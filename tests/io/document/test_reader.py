@@ -95,6 +95,18 @@ def test_unknown_classes_in_a_set_keep_their_place_and_name() -> None:
     assert osimlite.read_text(text) == result.model
 
 
+def test_a_property_of_an_unknown_class_is_refused_by_class_and_name(fixtures: Path) -> None:
+    # A coordinate stands where code expects one, so that no earlier check refuses it.
+    text = (fixtures / "lint" / "skeleton.osim").read_text(encoding="utf-8")
+    wrong = text.replace("<Coordinate name", "<Cordinate name").replace(
+        "</Coordinate>", "</Cordinate>"
+    )
+    with pytest.raises(
+        osimlite.OsimliteError, match=r"'\w+' is a Cordinate, a class that osimlite does not know"
+    ):
+        osimlite.mechanism(osimlite.read_text(wrong))
+
+
 def test_wrong_class_duplicates_attributes() -> None:
     result = document(
         '<ForceSet><objects><Body name="b"/></objects></ForceSet><gravity>0 -1 0</gravity><gravity>0 -2 0</gravity>'
