@@ -57,8 +57,8 @@ def cache_per_subject(
 class Subject(CheckTarget):
     """Model under check. A model made in Python has no `source`, an unreadable text has no `model`.
 
-    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is
-    measured of it. If there was no machine code to measure it with, it `needs_remeasuring`: the next
+    `top` is the object at the top of the document, whatever it is; `cache_folder` the folder for what
+    is measured of it. If there was no machine code to measure it with, it `needs_remeasuring`: the next
     check may find more.
     """
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
+
+import osimlite
+from osimlite import errors
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -41,6 +46,30 @@ def test_the_tables_of_forms_name_classes_of_these_files() -> None:
         assert name in {node.name for node in tree.body if isinstance(node, ast.ClassDef)}, (
             f"{path} has no class {name}"
         )
+
+
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
+def test_classes_of_a_section_are_defined_beside_the_files_that_it_names(page: str) -> None:
+    """A class of the same name elsewhere in the package must not hide that a page is outdated."""
+    missing = []
+    on_page = [ROOT / path for path in PATH.findall(read_text(page)) if path.endswith(".py")]
+    known = {*dir(builtins), *dir(osimlite), *dir(errors)}.union(*map(list_definitions, on_page))
+    for section in re.split(r"^##+ ", read_text(page), flags=re.M):
+        named = [ROOT / path for path in PATH.findall(section)]
+        folders = {path if path.is_dir() else path.parent for path in named if path.exists()}
+        files = [file for folder in folders for file in folder.rglob("*.py")]
+        defined = known.union(*map(list_definitions, files))
+        for name in re.findall(r"`([A-Z]\w*[a-z]\w*)(?:\.\w+)?(?:\([^`]*\))?`", section):
+            if name not in defined:
+                missing.append((section.partition("\n")[0], name))
+    assert not missing
+
+
+@cache
+def list_definitions(path: Path) -> set[str]:
+    """Return the names of the classes of a module."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
 def test_the_table_of_rooms_is_complete() -> None:

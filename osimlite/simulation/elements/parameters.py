@@ -267,7 +267,7 @@ class Vector(Numbers):
 
 @dataclass(frozen=True)
 class Curve(Parameter):
-    """Property that is a function of one argument; the law takes its table, for `value_at`.
+    """Property that is a function of one argument; the law takes its table, for `evaluate_function`.
 
     Attributes:
         name: name of the property.
