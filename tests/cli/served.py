@@ -14,9 +14,11 @@ import os
 import sys
 from contextlib import suppress
 from importlib import import_module
+from math import inf
 from pathlib import Path
 
 import osimlite.cli
+from osimlite.cli import _progress
 
 
 def load() -> None:
@@ -33,6 +35,11 @@ def load() -> None:
             with suppress(ImportError):
                 for module in [line.module] if isinstance(line, ast.ImportFrom) else []:
                     import_module(module or "")
+
+
+def keep_quiet() -> None:
+    """Leave out of standard error how far long work is: on a busy machine all work may be long."""
+    _progress.LONG_S = inf
 
 
 def become_one() -> None:
@@ -56,5 +63,6 @@ def become_one() -> None:
 
 if __name__ == "__main__":
     load()
+    keep_quiet()
     become_one()
     osimlite.cli.main()
