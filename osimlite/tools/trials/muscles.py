@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -84,8 +85,9 @@ def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> S
     if not count or not any(True for _ in tool.model.components(Muscle)):
         raise MissingInput(f"{tool} has no muscles, or '{file}' has no row in its time range")
     analysis = MuscleAnalysis(name="muscles", moment_arm_coordinate_list=(), compute_moments=False)
-    # The largest force changes slowly, so that some rows suffice.
-    analysis.step_interval = max(1, count // MAX_ROWS)
+    # The largest force changes slowly, so that some rows suffice. As in OpenSim, the row before the
+    # time range is analysed too.
+    analysis.step_interval = ceil((count + 1) / MAX_ROWS)
     setup = AnalyzeTool(
         name="trial",
         model_file=str(tool.model_file.absolute()),
