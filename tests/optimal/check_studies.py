@@ -12,7 +12,12 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.moco import MocoTrajectory, build_problem, evaluate, solve
+from osimlite.optimal.ipopt import Violation
 from osimlite.optimal.program import Program
+from osimlite.optimal.solution import MocoSolution
+from osimlite.tools.job import Job
+from osimlite.tools.moco_tools import report_solution
+from osimlite.tools.outcome import Outcome
 from tests.optimal import small
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 
@@ -160,6 +165,27 @@ def test_progress_names_what_is_violated_and_when(tmp_path):
     assert found.status == "Maximum_Iterations_Exceeded"
     assert "defect at" in str(told[1])
     assert found.violations[0].size >= found.violations[-1].size > 0.0
+
+
+@pytest.mark.parametrize(
+    ("success", "name", "count"), [(True, "largest violation", 1), (False, "not fulfilled", 5)]
+)
+def test_a_failure_names_more_violations_than_a_solution(success, name, count, tmp_path):
+    file = study_file(tmp_path, "pendulum-50")
+    problem = build_problem(file)
+    motion = MocoTrajectory.read(moco_found(tmp_path, "pendulum-50"))
+    violations = [Violation(f"row {number}", 0.1, 1.0 / (1 + number)) for number in range(7)]
+    solution = MocoSolution(motion, success, "a status", 3.0, {"goal": 3.0}, violations, 4, 0.5)
+    outcome = Outcome()
+    report_solution(Job(problem.study, file), problem, solution, outcome)
+    assert outcome.done is success
+    told = [
+        words for title, words in outcome.told if title in ("largest violation", "not fulfilled")
+    ]
+    assert told == [str(violation) for violation in violations[:count]]
+    assert (name, told[0]) in outcome.told
+    # Nobody has asked for a simulation of the solution.
+    assert not {"simulated", "not simulated"} & {title for title, _ in outcome.told}
 
 
 def test_an_interrupt_keeps_the_best_so_far(tmp_path):

@@ -150,13 +150,15 @@ def test_loops(fixtures) -> None:
         assemble_motion(build_mechanism(model), np.zeros(20), wanted)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-20, 1e20])
 @pytest.mark.parametrize("size", [1, 2, 5, 12])
-def test_eigenvalues(size: int) -> None:
-    matrix = np.random.default_rng(size).normal(size=(size, size))
+def test_eigenvalues(size: int, scale: float) -> None:
+    """Of small and large numbers alike: the search ends by the ratio of entries, not by their size."""
+    matrix = scale * np.random.default_rng(size).normal(size=(size, size))
     matrix += matrix.T
     work, vectors = matrix.copy().reshape(-1), np.zeros(size * size)
     diagonalize(size, work, vectors)
     values, rows = work.reshape(size, size).diagonal(), vectors.reshape(size, size)
-    assert np.sort(values) == pytest.approx(np.linalg.eigvalsh(matrix), abs=1e-13)
+    assert np.sort(values) == pytest.approx(np.linalg.eigvalsh(matrix), abs=scale * 1e-13)
     assert rows @ rows.T == pytest.approx(np.eye(size), abs=1e-13)
-    assert rows.T @ np.diag(values) @ rows == pytest.approx(matrix, abs=1e-13)
+    assert rows.T @ np.diag(values) @ rows == pytest.approx(matrix, abs=scale * 1e-13)

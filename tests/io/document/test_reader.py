@@ -14,6 +14,7 @@ from osimlite.io.document.reader import Document, read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.schema.frames import BodySet
 from osimlite.schema.model import Model
 
 
@@ -241,6 +242,17 @@ def test_what_was_just_read_knows_its_place() -> None:
     (body,) = model.body_set.objects
     assert (body.path, body.model, body.parent) == ("/bodyset/b", model, model.body_set)
     assert body.copy_deep().model is None
+
+
+def test_parts_of_a_text_belong_to_its_model_or_to_none() -> None:
+    bodies = '<BodySet><objects><Body name="b"/></objects></BodySet>'
+    text = f'<OpenSimDocument Version="40600"><Model name="m">{bodies}</Model></OpenSimDocument>'
+    model = osimlite.read_text(text)
+    # The first question: there is no tree of components that could answer it.
+    assert model.body_set.objects[0].model is model
+    alone = Source(f'<OpenSimDocument Version="40600">{bodies}</OpenSimDocument>'.encode())
+    body_set = read_document(alone, expected_class=BodySet).top
+    assert body_set.objects[0].model is None
 
 
 def test_an_optional_number_may_be_empty_and_an_optional_text_is_then_empty() -> None:

@@ -1,0 +1,51 @@
+"""The process that reads a .c3d file has limits, and tells a reason in place of a traceback."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+resource = pytest.importorskip("resource", reason="limits of processes are those of POSIX")
+
+PROGRAM = """
+import resource, sys
+import numpy as np
+from osimlite.io.tables import c3d_process
+
+def read(path):
+    names = (resource.RLIMIT_CPU, resource.RLIMIT_AS, resource.RLIMIT_CORE)
+    limits = [resource.getrlimit(name)[0] for name in names]
+    return {"times": np.array([float(path)]), "limits": np.array(limits)}
+
+lowest = sys.argv.pop()
+if lowest:
+    resource.setrlimit(resource.RLIMIT_CPU, (int(lowest), int(lowest)))
+c3d_process.READERS["markers"] = read
+c3d_process.run_process()
+"""
+
+
+def run(time: str, lowest: str = "") -> subprocess.CompletedProcess[bytes]:
+    """Run the process with a reader that returns its limits, and a limit that the system has set."""
+    command = [sys.executable, "-c", PROGRAM, "markers", time, "120", lowest]
+    return subprocess.run(command, capture_output=True, check=False, timeout=200)
+
+
+@pytest.mark.parametrize(("lowest", "seconds"), [("", 120), ("90", 90), ("500", 120)])
+def test_limits_are_set_as_far_as_the_system_lets(lowest: str, seconds: int) -> None:
+    done = run("0.5", lowest)
+    assert done.returncode == 0, done.stderr.decode()
+    limits = np.load(io.BytesIO(done.stdout))["limits"].tolist()
+    assert limits == [seconds, 4_000_000_000, 0]
+
+
+@pytest.mark.parametrize(("time", "said"), [("nan", "its frames have no times"), ("x", "'x'")])
+def test_the_reason_is_told(time: str, said: str) -> None:
+    done = run(time)
+    assert done.returncode == 1 and said in json.loads(done.stdout)["error"]
+    assert not done.stderr
