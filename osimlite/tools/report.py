@@ -34,6 +34,7 @@ from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import contact_forces
+from osimlite.view.page import page_data, page_text
 from osimlite.view.panels import (
     COLORS,
     STYLES,
@@ -369,11 +370,8 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
     )
     viewer = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
     # A report shows no findings about the model.
-    page = (
-        replace(viewer, findings=())
-        .page_text()
-        .replace("</style>", f"{NO_SIDEBAR_STYLE}</style>", 1)
-    )
+    data = page_data(viewer.model, viewer.scene, viewer.motion, (), viewer.q)
+    page = page_text(data).replace("</style>", f"{NO_SIDEBAR_STYLE}</style>", 1)
     note = "Green: as measured; pink: of the model." if measured else ""
     return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
 

@@ -30,7 +30,7 @@ def run(*words: object, folder: Path | None = None, text: str = "") -> Done:
     environment = {**os.environ, "COLUMNS": "80", "PYTHONPATH": str(ROOT)}
     where, given = str(folder or Path.cwd()), [*map(str, words)]
     done = (_served if hasattr(os, "fork") else _started)(given, where, text, environment)
-    assert "Traceback" not in done.err
+    assert "Traceback" not in done.err, done.err
     return done
 
 

@@ -101,6 +101,9 @@ def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)', outside) and "<script" not in outside
     viewers = data_of(page)
     assert [viewer["name"] for viewer in viewers] == ['a <b>"model"'] * 2
+    # The model has findings; the report is about the motion.
+    assert osimlite.validate(trials / "model.osim").findings
+    assert [viewer["findings"] for viewer in viewers] == [[], []]
     measured = viewers[0]["motion"]["measured"]
     assert [marker["name"] for marker in measured["markers"]] == ["one", "two", "three", "four"]
 
