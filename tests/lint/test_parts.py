@@ -36,7 +36,7 @@ def asked(monkeypatch):
     def measured(model, **given):
         result = own(model, **given)
         results.append(
-            sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ()))
+            sorted(set(result.swept) - set(given["earlier"][1].swept if given["earlier"] else ()))
         )
         return result
 

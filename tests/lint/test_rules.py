@@ -262,6 +262,14 @@ def test_the_place_of_an_old_connector_is_the_name_in_it():
     assert "names 'b'" in finding.message
 
 
+def test_the_place_of_a_cdata_section_is_its_beginning():
+    text = """<OpenSimDocument Version="40600"><Model name="m"><BodySet><objects><Body name="b">
+        <mass>1
+            .5<![CDATA[0]]></mass></Body></objects></BodySet></Model></OpenSimDocument>"""
+    (finding,) = validate(Source(text.encode()), select="OSIM107").findings
+    assert (finding.line, finding.column, finding.length) == (3, 15, len("<![CDATA["))
+
+
 @pytest.mark.parametrize(
     ("tag", "nearest"), [("OpenSim::Body", "Body"), ("xml:Body", "Body"), ("o:body", "Body")]
 )
