@@ -32,6 +32,16 @@ def poses(path, states):
         result.append({body.getName(): body.getWorldTransform().matrix().tolist() for body in bodies})
     return {"names": names, "poses": result}
 
+def moments(path, positions, velocities, accelerations, gravity):
+    skeleton = nimble.biomechanics.OpenSimParser.parseOsim(path, "", True).skeleton
+    skeleton.setGravity(np.array(gravity))
+    result = []
+    for position, velocity, acceleration in zip(positions, velocities, accelerations):
+        skeleton.setPositions(np.array(position))
+        skeleton.setVelocities(np.array(velocity))
+        result.append(skeleton.getInverseDynamics(np.array(acceleration)).tolist())
+    return result
+
 def subject(path):
     file = nimble.biomechanics.SubjectOnDisk(path)
     trials = []
@@ -68,7 +78,7 @@ def subject(path):
     return {"header": header, "trials": trials}
 
 question = json.load(sys.stdin)
-answer = {"poses": poses, "subject": subject}[question[0]](*question[1:])
+answer = {"poses": poses, "moments": moments, "subject": subject}[question[0]](*question[1:])
 os.write(1, b"\\nANSWER" + json.dumps(answer).encode() + b"\\n")
 """
 

@@ -160,7 +160,7 @@ class SubjectFolder:
             self._models[index] = f"models/{name}.osim"
             self.fidelity.translated[f"/passes/{name}/model"] = self._models[index]
             # The conversion changes the model in place.
-            model = self.subject.read_model(index).copy_deep()
+            model = self.subject.read_model(index)
             try:
                 # Changes that do nothing in OpenSim are for information only.
                 changes = [change for change in convert_from_nimble(model) if change.done]

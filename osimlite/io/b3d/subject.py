@@ -443,7 +443,7 @@ class B3dSubject:
         return _get_name(DATA_QUALITIES, self.header["quality"])
 
     def read_model(self, processing_pass: int = -1) -> Model:
-        """Return the model of a processing pass.
+        """Return the model of a processing pass, a new one in each call.
 
         Args:
             processing_pass: index of the pass; the last one by default.
@@ -452,6 +452,10 @@ class B3dSubject:
             DocumentError: the text is not a model.
             SettingError: there is no such pass.
         """
+        return self._read_shared_model(processing_pass).copy_deep()
+
+    def _read_shared_model(self, processing_pass: int) -> Model:
+        """Return the model of a processing pass, which nobody may change."""
         count = len(self.model_texts)
         # Negative indices count from the last pass, as for lists.
         index = processing_pass + count if processing_pass < 0 else processing_pass
@@ -484,7 +488,8 @@ class B3dSubject:
             DocumentError: the model cannot be read, or has another number of coordinates.
         """
         names = tuple(
-            coordinate.name for coordinate in list_coordinates(self.read_model(processing_pass))
+            coordinate.name
+            for coordinate in list_coordinates(self._read_shared_model(processing_pass))
         )
         if len(names) != self.header["dof_count"]:
             raise DocumentError(

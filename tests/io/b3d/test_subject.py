@@ -36,6 +36,16 @@ def test_the_header_is_read(path: Path) -> None:
     assert subject.read_model().name == "walker"
 
 
+def test_a_changed_model_changes_no_later_reading(path: Path) -> None:
+    subject = osimlite.read_b3d(path)
+    model = subject.read_model()
+    model.gravity = (0.0, 0.0, 0.0)
+    for joint in list(model.joint_set.objects):
+        joint.coordinates.clear()
+    assert subject.read_model().gravity != model.gravity
+    assert subject.trials[0].read_coordinates().columns == files.NIMBLE_ORDER
+
+
 def test_every_number_is_read(path: Path) -> None:
     subject = read_b3d(path)
     for index, trial in enumerate(subject.trials):
