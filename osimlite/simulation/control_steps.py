@@ -23,7 +23,6 @@ from osimlite.mechanics.kernels.reflexes import LEG_STATE, REFLEXES
 from osimlite.mechanics.kernels.sensors import SENSES
 from osimlite.mechanics.kernels.walks import LEGS, PROGRESS
 from osimlite.mechanics.multibody.functions import ConstantValue, PiecewiseConstant, SmoothFunction
-from osimlite.simulation.options import INITIAL_STEP_S
 from osimlite.simulation.run_controls import find_constant_offsets
 
 if TYPE_CHECKING:
@@ -232,7 +231,7 @@ class ControllerRuns:
         before: record of the earlier run that a single run continues.
 
     Attributes:
-        next_step: first step that the integrator tries, s.
+        next_step: step with which the earlier run ended, s; None without one.
         parts: further arguments of the law `run_by_reflexes`.
     """
 
@@ -245,11 +244,9 @@ class ControllerRuns:
         earlier_record: StoTable | None,
     ) -> None:
         first_controller, count = controllers[0], len(controllers)
-        self.controller, self._before, self.next_step = (
-            first_controller,
-            earlier_record,
-            INITIAL_STEP_S,
-        )
+        self.controller = first_controller
+        self._before = earlier_record
+        self.next_step: float | None = None
         plan, senses = first_controller.plan.copy(), first_controller.senses
         # All runs use the memory of the longest delay.
         plan[REFLEXES.KEPT] = max(controller.plan[REFLEXES.KEPT] for controller in controllers)

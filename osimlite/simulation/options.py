@@ -72,8 +72,9 @@ class IntegrationOptions:
 
     The records of simulations, batches, sweeps and learning tasks extend this one, and hand its
     options on with :meth:`integration_choices`. A new option of the integrator is therefore one
-    attribute here, and its use in `simulation/engines`. An attribute with a help text is an option
-    of the commands too.
+    attribute here, and its use: `BatchWorkspace` of `simulation/engines/batch.py` hands numbers to
+    the kernels, for single motions too. The first step is chosen by :attr:`initial_step`. An
+    attribute with a help text is an option of the commands too.
     """
 
     accuracy: float = define_option(
@@ -95,6 +96,12 @@ class IntegrationOptions:
         more="shortest and longest step of 'merson' and 'euler2', s. A step of the shortest length is accepted "
         "whatever its error.",
     )
+
+    @property
+    def initial_step(self) -> float:
+        """First step that the integrator tries, s; within `step_bounds`."""
+        shortest, longest = self.step_bounds
+        return min(max(INITIAL_STEP_S, shortest), longest)
 
     def integration_choices(self) -> dict[str, Any]:
         """Return the values of the integration options, as keyword arguments for another record.

@@ -79,5 +79,11 @@ def test_steps_keep_their_bounds():
             simulation.run(0.1, step_bounds=(0.0, 0.01), fixed_step=1e-3)
         with pytest.raises(SettingError, match=r"no effect on the steps of 'adams'; .*merson or"):
             simulation.run(0.1, step_bounds=(0.0, 0.01), integrator="adams")
+        # The first step of a batch keeps them too: without bounds it is 0.01 s.
+        (start,) = simulation.engine.run_many(
+            [simulation.initial_state({}, {})],
+            BatchOptions(to=0.01, accuracy=0.01, step_bounds=(0.0, 1e-3)),
+        ).counts[:, 0]
+    assert start >= 10, "the first step is longer than allowed"
     assert short.summary["steps"] >= 100 > free.summary["steps"]
     assert short.summary["settings"]["step_bounds"] == (0.0, 1e-3)

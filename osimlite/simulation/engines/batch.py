@@ -16,7 +16,6 @@ from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.batches import BatchOptions
-from osimlite.simulation.options import INITIAL_STEP_S
 
 if TYPE_CHECKING:
     from osimlite.simulation.control_steps import ControllerRuns
@@ -37,7 +36,7 @@ class BatchWorkspace:
         states: initial states (W, y).
         options: options; watches are given as `kinds` and `levels`.
         start: start time, s.
-        next_step: first step that is tried, s.
+        next_step: first step that is tried, s; that of the options if None.
         vectors: numbers of the model, one row for all runs or one for each.
         kinds: kinds of the watches (k, 3).
         levels: levels of the watches (k, 7).
@@ -66,7 +65,7 @@ class BatchWorkspace:
         options: BatchOptions,
         *,
         start: float = 0.0,
-        next_step: float = INITIAL_STEP_S,
+        next_step: float | None = None,
         vectors: Floats | None = None,
         kinds: Ints = NO_WATCH_KINDS,
         levels: Floats = NO_WATCH_LEVELS,
@@ -106,7 +105,7 @@ class BatchWorkspace:
         address = program.code.get_address(options.integrator)
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
-        self.clocks[:] = start, next_step
+        self.clocks[:] = start, options.initial_step if next_step is None else next_step
         self.counts = np.zeros((count, record.COUNTS.SIZE), dtype=np.int64)
         self.endings = np.zeros(count, dtype=np.int64)
         # Rows that a run does not reach stay NaN.

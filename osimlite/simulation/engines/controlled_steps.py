@@ -18,7 +18,6 @@ from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.options import (
     DEFAULT_ACCURACY,
-    INITIAL_STEP_S,
     INTEGRATORS,
     IntegrationOptions,
 )
@@ -88,12 +87,10 @@ class ControlledSteps(Stepper):
         self._options = options
         self._accuracy = options.accuracy
         self._held = held
-        shortest, longest = options.step_bounds
-        self.next_step = (
-            # A resumed controller continues with the step of the earlier run, so that both together
-            # equal one run.
-            min(max(INITIAL_STEP_S, shortest), longest) if held is None else held.next_step
-        )
+        # A resumed controller continues with the step of the earlier run, so that both together
+        # equal one run.
+        resumed_step = held.next_step if held is not None else None
+        self.next_step = options.initial_step if resumed_step is None else resumed_step
         self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (
