@@ -12,6 +12,7 @@ import osimlite
 from osimlite.cli._fidelity_table import tabulate
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.geometry import Mesh
+from osimlite.translate.exporters import list_exporters
 from osimlite.translate.fidelity import Fidelity
 from tests.cli.command import run
 from tests.simulation.elements.muscle_rows import hung, muscle
@@ -139,10 +140,14 @@ def test_paths_are_called_by_the_names_of_their_muscles() -> None:
     assert list(tabulate(fidelity, "MJCF").columns[2].cells) == ["BRA and TRIlat"]
 
 
+FORMATS = " or ".join(repr(name) for name in (*list_exporters("translate"), "osim"))
+"""What `--to` accepts, as messages say it."""
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("walker.osim", "--to", "sdf"), "--to is 'urdf' or 'mjcf' or 'osim', not 'sdf'"),
+        (("walker.osim", "--to", "sdf"), f"--to is {FORMATS}, not 'sdf'"),
         (("walker.osim", "--to", "mjcf", "--merge"), "--merge is an option of --to urdf"),
         (("walker.osim", "--mujoco", "3"), "--mujoco is an option of --to mjcf"),
         (("walker.osim", "--to", "mjcf", "--mujoco", "2"), "MuJoCo 3 or 4, not 2"),
