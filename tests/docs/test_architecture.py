@@ -67,9 +67,9 @@ def test_classes_of_a_section_are_defined_beside_the_files_that_it_names(page: s
 
 @cache
 def list_definitions(path: Path) -> set[str]:
-    """Return the names of the classes of a module."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
+    """Return the names of the classes and of the types in variables of a module."""
+    # Parsing all files of the package would take seconds.
+    return {*re.findall(r"^(?:class )?(\w+)(?: =|[:(])", path.read_text(encoding="utf-8"), re.M)}
 
 
 def test_the_table_of_rooms_is_complete() -> None:
