@@ -17,7 +17,9 @@ from tests.simple_models import make_slide
 STRENGTH_N, OPTIMAL_M, TENDON_M = 200.0, 0.1, 0.02
 
 
-def write_trial(folder: Path, count: int, first: float = 0.1, last: float = 0.9) -> TrialTool:
+def write_trial(
+    folder: Path, count: int, first: float = 0.1, last: float = 0.9, cutoff: float = -1.0
+) -> TrialTool:
     """A muscle that a motion of some rows in one second pulls to 1.35 of its optimal length, and a setup."""
     muscle = osimlite.Thelen2003Muscle(
         name="muscle",
@@ -53,7 +55,7 @@ def write_trial(folder: Path, count: int, first: float = 0.1, last: float = 0.9)
         model_file="model.osim",
         coordinates_file="motion.sto",
         time_range=(first, last),
-        lowpass_cutoff_frequency_for_coordinates=-1.0,
+        lowpass_cutoff_frequency_for_coordinates=cutoff,
     )
     osimlite.write(setup, folder / "id.xml")
     return TrialTool(TrialFolder([folder]), Job(setup, folder / "id.xml"))
@@ -81,10 +83,31 @@ def test_forces_at_some_rows_of_the_range(tmp_path: Path, count: int) -> None:
     assert min(len(inside), MAX_ROWS // 2) <= len(table.times) <= MAX_ROWS
 
 
+@pytest.mark.parametrize(("first", "rows"), [(0.005, 51), (0.015, 100)])
+def test_as_many_rows_as_may_be_and_no_more(tmp_path: Path, first: float, rows: int) -> None:
+    tool = write_trial(tmp_path, 101, first, 2.0)
+    table = compute_passive_forces(tool, tmp_path / "motion.sto", is_states=False)
+    assert MAX_ROWS == 100 and len(table.times) == rows
+
+
+def test_a_range_beyond_the_file_has_all_rows(tmp_path: Path) -> None:
+    tool = write_trial(tmp_path, 11, -1.0, 2.0)
+    table = compute_passive_forces(tool, tmp_path / "motion.sto", is_states=False)
+    assert table.times == pytest.approx(np.linspace(0.0, 1.0, 11))
+
+
 def test_fibers_of_states_are_those_of_the_file(tmp_path: Path) -> None:
     tool = write_trial(tmp_path, 11)
     table = compute_passive_forces(tool, tmp_path / "states.sto", is_states=True)
     assert table.times == pytest.approx(np.linspace(0.1, 0.9, 9))
+    np.testing.assert_allclose(table["muscle"], passive(table.times), rtol=1e-6)
+
+
+def test_motions_are_filtered_and_states_are_not(tmp_path: Path) -> None:
+    tool = write_trial(tmp_path, 101, cutoff=0.5)
+    filtered = compute_passive_forces(tool, tmp_path / "motion.sto", is_states=False)
+    assert filtered["muscle"].max() < 0.8 * passive(np.array([0.5]))[0]
+    table = compute_passive_forces(tool, tmp_path / "states.sto", is_states=True)
     np.testing.assert_allclose(table["muscle"], passive(table.times), rtol=1e-6)
 
 
