@@ -295,14 +295,7 @@ def _explain_reference(
     last_name = text.rstrip("/").rpartition("/")[2]
     same_name = [word for word in valid_texts if word.rpartition("/")[2] == last_name]
     if same_name and resolution.failure != "wrong-type" and _differs_in_form(text, same_name):
-        return BrokenReference(
-            use,
-            text,
-            "form",
-            None,
-            pick_closest(text, same_name),
-            "" if len(same_name) == 1 else "several",
-        )
+        return _make_form_fault(use, text, same_name)
     wrong_target = resolution.found or _find_elsewhere(subject, use, text)
     if wrong_target is not None and is_a(wrong_target, reference.target):
         # A coordinate, but of another joint.
@@ -316,14 +309,7 @@ def _explain_reference(
             return BrokenReference(
                 use, text, "wrong-type", wrong_target, pick_closest(text, same_name)
             )
-        return BrokenReference(
-            use,
-            text,
-            "form",
-            None,
-            pick_closest(text, same_name),
-            "" if len(same_name) == 1 else "several",
-        )
+        return _make_form_fault(use, text, same_name)
     lowered = [word for word in valid_texts if word.lower() == text.lower()]
     if lowered:
         return BrokenReference(use, text, "case", None, lowered[0])
@@ -336,6 +322,18 @@ def _explain_reference(
         else sorted(set(valid_texts).difference(current_values or ()))
     )
     return BrokenReference(use, text, "missing", None, find_nearest_name(text, unused_texts), hint)
+
+
+def _make_form_fault(use: Use, text: str, same_name: list[str]) -> BrokenReference:
+    """Return the fault of a reference that names an object in a form that OpenSim does not resolve.
+
+    Args:
+        use: the reference.
+        text: its text.
+        same_name: texts with the same last name that are valid there.
+    """
+    certainty = "" if len(same_name) == 1 else "several"
+    return BrokenReference(use, text, "form", None, pick_closest(text, same_name), certainty)
 
 
 def _list_right_words(subject: Subject, use: Use) -> list[str]:

@@ -77,21 +77,15 @@ class ConstraintEquations(Protocol):
 
 
 @dataclass(frozen=True)
-class Lock(ConstraintEquations):
-    """Keeps the value of one coordinate constant.
-
-    It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint does
-    not change, whatever angular velocity this requires. Any value is accepted as long as it stays
-    constant.
-    """
+class CoordinateConstraint(ConstraintEquations):
+    """Constrains one coordinate, and no body directly."""
 
     bodies: ClassVar[tuple[int, ...]] = ()
     coordinate: int
-    name: str = "lock"
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Index of the locked coordinate.
+        """Index of the coordinate.
 
         Returns:
             Indices in the mechanism.
@@ -100,25 +94,26 @@ class Lock(ConstraintEquations):
 
 
 @dataclass(frozen=True)
-class PrescribedCoordinate(ConstraintEquations):
+class Lock(CoordinateConstraint):
+    """Keeps the value of one coordinate constant.
+
+    It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint does
+    not change, whatever angular velocity this requires. Any value is accepted as long as it stays
+    constant.
+    """
+
+    name: str = "lock"
+
+
+@dataclass(frozen=True)
+class PrescribedCoordinate(CoordinateConstraint):
     """Makes one coordinate follow a function of time (s).
 
     The error is the coordinate minus the function.
     """
 
-    bodies: ClassVar[tuple[int, ...]] = ()
-    coordinate: int
     function: SmoothFunction
     name: str = "prescribed coordinate"
-
-    @property
-    def coordinates(self) -> tuple[int, ...]:
-        """Index of the prescribed coordinate.
-
-        Returns:
-            Indices in the mechanism.
-        """
-        return (self.coordinate,)
 
 
 @dataclass(frozen=True)

@@ -143,8 +143,22 @@ def require_positive(name: str) -> Number:
     return Number(name, lambda value: value > 0.0, "is not positive; give it a positive value")
 
 
+class NumbersParameter(Parameter):
+    """Parameter whose value is a sequence of numbers of fixed position."""
+
+    def pack(
+        self, value: Sequence[float], tail: Tail, where: str
+    ) -> tuple[Sequence[int], Sequence[float]]:
+        """Return no integers and the values.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
+        return (), value
+
+
 @dataclass(frozen=True)
-class Numbers(Parameter):
+class Numbers(NumbersParameter):
     """Several numbers that are computed from a component together."""
 
     count: int  # number of values
@@ -173,19 +187,9 @@ class Numbers(Parameter):
         """Return one expression for each value."""
         return [f"p[{number + k}]" for k in range(self.count)]
 
-    def pack(
-        self, value: Sequence[float], tail: Tail, where: str
-    ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return no integers and the values.
-
-        Returns:
-            Integers and numbers of fixed position.
-        """
-        return (), value
-
 
 @dataclass(frozen=True)
-class Fields(Parameter):
+class Fields(NumbersParameter):
     """Numbers that the law takes as one named tuple."""
 
     type: type[Any]  # type of the tuple; its first fields are the properties
@@ -228,16 +232,6 @@ class Fields(Parameter):
             Functions or types by name.
         """
         return {self.type.__name__: self.type}
-
-    def pack(
-        self, value: Sequence[float], tail: Tail, where: str
-    ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return no integers and the values of the tuple.
-
-        Returns:
-            Integers and numbers of fixed position.
-        """
-        return (), value
 
 
 @dataclass(frozen=True)

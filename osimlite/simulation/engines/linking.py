@@ -94,8 +94,11 @@ class Code(ABC):
 class _MachineCode(Code):
     """Backend of machine code; see :class:`Code`."""
 
+    _suffix = ""
+    """Suffix of the names of compiled functions behind those of the kernels."""
+
     def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
-        if not machine_code.can_prepare((*functions, *later)):
+        if not machine_code.can_prepare([name + self._suffix for name in (*functions, *later)]):
             warn_of_python()
             return self._fall_back_to_python()
         try:
@@ -164,18 +167,6 @@ class Tangents(_MachineCode):
         super().__init__(f"machine code along {directions} directions")
         self._width = 1 + directions
         self._suffix = f"{ALONG}{directions}"
-
-    def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
-        """Return this backend, or Python where the functions cannot be compiled."""
-        if not machine_code.can_prepare([name + self._suffix for name in (*functions, *later)]):
-            warn_of_python()
-            return self._fall_back_to_python()
-        try:
-            self.make_ready(functions)
-        except CompilationError as error:
-            warn_of_python(str(error))
-            return self._fall_back_to_python()
-        return self
 
     def _fall_back_to_python(self) -> Code:
         """Return the Python backend with dual numbers."""

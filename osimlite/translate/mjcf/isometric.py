@@ -1,4 +1,4 @@
-"""Isometric tension of forces along paths, by OpenSim's laws."""
+"""Isometric tension of forces along paths by OpenSim's laws, and MuJoCo's active force over length."""
 
 from __future__ import annotations
 
@@ -62,3 +62,34 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
                 state = system.equilibrate_muscles(activation, [length, 0.0, *start])
                 row[index] = system.force_records(activation, state)[0]
     return result
+
+
+def compute_mujoco_active_force(lengths: Array, lmin: float, lmax: float) -> Array:
+    """Return the normalized active force of MuJoCo's muscles over the length of their fibers.
+
+    It consists of four parabolas: it rises from 0 at `lmin` to 1 at the normalized length 1, and
+    falls to 0 at `lmax` (MuJoCo's `mju_muscleGainLength`).
+
+    Args:
+        lengths: normalized lengths (L,).
+        lmin: normalized length below which there is no force.
+        lmax: normalized length above which there is no force.
+    """
+    rising_mid, falling_mid = 0.5 * (lmin + 1.0), 0.5 * (1.0 + lmax)
+    is_short = lengths <= 1.0
+    # Widths of 0 give NaN only where another branch is selected.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner_distance = np.where(
+            is_short, (1.0 - lengths) / (1.0 - rising_mid), (lengths - 1.0) / (falling_mid - 1.0)
+        )
+        outer_distance = np.where(
+            is_short,
+            (lengths - lmin) / (rising_mid - lmin),
+            (lmax - lengths) / (lmax - falling_mid),
+        )
+    force = np.where(
+        (lengths < rising_mid) | (lengths > falling_mid),
+        0.5 * outer_distance**2,
+        1.0 - 0.5 * inner_distance**2,
+    )
+    return np.where((lengths < lmin) | (lengths > lmax), 0.0, force)

@@ -31,7 +31,10 @@ from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Mu
 from osimlite.schema.states import list_states
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import MjcfDraft, Untranslatable, add_element, clear_rounding
-from osimlite.translate.mjcf.isometric import compute_isometric_tension
+from osimlite.translate.mjcf.isometric import (
+    compute_isometric_tension,
+    compute_mujoco_active_force,
+)
 
 COMPARED_ACTIVATIONS = (0.01, 0.5, 1.0)
 """Activations at which isometric tensions are compared."""
@@ -98,23 +101,7 @@ class Curves(NamedTuple):
             activations: activations (A,).
         """
         x = (lengths - self.tendon) / self.fiber
-        rising_mid = 0.5 * (self.lmin + 1.0)
-        falling_mid = 0.5 * (1.0 + self.lmax)
-        is_short = x <= 1.0
-        inner_distance = np.where(
-            is_short, (1.0 - x) / (1.0 - rising_mid), (x - 1.0) / (falling_mid - 1.0)
-        )
-        outer_distance = np.where(
-            is_short,
-            (x - self.lmin) / (rising_mid - self.lmin),
-            (self.lmax - x) / (self.lmax - falling_mid),
-        )
-        active = np.where(
-            (x < rising_mid) | (x > falling_mid),
-            0.5 * outer_distance**2,
-            1.0 - 0.5 * inner_distance**2,
-        )
-        active[(x < self.lmin) | (x > self.lmax)] = 0.0
+        active = compute_mujoco_active_force(x, self.lmin, self.lmax)
         stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
         passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
         return self.force * (np.multiply.outer(activations, active) + passive)

@@ -119,6 +119,30 @@ def _read_dynamics(draft: ConversionDraft, actuator: int) -> float | None:
     return None
 
 
+def _read_linear_law(
+    draft: ConversionDraft, actuator: int, gear: float
+) -> tuple[float, tuple[float, float, float], float] | None:
+    """Return gain, bias and time constant (s) of a force that is a linear function of the control.
+
+    The bias has a constant and factors of length and speed. Other actuators are left out: the
+    result is None, and the draft has a record of them.
+
+    Args:
+        draft: draft of the model.
+        actuator: index of the actuator.
+        gear: its gear; one of 0 makes an actuator without a force.
+    """
+    gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
+    if gain_and_bias is None or delay is None or not gear:
+        draft.drop(
+            "actuator",
+            actuator,
+            "a force that is no linear function of the control, or other dynamics",
+        )
+        return None
+    return *gain_and_bias, delay
+
+
 def _set_limits(
     draft: ConversionDraft, actuator: int, force: ScalarActuator, gain: float, biased: bool
 ) -> None:
@@ -146,18 +170,11 @@ def _set_limits(
 
 
 def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> None:
-    model = draft.mj
-    gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
-    gear = float(model.actuator_gear[actuator, 0])
-    # A gear of 0 makes an actuator without a force.
-    if gain_and_bias is None or delay is None or not gear:
-        draft.drop(
-            "actuator",
-            actuator,
-            "a force that is no linear function of the control, or other dynamics",
-        )
+    gear = float(draft.mj.actuator_gear[actuator, 0])
+    law = _read_linear_law(draft, actuator, gear)
+    if law is None:
         return
-    gain, (constant, by_length, by_speed) = gain_and_bias
+    gain, (constant, by_length, by_speed), delay = law
     coordinate = draft.coordinates[joint][0]
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
     force: CoordinateActuator
@@ -231,15 +248,10 @@ def _add_path_actuator(
     draft: ConversionDraft, actuator: int, path: TendonPath, gear: float
 ) -> None:
     """Add an actuator of a tendon; a positive force of MuJoCo lengthens it, OpenSim's shortens it."""
-    gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
-    if gain_and_bias is None or delay is None or not gear:
-        draft.drop(
-            "actuator",
-            actuator,
-            "a force that is no linear function of the control, or other dynamics",
-        )
+    law = _read_linear_law(draft, actuator, gear)
+    if law is None:
         return
-    gain, (constant, by_length, by_speed) = gain_and_bias
+    gain, (constant, by_length, by_speed), delay = law
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
     force = PathActuator(name=name, geometry_path=_copy(path).path, optimal_force=-gain * gear)
     biased = any((constant, by_length, by_speed))

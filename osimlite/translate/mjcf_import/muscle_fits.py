@@ -31,6 +31,7 @@ from osimlite.schema.muscle_curves import (
     FiberForceLengthCurve,
     ForceVelocityCurve,
 )
+from osimlite.translate.mjcf.isometric import compute_mujoco_active_force
 
 POINTS = 27
 """Number of points in which a curve is fitted."""
@@ -64,24 +65,7 @@ class Shape(NamedTuple):
 
     def active(self, x: Array) -> Array:
         """Return the active force at normalized lengths."""
-        rising_mid, falling_mid = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
-        is_short = x <= 1.0
-        # Widths of 0 give NaN only where another branch is selected.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inner_distance = np.where(
-                is_short, (1.0 - x) / (1.0 - rising_mid), (x - 1.0) / (falling_mid - 1.0)
-            )
-            outer_distance = np.where(
-                is_short,
-                (x - self.lmin) / (rising_mid - self.lmin),
-                (self.lmax - x) / (self.lmax - falling_mid),
-            )
-        force = np.where(
-            (x < rising_mid) | (x > falling_mid),
-            0.5 * outer_distance**2,
-            1.0 - 0.5 * inner_distance**2,
-        )
-        return np.where((x < self.lmin) | (x > self.lmax), 0.0, force)
+        return compute_mujoco_active_force(x, self.lmin, self.lmax)
 
     def velocity(self, v: Array) -> Array:
         """Return the factor of the active force at normalized velocities."""
