@@ -171,13 +171,13 @@ def test_progress_names_what_is_violated_and_when(tmp_path):
     ("success", "name", "count"), [(True, "largest violation", 1), (False, "not fulfilled", 5)]
 )
 def test_a_failure_names_more_violations_than_a_solution(success, name, count, tmp_path):
-    file = study_file(tmp_path, "pendulum-50")
-    problem = build_problem(file)
-    motion = MocoTrajectory.read(moco_found(tmp_path, "pendulum-50"))
+    problem = build_problem(small.study_of(small.links()))
+    layout = Program(problem).layout
+    motion = MocoTrajectory.from_variables(layout, layout.make_guess())
     violations = [Violation(f"row {number}", 0.1, 1.0 / (1 + number)) for number in range(7)]
     solution = MocoSolution(motion, success, "a status", 3.0, {"goal": 3.0}, violations, 4, 0.5)
     outcome = Outcome()
-    report_solution(Job(problem.study, file), problem, solution, outcome)
+    report_solution(Job(problem.study, tmp_path / "study.omoco"), problem, solution, outcome)
     assert outcome.done is success
     told = [
         words for title, words in outcome.told if title in ("largest violation", "not fulfilled")
