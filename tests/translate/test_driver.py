@@ -48,7 +48,14 @@ def test_the_walker_walks_as_in_opensim(fixtures):
     np.testing.assert_allclose(
         driver.state()[0], [last[name] for name in names], rtol=0.0, atol=1e-5
     )
-    assert driver.mjcf.fidelity.translated["/forceset/RHipForce"] == COMPUTED_NOTE
+    translated = driver.mjcf.fidelity.translated
+    assert translated["/forceset/RHipForce"] == COMPUTED_NOTE
+    assert translated["/contactgeometryset/RFootContact"] == COMPUTED_NOTE
+    # MuJoCo itself has the bodies and the joints.
+    assert COMPUTED_NOTE not in (
+        translated["/bodyset/Pelvis"],
+        translated["/jointset/RightThighToPelvis"],
+    )
     assert {record.kind for record in driver.mjcf.fidelity} == {"ellipsoid"}
 
 

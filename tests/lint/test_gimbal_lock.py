@@ -1,0 +1,44 @@
+"""A joint is in gimbal lock where its three axes are in a plane, however these are turned."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.lint import validate
+from tests.simple_models import make_single_body
+
+SIZE = 12
+
+
+def turned_by(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> osimlite.Model:
+    """A body that three rotations about these axes turn, all by nothing at first."""
+    names = ("a", "b", "c")
+    axes = {
+        f"rotation{number}": osimlite.TransformAxis(
+            name=f"rotation{number}",
+            axis=tuple(map(float, axis)),
+            function=osimlite.LinearFunction(coefficients=(1.0, 0.0)),
+            coordinates=(name,),
+        )
+        for number, (name, axis) in enumerate(zip(names, (first, second, third), strict=True), 1)
+    }
+    joint = osimlite.CustomJoint(
+        name="joint",
+        coordinates=[osimlite.Coordinate(name=name) for name in names],
+        spatial_transform=osimlite.SpatialTransform(**axes),
+    )
+    return make_single_body(joint)
+
+
+@pytest.mark.parametrize("seed", range(SIZE))
+def test_axes_in_a_plane_are_in_gimbal_lock_and_no_others(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first, second, across = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    angle, lift = rng.uniform(0.3, 1.2, 2)
+    inside = np.cos(angle) * first + np.sin(angle) * second
+    codes = set(validate(turned_by(first, second, inside), select="OSIM416").codes)
+    assert codes == {"OSIM416"}
+    beside = np.cos(lift) * inside + np.sin(lift) * across
+    assert not validate(turned_by(first, second, beside), select="OSIM416").findings
