@@ -158,6 +158,8 @@ class StaticOptimization:
         external_loads: measured loads or their file.
         folder: folder of the model's file.
         early_return: whether Simbody's defect in contacts of several surfaces is reproduced.
+        underactuated: whether there may be fewer actuators than coordinates to accelerate, as for
+            tools that need not balance every coordinate.
 
     Raises:
         SettingError: the exponent is not greater than 1, or there is no such muscle force.
@@ -177,6 +179,7 @@ class StaticOptimization:
         external_loads: str | Path | ExternalLoads | None = None,
         folder: str | Path | None = None,
         early_return: bool = False,
+        underactuated: bool = False,
     ) -> None:
         if not 1.0 < exponent < np.inf:
             raise SettingError(
@@ -217,7 +220,7 @@ class StaticOptimization:
         self.names = tuple(item.name for item in self._actuators)
         self.coordinates = tuple(mechanism.coordinates[index].name for index in self._free)
         # Fewer unknowns than equations have no solution but by chance.
-        if len(self.names) < len(self.coordinates):
+        if len(self.names) < len(self.coordinates) and not underactuated:
             raise ModelError(
                 f"'{model.name}' has {len(self.names)} actuators for {len(self.coordinates)} coordinates; append "
                 "reserve actuators, or lock coordinates"

@@ -316,8 +316,14 @@ class ForceDistribution:
         self.tasks = tasks
         self.exact = exact
         self.mechanism = mechanism
-        self._unit = build_static_optimization(job, model, mechanism, muscles="isometric")
-        self._strong = build_static_optimization(job, model, mechanism) if exact else None
+        # Only the tasks are to be fulfilled: as in OpenSim, there may be more coordinates than
+        # actuators, such as those of a loop that constraints close.
+        self._unit = build_static_optimization(
+            job, model, mechanism, muscles="isometric", underactuated=True
+        )
+        self._strong = (
+            build_static_optimization(job, model, mechanism, underactuated=True) if exact else None
+        )
         self.names = self._unit.names
         self.optimal = self._unit.optimal_forces
         if not self.optimal.all():

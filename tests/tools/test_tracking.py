@@ -175,3 +175,26 @@ def test_a_property_that_opensim_ignores_stops_no_run(folder: Path) -> None:
     written(folder, more="<optimizer_derivative_dx>0.1</optimizer_derivative_dx>")
     outcome = osimlite.run(folder / "setup.xml")
     assert outcome.done and "OSIM101" in [found.code for found in outcome.warnings]
+
+
+@pytest.mark.parametrize("tool", ["RRATool", "CMCTool"])
+def test_a_coordinate_may_have_no_actuator(tmp_path: Path, tool: str) -> None:
+    """Only the tasks are to be followed; another rod may swing freely below."""
+    model = pendulum()
+    rod = next(body for body in model.components(osimlite.Body) if body.name == "rod")
+    other = osimlite.Body(
+        name="other",
+        mass=0.1,
+        mass_center=(0.0, -0.1, 0.0),
+        inertia=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0),
+    )
+    model.add(other)
+    pin = osimlite.PinJoint(name="low", socket_parent_frame=rod, socket_child_frame=other)
+    pin.coordinates[0].name = "free"
+    model.add(pin)
+    written(tmp_path, model, tool)
+    outcome = osimlite.run(tmp_path / "setup.xml")
+    assert outcome.done, outcome.told
+    states = outcome.tables["it_states.sto"]
+    wanted = 0.2 * np.sin(4.0 * states.times)
+    assert states["/jointset/pin/angle/value"] == pytest.approx(wanted, abs=1e-3)
