@@ -17,6 +17,7 @@ from osimlite.fitting.measuring import select_frames
 from osimlite.io.tables.old_storage import format_old_table
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.tools.inverse_kinematics import IKTask
@@ -112,6 +113,18 @@ def place_markers(
     return MarkerPlacement(pose, removed, move_distances)
 
 
+def _get_pose_speed(info: CoordinateInfo) -> float:
+    """Return the speed that OpenSim writes with a static pose.
+
+    It is that of the initial state at the time 0, before constraints change it.
+    """
+    if info.locked:
+        return 0.0
+    if info.prescribed is not None:
+        return float(info.prescribed.evaluate((0.0,))[1][0])
+    return info.default_speed
+
+
 def _find_frame_path(model: Model, marker: Marker) -> str:
     """Return the path of the frame of a marker."""
     tree = model.tree()
@@ -137,7 +150,8 @@ def format_pose(model: Model, placement: MarkerPlacement) -> str:
     columns = dict(zip(layout.paths, layout.auxiliary(state), strict=True))
     named_paths = [variable.path for variable in layout.variables if variable.is_named]
     for info, value in zip(mechanism.coordinates, values, strict=True):
-        columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = value, 0.0
+        columns[f"{info.path}/value"] = value
+        columns[f"{info.path}/speed"] = _get_pose_speed(info)
     coordinate_paths = [
         f"{info.path}/{quantity}"
         for info in mechanism.coordinates

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,132 @@ LOOPS = {
 }
 
 
+# Frames whose X axis is the Z axis of their base, in which the first rotation of every joint is that of the bars.
+JOINT = """<{kind} name="{name}"><socket_parent_frame>{name}_p</socket_parent_frame>
+<socket_child_frame>{name}_c</socket_child_frame><coordinates>{coordinates}</coordinates><frames>
+<PhysicalOffsetFrame name="{name}_p"><socket_parent>/bodyset/{upper}</socket_parent><translation>0 -0.3 0</translation>
+<orientation>0 {turn} 0</orientation></PhysicalOffsetFrame><PhysicalOffsetFrame name="{name}_c">
+<socket_parent>/bodyset/{bar}</socket_parent><orientation>0 {turn} 0</orientation></PhysicalOffsetFrame>
+</frames></{kind}>"""
+COUNTS = {"PinJoint": 1, "UniversalJoint": 2, "BallJoint": 3}
+BAR = """<Body name="{0}"><mass>0.5</mass><mass_center>{1} 0 0</mass_center>
+<inertia>0.001 0.007 0.007 0 0 0</inertia></Body>"""
+POINT = """<PointConstraint name="end"><socket_body_1>/bodyset/b</socket_body_1><socket_body_2>/bodyset/c</socket_body_2>
+<location_body_1>0 -0.3 0</location_body_1><location_body_2>0.4 0 0</location_body_2></PointConstraint>"""
+WELD = """<WeldConstraint name="cut"><socket_frame1>/bodyset/c</socket_frame1><socket_frame2>other</socket_frame2>
+<frames><PhysicalOffsetFrame name="other"><socket_parent>/bodyset/d</socket_parent><translation>-0.4 0 0</translation>
+</PhysicalOffsetFrame></frames></WeldConstraint>"""
+FUNCTIONS = {
+    "a coupler": "<LinearFunction><coefficients>1 0</coefficients></LinearFunction>",
+    "a coupler of higher degree": "<PolynomialFunction><coefficients>0.3 1 0</coefficients></PolynomialFunction>",
+}
+
+
+BARS = {
+    "a point": (POINT, [("jc", "a", "c", "0.2", "UniversalJoint")]),
+    "a weld": (
+        WELD,
+        [("jc", "a", "c", "0.2", "BallJoint"), ("jd", "b", "d", "-0.2", "UniversalJoint")],
+    ),
+}
+"""Constraints that close a loop with a third bar, or two halves of it; the joints leave no equation redundant."""
+
+
+def close_loop(folder: Path, closed_by: str, *, is_planar: bool = False) -> None:
+    """Close the loop of two bars not by a rod, but by a coupler, or by a third bar.
+
+    Args:
+        folder: a copy of the lab.
+        closed_by: key of `FUNCTIONS` or `BARS`.
+        is_planar: whether the third bar turns in the plane only, so that equations are redundant.
+    """
+    text = (folder / "bars.osim").read_text()
+    start, end = text.index("<ConstantDistance"), text.index(ROD) + len(ROD)
+    constraint = COUPLER.removeprefix(ROD)
+    if closed_by in FUNCTIONS:
+        function = FUNCTIONS[closed_by]
+        constraint = re.sub("<LinearFunction.*</LinearFunction>", function, constraint)
+    constraint, bars = BARS.get(closed_by, (constraint, []))
+    text = text[:start] + constraint + text[end:]
+    table = read_sto(folder / "walk.mot")
+    columns, rows = table.columns, table.rows
+    for name, upper, bar, center, kind in bars:
+        kind = "PinJoint" if is_planar else kind
+        names = [f"{name}_q", f"{name}_2", f"{name}_3"][: COUNTS[kind]]
+        joint = JOINT.format(
+            kind=kind,
+            name=name,
+            upper=upper,
+            bar=bar,
+            # A pin turns about Z.
+            turn=0 if is_planar else -np.pi / 2.0,
+            coordinates="".join(
+                f'<Coordinate name="{name}"><range>-3 3</range></Coordinate>' for name in names
+            ),
+        )
+        text = text.replace(
+            "</objects></BodySet>", f"{BAR.format(bar, center)}</objects></BodySet>"
+        )
+        text = text.replace("</objects></JointSet>", f"{joint}</objects></JointSet>")
+        # The third bar stays horizontal.
+        columns = (*columns, *names)
+        angles = np.outer(table.rows[:, 0], [-1.0, 0.0, 0.0][: len(names)])
+        rows = np.hstack([rows, angles])
+    (folder / "bars.osim").write_text(text)
+    (folder / "walk.mot").unlink()
+    write_sto(
+        folder / "walk.mot", "m", table.times.tolist(), columns, rows.tolist(), in_degrees=True
+    )
+
+
+@pytest.mark.parametrize("closed_by", [*BARS, *FUNCTIONS])
+@pytest.mark.parametrize("setup", ["rra.xml", "rra2.xml", "cmc.xml"])
+@pytest.mark.full
+def test_loops_closed_by_other_constraints_are_tracked(
+    tmp_path: Path, closed_by: str, setup: str
+) -> None:
+    folder = copy_lab("loop", tmp_path)
+    close_loop(folder, closed_by)
+    compare_runs(folder, setup)
+
+
+@pytest.mark.parametrize("closed_by", [*BARS])
+@pytest.mark.full
+def test_redundant_equations_of_a_loop_change_nothing(tmp_path: Path, closed_by: str) -> None:
+    """Without freedom out of the plane the bars move as with it; OpenSim's assembly may fail there."""
+    tables = []
+    for is_planar in (False, True):
+        (tmp_path / str(is_planar)).mkdir()
+        folder = copy_lab("loop", tmp_path / str(is_planar))
+        close_loop(folder, closed_by, is_planar=is_planar)
+        result = osimlite.run(folder / "rra.xml", folder / "ours")
+        tables.append(result.tables["rra_Kinematics_q.sto"])
+    free, planar = tables
+    assert np.ptp(planar["ja_q"]) > 0.5
+    for name in planar.columns:
+        assert np.allclose(planar[name], free[name], atol=1e-5), name
+
+
+@pytest.mark.parametrize("setup", ["so.xml", "rra.xml"])
+def test_fewer_actuators_than_coordinates(tmp_path: Path, setup: str) -> None:
+    """RRA and CMC follow their tasks; static optimization refuses, as in OpenSim."""
+    folder = copy_lab("loop", tmp_path)
+    text = (folder / "bars.osim").read_text()
+    start, end = text.index("<ConstantDistance"), text.index(ROD) + len(ROD)
+    (folder / "bars.osim").write_text(text[:start] + text[end:])
+    actuators = (folder / "act.xml").read_text()
+    start, end = actuators.index('<CoordinateActuator name="jb'), actuators.index("</objects>")
+    (folder / "act.xml").write_text(actuators[:start] + actuators[end:])
+    if setup == "rra.xml":
+        compare_runs(folder, setup)
+        return
+    ran, log = run_opensim(folder / setup, folder / "theirs")
+    assert not ran
+    assert "over-constrained" in log
+    with pytest.raises(osimlite.OsimliteError, match="1 actuators for 2 coordinates"):
+        osimlite.run(folder / setup, folder / "ours")
+
+
 @pytest.mark.parametrize("loop", [*LOOPS])
 @pytest.mark.full
 def test_closed_loops_are_tracked(tmp_path: Path, loop: str) -> None:
@@ -218,3 +345,77 @@ def test_marker_errors_where_a_marker_is_unseen(tmp_path: Path, which: str) -> N
     ours = osimlite.run(folder / "ik.xml", folder / "ours").tables["ik_ik_marker_errors.sto"]
     assert np.isfinite(ours.rows).all()
     assert difference(ours, folder / "theirs" / "ik_ik_marker_errors.sto") < 2e-5
+
+
+def prescribe(function: str) -> str:
+    return f"<prescribed_function>{function}</prescribed_function><prescribed>true</prescribed>"
+
+
+KNEE, HIP = '<Coordinate name="knee_angle">', '<Coordinate name="hip_flexion">'
+SINE = prescribe('<Sine name="f"><amplitude>0.3</amplitude><omega>4</omega></Sine>')
+STILL = prescribe('<Constant name="f"><value>-0.4</value></Constant>')
+SPEED = "<default_speed_value>0.7</default_speed_value>"
+FOLLOWS = f"""<ConstraintSet>{COUPLER.removeprefix(ROD)}""".replace("ja_q", "hip_flexion").replace(
+    "jb_q", "knee_angle"
+)
+COUPLED = (
+    "<ConstraintSet><objects></objects></ConstraintSet>",
+    f"{FOLLOWS.replace('<ConstraintSet>', '<ConstraintSet><objects>')}</objects></ConstraintSet>",
+)
+FIXED = {
+    "a locked knee": [(KNEE, f"{KNEE}{LOCK}")],
+    "a bent locked knee": [(f"{KNEE}<default_value>0<", f"{KNEE}{LOCK}<default_value>-0.5<")],
+    "a locked pelvis": [
+        (f'<Coordinate name="pelvis_{name}">', f'<Coordinate name="pelvis_{name}">{LOCK}')
+        for name in ("tilt", "tx", "ty")
+    ],
+    "a locked coordinate that a coupler drives": [(KNEE, f"{KNEE}{LOCK}"), COUPLED],
+    "a locked coordinate that drives a coupler": [(HIP, f"{HIP}{LOCK}"), COUPLED],
+    "a prescribed constant": [(KNEE, f"{KNEE}{STILL}")],
+    "a prescribed motion": [(HIP, f"{HIP}{SINE}")],
+    "all locked": [(KNEE, f"{KNEE}{LOCK}"), (HIP, f"{HIP}{LOCK}")]
+    + [
+        (f'<Coordinate name="pelvis_{name}">', f'<Coordinate name="pelvis_{name}">{LOCK}')
+        for name in ("tilt", "tx", "ty")
+    ],
+}
+
+
+@pytest.mark.parametrize("fixed", [*FIXED])
+def test_inverse_kinematics_of_coordinates_that_are_held(tmp_path: Path, fixed: str) -> None:
+    folder = copy_lab("unseen", tmp_path)
+    change(folder / "leg.osim", *FIXED[fixed])
+    ran, log = run_opensim(folder / "ik.xml", folder / "theirs")
+    assert ran, log
+    result = osimlite.run(folder / "ik.xml", folder / "ours")
+    # OpenSim writes the motion where the setup says, beside it.
+    assert difference(result.tables["ik.mot"], folder / "ik.mot") < 0.05
+    errors = "ik_ik_marker_errors.sto"
+    assert difference(result.tables[errors], folder / "theirs" / errors) < 2e-5
+
+
+SPEEDS = {
+    "a default speed": [(KNEE, f"{KNEE}{SPEED}")],
+    "a default speed of a lock": [(KNEE, f"{KNEE}{SPEED}{LOCK}")],
+    "a default speed that drives a coupler": [(HIP, f"{HIP}{SPEED}"), COUPLED],
+    "a prescribed motion": [(HIP, f"{HIP}{SPEED}{SINE}")],
+    "a prescribed constant": [(KNEE, f"{KNEE}{SPEED}{STILL}")],
+}
+
+
+@pytest.mark.parametrize("which", [*SPEEDS])
+def test_speeds_of_a_static_pose(tmp_path: Path, which: str) -> None:
+    """OpenSim writes the speeds of the initial state, at the time 0, beside the fitted values."""
+    folder = copy_lab("plugin", tmp_path)
+    copy_lab("one_frame", tmp_path / "sound")
+    (folder / "leg.osim").write_bytes((tmp_path / "sound" / "leg.osim").read_bytes())
+    change(folder / "leg.osim", *SPEEDS[which])
+    change(folder / "scale.xml", ("<time_range> 0 0.1<", "<time_range> 0.04 0.08<"))
+    ran, log = run_opensim(folder / "scale.xml", folder / "theirs")
+    assert ran, log
+    osimlite.run(folder / "scale.xml", folder / "ours")
+    ours, theirs = (read_sto(path / "subj_static.mot") for path in (folder / "ours", folder))
+    assert ours.columns == theirs.columns
+    for label in ours.columns:
+        tolerance = 1e-9 if label.endswith("/speed") else 0.01
+        assert ours[label] == pytest.approx(theirs[label], abs=tolerance), label
