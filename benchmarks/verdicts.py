@@ -279,6 +279,7 @@ def main() -> None:
                         left[error] -= 1
                     else:
                         new.append(error)
+                counts[name, verdict, "error" if new else "no error"] += 1
                 wrong = ""
                 if any(code == "TRACEBACK" for code, _ in new):
                     wrong = "traceback"
