@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -47,6 +48,9 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
     analyses = find_analyses(job)
     if not analyses:
         raise job.create_error("no analysis of the setup is on; add one, or set <on>true</on>")
+    # OpenSim's comparisons with NaN are false, so that the motion does not end before its data.
+    if math.isnan(setup.final_time):
+        setup.final_time = math.inf
     states = job.find_path("states_file")
     model = build_model(job)
     with build_simulation(job, model) as simulation:

@@ -165,9 +165,11 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     setup: IMUInverseKinematicsTool = job.setup
     model = job.read_model()
     file = job.require_path("orientations_file")
+    start, end = expect_time_range(setup.time_range)
     data = (
         OrientationData.from_source(file)
-        .select_times(*expect_time_range(setup.time_range))
+        # OpenSim begins with the first frame if the first time is not a number.
+        .select_times(-math.inf if math.isnan(start) else start, end)
         .rotate_ground(setup.sensor_to_opensim_rotations)
     )
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}

@@ -70,3 +70,29 @@ def opensim_says() -> Iterator[Callable[[Path], str | None]]:
 
         yield ask
         process.stdin.close()
+
+
+@pytest.fixture(scope="module")
+def run_live() -> Iterator[Callable[[Path, str, str], dict[str, Any]]]:
+    """Runs a tool by OpenSim, by its folder, class and setup; returns how it ended, and its log."""
+    pytest.importorskip("opensim")
+    command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_tools.py"))]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        stdin, stdout = process.stdin, process.stdout
+
+        def ask(folder: Path, kind: str, setup: str) -> dict[str, Any]:
+            stdin.write(json.dumps({"folder": str(folder), "kind": kind, "setup": setup}) + "\n")
+            stdin.flush()
+            for line in stdout:
+                if line.startswith("{"):
+                    answer: dict[str, Any] = json.loads(line)
+                    return answer
+            raise AssertionError("OpenSim has ended")
+
+        yield ask
+        stdin.close()

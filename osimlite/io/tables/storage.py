@@ -307,15 +307,15 @@ def format_number(value: float) -> str:
 
 
 def expect_time_range(time_range: Sequence[float]) -> tuple[float, float]:
-    """Check that a `time_range` has two times.
+    """Return the two times of a `time_range`; as in OpenSim, more numbers have no effect.
 
     Returns:
         The first and the last time (s).
 
     Raises:
-        SettingError: the range does not have two numbers.
+        SettingError: the range has fewer than two numbers.
     """
-    if len(time_range) != 2:
+    if len(time_range) < 2:
         count = format_count(len(time_range), "number")
         raise SettingError(f"time_range has {count}; it needs two, the first and the last time")
     return time_range[0], time_range[1]

@@ -61,7 +61,8 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
 
     OpenSim accepts it in a single number or a vector without a message, and everything computed
     from it becomes NaN: the simulation runs to its end without a result. It rejects a file with
-    such a number in a list, such as the points of a function. In properties for drawing, in bounds,
+    such a number in a list, such as the points of a function or the `time_range` of inverse
+    dynamics. In properties for drawing, in bounds,
     and in forces and controllers that are disabled, it is a warning: the motion is not affected.
 
     ```xml
@@ -79,7 +80,15 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
         non_finite = [
             number
             for number in _to_numbers(value)
-            if math.isnan(number) or (math.isinf(number) and not _may_be_infinite(item, spec))
+            if math.isnan(number)
+            or (
+                math.isinf(number)
+                # A range of times is infinite unless the file sets it.
+                and (
+                    (_is_older_list(spec.kind) and spec.name in item.model_fields_set)
+                    or not _may_be_infinite(item, spec)
+                )
+            )
         ]
         if non_finite:
             consequence = _describe_nan_consequence(subject, item, spec, non_finite[0])
@@ -97,8 +106,7 @@ def _describe_nan_consequence(
 ) -> str:
     """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
     assert isinstance(spec.kind, Value)
-    # A list of the older kind is the one case in which OpenSim rejects the file.
-    if spec.kind.legacy and spec.kind.shape == "list":
+    if _is_older_list(spec.kind):
         return "OpenSim rejects the file"
     if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):
         return "OpenSim rejects the model"
@@ -109,6 +117,14 @@ def _describe_nan_consequence(
     if number != number and spec.name in _NAN_REFUSED.get(type(item).__name__, "").split():
         return "OpenSim rejects the model"
     return UNUSED if is_unused(subject, item) else _NAN_CONSEQUENCE
+
+
+def _is_older_list(kind: object) -> bool:
+    """Return whether a property is a list of the first property system.
+
+    It is the one case in which OpenSim rejects a file with NaN or infinity, even in a bound.
+    """
+    return isinstance(kind, Value) and kind.legacy and kind.shape == "list"
 
 
 @rule("OSIM206", "impossible-value", severity=ERROR)

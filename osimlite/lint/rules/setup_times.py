@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.io.tables.headers import MarkerHeader
+from osimlite.lint.diagnostic import Severity
 from osimlite.lint.posture import coordinate_name, find_angles
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.rules.setup_columns import find_motions
@@ -42,22 +43,23 @@ _FRAMES = {
 
 
 _FAULTS = """\
-01 time-count, error, in dynamics: A time range does not have two times. With fewer the tool fails, of more OpenSim uses
-the first two.
+01 time-count, error, in dynamics: A time range does not have two times. With fewer the tool fails, or reads memory that it
+has not set; of more OpenSim uses the first two.
 - <time_range>0</time_range>
 + <time_range>0 0.5</time_range>
 02 few-rows, error, in any: A motion has fewer than six rows. OpenSim needs at least six for its spline.
 - <coordinates_file>short.mot</coordinates_file>
 + <coordinates_file>leg.mot</coordinates_file>
-03 impossible-times, error, in dynamics: A time range of a tool or an analysis is reversed or not a number. It fails, or
-uses other times.
+03 impossible-times, error, in dynamics: A time range of a tool or an analysis is reversed or not a number. It fails,
+writes tables without rows, or uses other times.
 - <time_range>0.5 0</time_range>
 + <time_range>0 0.5</time_range>
 04 too-short-for-control, error, in control: The time range of computed muscle control is too short. It needs 0.03 s for the first
 states, and one window.
 - <initial_time>0</initial_time> <final_time>0.02</final_time>
 + <initial_time>0</initial_time> <final_time>0.5</final_time>
-05 no-data-at-times, error, in dynamics: A tool runs completely before or after its data. It fails or crashes.
+05 no-data-at-times, error, in dynamics: A tool runs completely before or after its data. It fails, crashes, or computes
+one row at the end of the data. Scaling measures in the first or the last frame: that is a warning.
 - <time_range>5 6</time_range>
 + <time_range>0 0.5</time_range>
 06 stops-at-default, warning, in ik: A tool has no end time and its data continue. Inverse kinematics stops at 2 s: OpenSim
@@ -94,9 +96,15 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
         count = len(item.time_range)
         # A disabled loads or task object has a time range that OpenSim does not read.
         if count != 2 and getattr(item, "apply", True):
-            consequence, severity = (
-                ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
-            )
+            consequence, severity = ("takes the first two", WARNING)
+            if count < 2:
+                # Only inverse dynamics does not look at the number of times.
+                consequence = (
+                    "reads beyond the end of the list"
+                    if is_a(item, "InverseDynamicsTool")
+                    else "fails"
+                )
+                severity = ERROR
             report(
                 f"expected two times in a range, found {count}: OpenSim {consequence}",
                 item,
@@ -114,13 +122,8 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 fault="few-rows",
             )
     for item, tags, first, last in _find_time_ranges(setup):
-        if any(number != number for number in (first, last)):
-            consequence, severity = (
-                ("takes all times", WARNING)
-                if is_a(item, "IMUInverseKinematicsTool")
-                else ("rejects it", ERROR)
-            )
-            tag = tags[0] if first != first else tags[-1]
+        if first != first or last != last:
+            consequence, severity, tag = _describe_unknown_time(item, tags, first != first)
             report(
                 f"a time of {describe_object(item)} is not a number: OpenSim {consequence}",
                 item,
@@ -134,11 +137,12 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
             first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")
         ):
             # Either of the two may be wrong.
-            consequence, severity = (
-                ("uses the times of the tool", WARNING)
-                if is_a(item, "Analysis")
-                else ("fails", ERROR)
-            )
+            consequence, severity = ("fails", ERROR)
+            if is_a(item, "Analysis"):
+                consequence, severity = ("uses the times of the tool", WARNING)
+            elif is_a(item, "AnalyzeTool"):
+                # Static optimization crashes.
+                consequence = "writes tables without rows, or crashes"
             for tag in tags:
                 report(
                     f"{describe_object(item)} begins at {first:g} s and ends at {last:g} s: "
@@ -171,11 +175,21 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
             # One row more or less, and rounded times, are no fault.
             slack = max(table.step, 1e-9) * 1.01
             if first > span[1] + slack or last < span[0] - slack:
+                # OpenSim measures distances in the nearest frame; the default times, -1, mean the
+                # first one.
+                nearest = "last" if first > span[1] else "first"
+                is_scaled = is_a(item, "ModelScaler")
+                consequence = ""
+                if is_scaled:
+                    consequence = f": OpenSim measures in the {nearest} frame"
+                elif is_a(item, "InverseDynamicsTool") or is_a(item, "AnalyzeTool"):
+                    consequence = f": OpenSim computes the {nearest} row only"
                 report(
                     f"{describe_object(item)} runs from {first:g} to {last:g} s, but '{name}' "
-                    f"covers {span[0]:g} to {span[1]:g} s",
+                    f"covers {span[0]:g} to {span[1]:g} s{consequence}",
                     item,
                     tag=tags[0] if first > span[1] else tags[-1],
+                    severity=WARNING if is_scaled else None,
                     fault="no-data-at-times",
                 )
                 continue
@@ -207,6 +221,32 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                     tag=tags[0],
                     fault="data-begin-late",
                 )
+
+
+def _describe_unknown_time(
+    item: Any, tags: tuple[str, ...], is_first: bool
+) -> tuple[str, Severity, str]:
+    """Return what OpenSim does with a time that is not a number.
+
+    Args:
+        item: a tool.
+        tags: properties of the times.
+        is_first: whether the first time is not a number; otherwise the last one.
+
+    Returns:
+        Consequence, severity, and the property that is to blame.
+    """
+    tag = tags[0] if is_first else tags[-1]
+    if is_a(item, "IMUInverseKinematicsTool"):
+        return ("begins at the first frame", WARNING, tag) if is_first else ("fails", ERROR, tag)
+    if is_a(item, "AnalyzeTool"):
+        if is_first:
+            return "writes tables without rows, or crashes", ERROR, tag
+        return "continues to the end of the data", WARNING, tag
+    # Tools with two properties integrate a motion, which ends where it begins.
+    if len(tags) > 1 and not is_first:
+        return "writes the first row only", ERROR, tag
+    return "rejects it", ERROR, tag
 
 
 def _find_time_ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:

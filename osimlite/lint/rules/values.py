@@ -20,11 +20,15 @@ from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_value
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Value
+from osimlite.schema.fields import Value, real
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 KEEPS_DEFAULT = "OpenSim keeps the default"
 """What a message says of a value that OpenSim cannot read, where it continues."""
+
+_SEPARATORS = ",;"
+"""Characters between numbers in other languages and programs."""
+_ONE_NUMBER = real()
 
 
 @rule("OSIM201", "unreadable-value", severity=ERROR, fixes="safe")
@@ -105,7 +109,8 @@ def report_cut_number(subject: Subject, report: FindingCollector) -> None:
     (`1/3`), hexadecimal digits (`0x10`), Fortran's exponent (`1d3`).
 
     OpenSim reads the longest beginning that is a number and ignores the rest without a message:
-    `1,5` is 1, `0x10` is 0.
+    `1,5` is 1, `0x10` is 0. Where only a separator follows, as in `0.1, 0.5`, it reads the intended
+    number: that is a warning.
 
     ```xml
     - <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -126,6 +131,7 @@ def report_cut_number(subject: Subject, report: FindingCollector) -> None:
                 better,
                 safe=False,
             ),
+            severity=WARNING if better == note.word.rstrip(_SEPARATORS) else None,
         )
 
 
@@ -286,6 +292,9 @@ def _replace_digits(text: str) -> str:
 
 def _complete_number(word: str) -> str | None:
     """Return the intended number, if it is obvious; otherwise None."""
+    plain = word.rstrip(_SEPARATORS)
+    if plain != word and reads_as(plain, _ONE_NUMBER, _read_beginning(word)):
+        return plain
     # A comma with digits on both sides is a decimal comma.
     comma = re.fullmatch(r"([+-]?\d+),(\d+)", word)
     if comma:
