@@ -19,7 +19,8 @@ def report_missing_column(setup: Setup, report: FindingCollector) -> None:
     """A table of coordinates lacks columns for coordinates of the model.
 
     Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's
-    inverse dynamics accepts plain names only, analyses and `osimlite run` accept paths too. A task
+    inverse dynamics accepts plain names only, analyses also paths of values, `osimlite run` any
+    path. A task
     whose value comes from a file needs a column there, and a table of states needs one for every
     state of the model.
 
@@ -47,9 +48,14 @@ def report_missing_column(setup: Setup, report: FindingCollector) -> None:
         }
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
         if not names & columns and names & _find_names_in_paths(table):
+            consequence = (
+                "OpenSim's inverse dynamics does not recognise these and computes the moments of "
+                "the default pose"
+                if plain
+                else "OpenSim looks for names or for paths that end with '/value', and uses 0"
+            )
             report(
-                f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse "
-                "dynamics does not recognise these and computes the moments of the default pose; "
+                f"'{getattr(item, tag)}' names the coordinates by paths: {consequence}; "
                 "osimlite accepts them",
                 item,
                 tag=tag,
