@@ -21,7 +21,7 @@ from osimlite.errors import OsimliteError
 from osimlite.io.document.cache import get_object
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
-from osimlite.tools.named_files import find_named_files
+from osimlite.tools.named_files import find_named_files, writes_own_result
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.patterns import find_files
 from osimlite.tools.running import list_runnable, run
@@ -218,9 +218,10 @@ def find_substitutes(
         folder = folders[writer]
         if folder is None:
             continue
-        for path in input_paths & {
-            os.path.realpath(name) for name in find_named_files(str(writer), "output-file")
-        }:
+        outputs = {os.path.realpath(name) for name in find_named_files(str(writer), "output-file")}
+        for path in input_paths:
+            if path not in outputs and not writes_own_result(str(writer), path):
+                continue
             present_path = folder / os.path.basename(path)
             # The other setup may have failed to write this result.
             if present_path.is_file():
@@ -472,22 +473,24 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     """
     writers: dict[str, Path] = {}
     tools = list_runnable()
-    for setup in setups:
-        if type(get_object(str(setup))).__name__ not in tools:
-            continue
+    runnable = [setup for setup in setups if type(get_object(str(setup))).__name__ in tools]
+    for setup in runnable:
         writers.update(
             (os.path.realpath(name), setup) for name in find_named_files(str(setup), "output-file")
         )
     needs_by_setup: dict[Path, list[Path]] = {}
     for setup in setups:
-        names = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
-        needs_by_setup[setup] = list(
-            {
-                writers[name]: None
-                for name in sorted(names & writers.keys())
-                if writers[name] != setup
-            }
-        )
+        needs: dict[Path, None] = {}
+        for name in sorted(
+            {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
+        ):
+            # Results without a property of their own are called by the name of the tool.
+            writer = writers.get(name) or next(
+                (other for other in runnable if writes_own_result(str(other), name)), None
+            )
+            if writer is not None and writer != setup:
+                needs[writer] = None
+        needs_by_setup[setup] = list(needs)
     # Setups that need each other are run in the given order.
     ordered: set[Path] = set()
     while len(ordered) < len(setups):

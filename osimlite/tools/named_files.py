@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import deque
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from osimlite.errors import DocumentError
 from osimlite.io.document.cache import cache_by_file
@@ -13,6 +15,7 @@ from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.engine import load_subject
 from osimlite.lint.setup import Setup
+from osimlite.schema.tree import is_a
 
 MAX_DOCUMENTS = 500
 """Largest number of documents that one setup may name, directly or through others.
@@ -72,6 +75,38 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
                 visited.add(real)
                 limit_documents(visited, setup)
                 waiting.append(naming.path)
+
+
+_OWN_RESULT = re.compile(
+    r"(?:states|states_degrees|controls|pErr|avgResiduals|(?:Kinematics|Actuation)_\w+)\.\w+"
+)
+"""Ends of the names of results that tools call by their own names."""
+
+
+def writes_own_result(setup: str, path: str) -> bool:
+    """Return whether a setup writes a file whose name follows from its own, such as `so_Kinematics_q.sto`.
+
+    Args:
+        setup: path of the setup.
+        path: real path of the file.
+    """
+    subject = read_subject(setup)
+    top: Any = subject.top if isinstance(subject, Setup) else None
+    results = str(getattr(top, "results_directory", "")).strip()
+    folder = os.path.realpath(os.path.join(os.path.dirname(setup), results))
+    prefix = f"{getattr(top, 'name', '')}_"
+    name = os.path.basename(path)
+    if (
+        not is_a(top, "AbstractTool")
+        or os.path.dirname(path) != folder
+        or not name.startswith(prefix)
+    ):
+        return False
+    rest = name.removeprefix(prefix)
+    analyses = getattr(getattr(top, "analysis_set", None), "objects", ())
+    return _OWN_RESULT.fullmatch(rest) is not None or any(
+        rest.startswith(f"{analysis.name}_") for analysis in analyses
+    )
 
 
 def limit_documents(documents: set[str], setup: str) -> None:

@@ -308,3 +308,45 @@ def test_results_put_elsewhere_are_found(
     moments = read_sto(folder / "out" / "id" / "id.sto")
     assert moments.times.tolist() == pytest.approx(expected.times.tolist())
     assert (folder / folder_name / "ik.mot").exists() == stale
+
+
+@pytest.mark.parametrize("order", [("jr.xml", "so.xml"), ("so.xml", "jr.xml")])
+@pytest.mark.parametrize("where", ["out", ""])
+def test_tables_that_a_tool_calls_by_its_name_are_found(
+    tmp_path: Path, order: tuple[str, str], where: str
+) -> None:
+    """The forces that static optimization writes have no property with their name."""
+    folder = copy_lab("probe", tmp_path)
+    done = run("run", *order, *(("-o", where) if where else ()), folder=folder)
+    assert done.code == 0, done.out + done.err
+    alone = copy_lab("probe", tmp_path / "alone")
+    for setup in ("so.xml", "jr.xml"):
+        osimlite.run(alone / setup)
+    name = next(alone.glob("jr_*ReactionLoads.sto")).name
+    mine = read_sto(folder / where / "jr" / name if where else folder / name)
+    assert (mine.rows == read_sto(alone / name).rows).all()
+
+
+def test_a_table_that_no_tool_of_the_run_writes_waits_for_none(tmp_path: Path) -> None:
+    """A name that only begins like that of a tool is no result of it."""
+    folder = copy_lab("unseen", tmp_path)
+    osimlite.run(folder / "ik.xml")
+    (folder / "ik_measured.mot").write_bytes((folder / "ik.mot").read_bytes())
+    (folder / "id.xml").write_text(
+        CHAINED.format(folder="").replace(">ik.mot<", ">ik_measured.mot<")
+    )
+    (folder / "walk.trc").unlink()
+    done = run("run", "ik.xml", "id.xml", folder=folder)
+    assert "1 done, 1 failed" in " ".join(done.out.split())
+
+
+@pytest.mark.parametrize("setup", ["kin.xml", "so.xml"])
+def test_paths_without_a_quantity_are_told_as_opensim_reads_them(
+    tmp_path: Path, setup: str
+) -> None:
+    """Analyses of OpenSim know names, and paths of values; with other paths every coordinate is 0."""
+    folder = copy_lab("loop", tmp_path)
+    change(folder / "walk.mot", ("time\tja_q\tjb_q", "time\t/jointset/ja/ja_q\t/jointset/jb/jb_q"))
+    result = osimlite.run(folder / setup)
+    (said,) = [item.message for item in result.warnings if item.code == "OSIM842"]
+    assert "OpenSim looks for names or for paths that end with '/value', and uses 0" in said
