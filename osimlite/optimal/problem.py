@@ -141,7 +141,8 @@ class Problem(StudyContext):
         self.functions: Any = self._make_functions(
             [path for property_paths in paths.values() for path in property_paths], motion
         )
-        if not self.functions.states:
+        # With a prescribed motion, muscles without activation dynamics leave no states.
+        if motion is None and not self.functions.states:
             raise self.invalid_error(self.phase, "the model has no states")
         self.parameters: dict[str, Range] = {
             parameter.name: read_range(parameter.moco_bounds) or FREE

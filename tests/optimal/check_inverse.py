@@ -155,3 +155,16 @@ def test_a_motion_without_a_coordinate(tmp_path):
     motion.functions.objects.pop()
     with pytest.raises(OsimliteError, match="has no function for '/jointset/"):
         osimlite.moco.build_problem(made, tmp_path)
+
+
+def test_muscles_without_states_are_solved(tmp_path):
+    """As in Moco: activations are controls, and nothing but the balance of forces is left."""
+    tool = squat(tmp_path)
+    tool.model.operators = [
+        osimlite.ModOpIgnoreActivationDynamics(),
+        osimlite.ModOpIgnoreTendonCompliance(),
+    ]
+    problem = build_inverse_problem(tool, folder=tmp_path)
+    assert not problem.functions.states
+    found = solve_inverse(tool, folder=tmp_path)
+    assert found.success and found.violations[0].size < 1e-3

@@ -22,6 +22,7 @@ from osimlite.translate.mjcf_import.geodesic_paths import (
     CLOSE_M,
     Hints,
     Obstacles,
+    find_default_pose,
     make_geodesic_path,
     select_geodesics,
 )
@@ -55,6 +56,8 @@ CHECK_POSES = 100
 """Number of poses in which errors are measured; none is one that decided anything."""
 ARM_POSES = 20
 """Number of poses in which moment arms are compared."""
+COINCIDENT_M = 1e-9
+"""Distance of neighbouring sites up to which a path has no direction between them."""
 STEP = 1e-6
 """Step of the joint position (rad, m) for derivatives of tendon lengths."""
 
@@ -323,6 +326,7 @@ class _Selection:
         target_arms, joints = self._true_arms(self.tendons, qpos)
         _, arms, names = bench.measure(qpos, arms=True)
         columns = [names.index(draft.coordinates[joint][0]) for joint in joints]
+        default_pose = find_default_pose(draft)
         is_rotational = [int(model.jnt_type[joint]) == 3 for joint in joints]
         for row, tendon in enumerate(self.tendons):
             length_errors = lengths[row] - self.truth[row]
@@ -372,6 +376,27 @@ class _Selection:
                 )
             else:
                 draft.translated("tendon", tendon.number, "path")
+            if row not in polynomials:
+                self._record_coincident_sites(tendon, default_pose)
+
+    def _record_coincident_sites(self, tendon: Tendon, pose: SampledPoses) -> None:
+        """Record neighbouring sites of two bodies in one place: OpenSim needs their direction."""
+        draft, model = self.draft, self.draft.mj
+        for segment in tendon.segments:
+            first, second = segment.first, segment.second
+            if int(model.site_bodyid[first]) == int(model.site_bodyid[second]):
+                continue
+            distance = float(norm(pose.sites[0, first] - pose.sites[0, second]))
+            if distance < COINCIDENT_M:
+                names = [draft.source.name_of("site", site) for site in (first, second)]
+                draft.record(
+                    "tendon",
+                    tendon.number,
+                    "neighbouring sites in one place in the default pose",
+                    "a path without a direction there: OpenSim computes no accelerations in this "
+                    "pose; start from another one",
+                    f"'{names[0]}' and '{names[1]}'",
+                )
 
 
 def _key(segment: TendonSegment) -> TendonSegment:

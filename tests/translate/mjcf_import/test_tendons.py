@@ -146,3 +146,23 @@ def test_geodesics_are_nearer_than_wrap_objects(arm, up):
     assert (after["m_over"] == "Scholz2015GeometryPath") == (wrapped > 1e-6)
     assert geodesic <= max(min(wrapped, 1e-6), 0.0)
     assert after["m_through"] == before["m_through"]
+
+
+def test_sites_in_one_place_are_recorded(tmp_path):
+    """OpenSim computes NaN where neighbouring points of two bodies are in one place."""
+    text = """<mujoco><worldbody>
+<body><joint type="hinge" axis="0 1 0"/><geom type="sphere" size=".2" pos="1 0 0"/><site name="inner" pos="1 0 0"/>
+<site name="other" pos="1 0 0"/></body><site name="outer" pos="1 0 0"/></worldbody>
+<tendon><spatial name="t" stiffness="2"><site site="outer"/><site site="inner"/><site site="other"/></spatial></tendon>
+<keyframe><key name="apart" qpos="1"/></keyframe></mujoco>"""
+    path = models.write_mjcf(tmp_path, text)
+
+    def find(keyframe):
+        return [
+            record.detail
+            for record in osimlite.from_mjcf(path, keyframe=keyframe).fidelity
+            if record.component == "/tendon/t" and "in one place" in record.cannot_say
+        ]
+
+    assert find(None) == ["'outer' and 'inner'"]
+    assert find("apart") == []
