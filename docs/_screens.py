@@ -54,7 +54,7 @@ COMMANDS = {
     "view --screenshot": "view model.osim long.mot --screenshot view.png",
     "simulate": "simulate jumper.osim --to 60 -o simulated",
     "simulate --plot": "simulate jumper.osim --to 1 --plot -o drawn",
-    "sweep": "sweep walker.osim --vary LHip_rz=-10deg:10deg --samples 4000 -o sweep.csv",
+    "sweep": "sweep walker.osim --vary LHip_rz=-10deg:10deg --samples 4000 -o sweep.parquet",
     "optimize": "optimize walker.osim --objective distance --vary LHip_rz=-20deg:20deg"
     " --vary RHip_rz=-20deg:20deg",
     "gait": "gait steady-walker --perturb 0.05 --basin -o gait",

@@ -58,6 +58,17 @@ def listen_to_progress(listener: Listener) -> Iterator[None]:
         _listeners.remove(listener)
 
 
+@contextmanager
+def mute_progress() -> Iterator[None]:
+    """Report nothing within the context: for the steps of work that reports its progress itself."""
+    listeners = _listeners[:]
+    _listeners.clear()
+    try:
+        yield
+    finally:
+        _listeners[:] = listeners
+
+
 def divide_rows(title: str, count: int, unit: str = " frames") -> Iterator[slice]:
     """Yield consecutive slices of rows for calls of a kernel, and report the number of finished rows.
 

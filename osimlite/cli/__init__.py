@@ -146,7 +146,7 @@ def main(arguments: list[str] | None = None) -> None:
 def _run(words: list[str]) -> None:
     import warnings
 
-    from osimlite.cli._console import complain
+    from osimlite.cli._console import complain, get_raw_stream
     from osimlite.errors import DoubtfulWarning, OsimliteError, UnitWarning
 
     # Imports create many objects and free none. With the default threshold the garbage collector
@@ -205,6 +205,9 @@ def _run(words: list[str]) -> None:
         raise SystemExit(error.exit_code) from None
     except (Exception, KeyboardInterrupt) as error:
         if _was_interrupted(error):
+            if sys.stderr.isatty():
+                # The terminal has written ^C, mostly at the start of a line.
+                get_raw_stream(sys.stderr).write("\r")
             complain("interrupted")
             raise SystemExit(130) from None
         _exit_with_message(error, words)

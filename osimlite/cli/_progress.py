@@ -16,7 +16,7 @@ from osimlite.cli._console import before_output, complain, count_columns, get_ra
 
 SILENT_S = 0.5
 """Time without any output after which the line appears, s."""
-FIRST_SILENT_S = 0.25
+FIRST_SILENT_S = 0.15
 """The same for the first line of a command, s: starting Python and its packages took the rest."""
 REDRAW_S = 0.1
 """Time between two states of the line, s."""
@@ -25,8 +25,8 @@ ESTIMATE_S = 1.0
 LONG_S = 10.0
 """Work of this duration says in logs and pipes, once, how far it is, and when it ends, s."""
 
-INTERACTIVE = ("lsp", "view")
-"""Commands that wait for people or editors."""
+INTERACTIVE = ("lsp",)
+"""Commands that only wait for editors."""
 
 ACTIVITIES = {
     "build": "building",
@@ -55,6 +55,7 @@ ACTIVITIES = {
     "translate": "translating",
     "upgrade": "upgrading",
     "validate": "checking",
+    "view": "preparing the picture",
 }
 """What commands do until they say more, in words."""
 
@@ -69,6 +70,7 @@ class _Task:
         done: how much is done.
         details: more about the state, in words.
         part: the piece of work that the library reports on now; None without.
+        stage: the last piece of work of unknown length that the library has named; None without.
     """
 
     def __init__(self, title: str, total: float | None, unit: str = "") -> None:
@@ -78,15 +80,18 @@ class _Task:
         self.details = ""
         self.is_told = False
         self.part: _Task | None = None
+        self.stage: _Task | None = None
 
     def receive(self, title: str, done: float, total: float, unit: str) -> None:
         """Take over what the library reports about a part of the task."""
         if self.part is None or title != self.part.title or done < self.part.done:
             self.part = _Task(title, total, unit)
         self.part.done, self.part.total, self.part.unit = float(done), total, unit
-        # Finished parts say nothing about what follows.
+        if total == 0.0:
+            self.stage = self.part
+        # Finished parts say nothing about what follows: the stage that they belong to continues.
         if 0.0 < total <= done:
-            self.part = None
+            self.part = self.stage
 
     def describe(self, now: float) -> str:
         """Return the task, how far it is, and the time left."""
@@ -263,7 +268,7 @@ def _listen() -> Iterator[None]:
 
 
 def finish_command() -> None:
-    """Remove the line at the end of the program."""
+    """Remove the line at the end of the program, or when it only waits for people."""
     _stack.close()
     _line.tasks.clear()
     _line.erase()
@@ -298,7 +303,7 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
             # A function of the rate is called here, where the rate is known.
             task.details = more(task.done / elapsed) if callable(more) else str(more)
         # What the library reported about the item that is done says nothing about the next.
-        task.part = None
+        task.part = task.stage = None
         _line.update(task)
 
     try:

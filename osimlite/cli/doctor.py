@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from threading import Event, Lock
 from typing import Annotated, NamedTuple
 
 from osimlite.base.cores import count_cores
@@ -97,6 +98,10 @@ MESHES = (".vtp", ".stl", ".obj")
 
 _processes: set[subprocess.Popen[bytes]] = set()
 """Processes that import a package now."""
+_stopped = Event()
+"""Set after Ctrl-C: no further process is started."""
+_process_lock = Lock()
+"""Lock of both: a process is started and entered, or not started."""
 
 
 class Package(NamedTuple):
@@ -148,6 +153,7 @@ def doctor(
     # A package may be in several extras, and is imported once.
     package_names = {name for names in requirements.values() for name in names}
     result = {}
+    _stopped.clear()
     with (
         progress_bar("loading each package", len(package_names)) as progress,
         # Threads suffice, since each waits for a process; importing is bound by the disk.
@@ -155,14 +161,15 @@ def doctor(
     ):
         # Each package is imported in a process of its own, several at a time.
         try:
+            # Listing takes seconds on a slow disk; only the main thread notices Ctrl-C meanwhile.
+            _list_modules(tuple(sys.path))
             for count, package in enumerate(pool.map(examine_package, package_names), 1):
                 result[package.name] = package
                 progress(count)
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
             # A library that is being loaded does not notice Ctrl-C, and takes seconds.
-            for process in [*_processes]:
-                process.kill()
+            _stop_processes()
             raise
     table = create_table()
     for heading in ("extra", "for", "packages"):
@@ -264,16 +271,20 @@ def examine_package(name: str) -> Package:
         if main_module in modules
         else next(module for module in modules if not module.startswith("_"))
     )
-    # -P: do not import from the current folder.
-    with subprocess.Popen(
-        [sys.executable, "-P", "-c", f"import {main}"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        # Some packages start processes or load libraries from the current folder, which may be untrusted.
-        cwd=Path(__file__).parent,
-        env={**os.environ, SAFE_PATH: "1"},
-    ) as process:
+    with _process_lock:
+        if _stopped.is_set():
+            return Package(name, version, "")
+        process = subprocess.Popen(
+            # -P: do not import from the current folder.
+            [sys.executable, "-P", "-c", f"import {main}"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            # Some packages start processes or load libraries from the current folder, which may be untrusted.
+            cwd=Path(__file__).parent,
+            env={**os.environ, SAFE_PATH: "1"},
+        )
         _processes.add(process)
+    with process:
         _, errors = process.communicate()
         _processes.discard(process)
     if process.returncode == 0:
@@ -282,6 +293,14 @@ def examine_package(name: str) -> Package:
         f"its process ended with {process.returncode}"
     ]
     return Package(name, version, error_lines[-1])
+
+
+def _stop_processes() -> None:
+    """Kill all processes that import a package, and start no more."""
+    with _process_lock:
+        _stopped.set()
+        for process in [*_processes]:
+            process.kill()
 
 
 @cache

@@ -95,8 +95,10 @@ def _serve(viewed: Shown, port: int, *, browser: bool) -> None:
     import webbrowser
 
     from osimlite.cli._console import say
+    from osimlite.cli._progress import finish_command
 
     with viewed.server(port) as server:
+        finish_command()
         say(f"serving {server.url} until you press Ctrl-C")
         if browser:
             webbrowser.open(server.url)

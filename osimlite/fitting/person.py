@@ -14,7 +14,7 @@ from math import log, sqrt
 
 import numpy as np
 
-from osimlite.base.progress import report_progress, report_stage
+from osimlite.base.progress import mute_progress, report_progress, report_stage
 from osimlite.base.records import dataclass
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
@@ -302,23 +302,26 @@ class _PersonFit:
             start: estimate to start from.
             tolerance: largest change of a size or offset (m) by the last step.
         """
-        estimate = self._evaluate_estimate(start.sizes, start.offsets, start.values)
+        report_stage("fitting sizes and markers")
+        with mute_progress():
+            estimate = self._evaluate_estimate(start.sizes, start.offsets, start.values)
         damping = 1e-6
         first_change = 0.0
         for _ in range(MAX_STEPS):
-            matrix, slope = self._compute_normal_equations(estimate)
-            while True:
-                # Levenberg-Marquardt: raise the damping until the cost falls.
-                # Damping by the diagonal makes the step independent of the units of sizes and
-                # offsets.
-                step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
-                sizes = np.clip(estimate.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
-                offsets = estimate.offsets.copy()
-                offsets[self._free] += step[self._sizes :].reshape(-1, 3)
-                trial_estimate = self._evaluate_estimate(sizes, offsets, estimate.values)
-                if trial_estimate.cost <= estimate.cost or np.abs(step).max() < tolerance:
-                    break
-                damping = 10.0 * max(damping, 1e-9)
+            with mute_progress():
+                matrix, slope = self._compute_normal_equations(estimate)
+                while True:
+                    # Levenberg-Marquardt: raise the damping until the cost falls.
+                    # Damping by the diagonal makes the step independent of the units of sizes and
+                    # offsets.
+                    step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
+                    sizes = np.clip(estimate.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
+                    offsets = estimate.offsets.copy()
+                    offsets[self._free] += step[self._sizes :].reshape(-1, 3)
+                    trial_estimate = self._evaluate_estimate(sizes, offsets, estimate.values)
+                    if trial_estimate.cost <= estimate.cost or np.abs(step).max() < tolerance:
+                        break
+                    damping = 10.0 * max(damping, 1e-9)
             if trial_estimate.cost <= estimate.cost:
                 estimate = trial_estimate
                 damping = 0.1 * damping

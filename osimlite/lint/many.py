@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -135,8 +136,20 @@ def _check_jobs(jobs: list[CheckJob], processes: int | None) -> Iterator[tuple[C
     # Several files in one message to a process; not too many, so that all processes end at the same
     # time.
     chunk_size = max(1, min(16, len(jobs) // (4 * processes)))
-    with ProcessPoolExecutor(processes, context) as pool:
-        yield from zip(jobs, pool.map(check_job, jobs, chunksize=chunk_size), strict=True)
+    others = {*multiprocessing.active_children()}
+    with ProcessPoolExecutor(processes, context, _ignore_interrupts) as pool:
+        try:
+            yield from zip(jobs, pool.map(check_job, jobs, chunksize=chunk_size), strict=True)
+        except BaseException:
+            # The pool would wait for the files that are being checked; reports are stored as a whole.
+            for process in {*multiprocessing.active_children()} - others:
+                process.terminate()
+            raise
+
+
+def _ignore_interrupts() -> None:
+    """Ignore Ctrl-C in this process, which the main process ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def count_processes(jobs: list[CheckJob]) -> int:

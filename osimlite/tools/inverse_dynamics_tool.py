@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.progress import watch_items
 from osimlite.base.records import replace
 from osimlite.base.text import join_words, suggest_name
 from osimlite.io.tables.storage import StoTable, expect_time_range
@@ -180,7 +181,8 @@ def compute_joint_loads(
         for joint, bodies in requested
     ]
     rows = np.zeros((len(recorded.times), len(joints), 2, 3))
-    for row, q, row_forces in zip(rows, recorded.values, forces, strict=True):
+    moments = [*zip(rows, recorded.values, forces, strict=True)]
+    for row, q, row_forces in watch_items("computing loads at joints", moments):
         state = mechanism.at(q)
         for number, joint_hinges in enumerate(hinges):
             row[number] = sum(

@@ -158,7 +158,7 @@ class Film:
         self.times = recorded[0] + np.arange(count) * speed / fps
         values = get_values(motion, self.mechanism)
         self.q = interpolate_columns(motion, values, self.times)
-        self.poses = [self.scene.compute_poses(row) for row in self.q]
+        self.poses = self.scene.compute_all_poses(self.q)
         self.moving = find_moving_bodies(self.poses)
         self.pushes = DrawnForces.from_motion(self.scene, motion, self.times)
         self.activity = {

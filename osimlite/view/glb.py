@@ -54,10 +54,10 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         )
         values = get_values(motion, scene.mechanism)
         rows = interpolate_columns(motion, values, times)
-    poses = [scene.compute_poses(row) for row in watch_items("posing the model", rows)]
+    poses = scene.compute_all_poses(rows)
     # glTF has Y up; the root turns the vertical of the model to it.
     writer = _GlbWriter(
-        times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
+        times - times[0], _turn_vectors(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
     )
     names = [*(body.name for body in scene.mechanism.bodies), "ground"]
     bodies = [
@@ -78,7 +78,8 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
             surface = scene.surfaces[drawn_item.surface]
             mesh = writer.add_mesh(surface, drawn_item.color, drawn_item.opacity)
             writer.add_shape(bodies[drawn_item.body], drawn_item.path, mesh, drawn_item.matrix)
-    for name, color, radius, end_points in _list_segments(scene, motion, times, rows, poses):
+    segments = [*_list_segments(scene, motion, times, rows, poses)]
+    for name, color, radius, end_points in watch_items("laying tubes", segments, " tubes"):
         writer.add_node(name, _lay_tubes(end_points, radius), writer.add_mesh(_ROUND, color, 1.0))
     write_atomically(path, writer.to_bytes(scene.mechanism.name))
     return Path(path)
@@ -136,7 +137,8 @@ def _lay_tubes(end_points: Array, radius: float) -> _Track:
     directions = end_points[:, 1] - end_points[:, 0]
     lengths = np.linalg.norm(directions, axis=1)
     directions = directions / np.maximum(lengths, 1e-300)[:, None]
-    rotations = np.array([_make_turns(np.array((-y, x, 0.0)), z) for x, y, z in directions])
+    axes = np.column_stack((-directions[:, 1], directions[:, 0], np.zeros(len(directions))))
+    rotations = _turn_vectors(axes, directions[:, 2])
     # A piece without length has no thickness either.
     radii = np.where(lengths > 0.0, radius, 0.0)
     return _Track(
@@ -146,13 +148,21 @@ def _lay_tubes(end_points: Array, radius: float) -> _Track:
     )
 
 
-def _make_turns(axis: Array, cosine: float) -> Array:
-    """Return the quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
+def _turn_vectors(axes: Array, cosines: Array) -> Array:
+    """Return the quaternions x y z w that turn unit vectors into others.
+
+    Args:
+        axes: cross products of the vectors before and after (..., 3).
+        cosines: their scalar products (...).
+
+    Returns:
+        Unit quaternions (..., 4); those of opposite vectors are half a turn about X.
+    """
     # The sum of axis and 1 + cosine is the quaternion of half the angle, up to its length.
-    result = np.array((*axis, 1.0 + cosine))
-    size = float(np.linalg.norm(result))
-    # Opposite vectors: half a turn about X.
-    return result / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
+    result = np.concatenate((axes, np.asarray(1.0 + cosines)[..., None]), axis=-1)
+    sizes = np.linalg.norm(result, axis=-1, keepdims=True)
+    is_opposite = sizes <= 1e-9
+    return np.where(is_opposite, (1.0, 0.0, 0.0, 0.0), result / np.where(is_opposite, 1.0, sizes))
 
 
 def _make_continuous(quaternions: Array) -> Array:

@@ -40,7 +40,7 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     if motion is not None:
         times = np.asarray(motion.times, dtype=float)
         rows = get_values(motion, scene.mechanism)
-    poses = [scene.compute_poses(row) for row in rows]
+    poses = scene.compute_all_poses(rows)
     recording = rr.RecordingStream(scene.mechanism.name or "osimlite")
     stream = recording.binary_stream()
 

@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
+from osimlite.base.progress import watch_items
 from osimlite.base.records import dataclass
 from osimlite.io.meshes.surface import Surface
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -164,6 +165,20 @@ class Scene:
         """Return the poses of all bodies at coordinate values q (n,)."""
         state = self.mechanism.at(q)
         return Bodies(self, state.q, state.rotations, state.origins)
+
+    def compute_all_poses(self, rows: Array) -> list[Bodies]:
+        """Return the poses of all bodies and lines along a motion, and report how many are done.
+
+        Args:
+            rows: coordinate values (t, n).
+        """
+        poses = []
+        for row in watch_items("posing the model", rows):
+            bodies = self.compute_poses(row)
+            # Tracing the paths takes most of the time; later it would be reported as no progress.
+            _ = bodies.lines
+            poses.append(bodies)
+        return poses
 
     @cached_property
     def polylines(self) -> Polylines:

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.base.progress import FIRST_ROWS, divide_rows, listen_to_progress, watch_items
+from osimlite.base.progress import (
+    FIRST_ROWS,
+    divide_rows,
+    listen_to_progress,
+    mute_progress,
+    watch_items,
+)
 
 
 @pytest.mark.parametrize("count", [0, 1, FIRST_ROWS, 1000])
@@ -26,3 +32,12 @@ def test_listeners_receive_the_last_row() -> None:
         assert [*divide_rows("a single pose", 1)]
     assert ("walking", 1000, 1000, " steps") in reports
     assert reports[-3:] == [("drawing", number, 3, " pages") for number in (1, 2, 3)]
+
+
+def test_steps_of_work_that_reports_itself_are_muted() -> None:
+    reports = []
+    with listen_to_progress(lambda *report: reports.append(report)):
+        for _ in watch_items("fitting", "ab", " steps"):
+            with mute_progress():
+                assert [*watch_items("drawing", "abc", " pages")]
+    assert reports == [("fitting", number, 2, " steps") for number in (1, 2)]

@@ -250,3 +250,7 @@ def test_an_interrupt_does_not_wait_for_packages(
     with pytest.raises(KeyboardInterrupt):
         doctor()
     assert time.monotonic() - started < 10.0
+    # Threads that have not started their process yet do not start it any more.
+    started = time.monotonic()
+    assert examine_package("lxml").name == "lxml"
+    assert time.monotonic() - started < 10.0

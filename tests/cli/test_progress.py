@@ -130,10 +130,21 @@ def test_parts_of_a_task_have_their_own_progress(monkeypatch, clock):
         report_progress("computing moments", 20.0, 40.0, " frames")
         words = "computing moments: 50 % (20 of 40 frames), 3 s left"
         assert shown(sys.stderr) == f"running, 1 of 3 done; {words}"
-        # A finished part says nothing about the next.
+        # A finished part says nothing about what follows.
         clock.now = 7.0
         report_progress("computing moments", 40.0, 40.0, " frames")
-        assert shown(sys.stderr) == "running: 33 % (1 of 3), 14 s left"
+        assert shown(sys.stderr) == "running, 1 of 3 done; writing results: 7 s"
+
+
+def test_a_stage_continues_after_its_parts(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress_bar("running", 1.0):
+        report_stage("InverseDynamicsTool: computing")
+        report_progress("computing moments", 20.0, 40.0, " frames")
+        report_progress("computing moments", 40.0, 40.0, " frames")
+        clock.now = 3.0
+        _progress._line.draw()
+        assert shown(sys.stderr) == "InverseDynamicsTool: computing: 3 s"
 
 
 def test_the_line_comes_back_at_once_after_another_task(monkeypatch, clock):
@@ -149,7 +160,7 @@ def test_the_line_comes_back_at_once_after_another_task(monkeypatch, clock):
 
 def test_commands_that_wait_for_people_have_no_line(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
-    _progress.watch_command("view")
+    _progress.watch_command("lsp")
     assert not _progress._line.tasks
 
 

@@ -277,6 +277,25 @@ def test_shared_work_finds_the_same_in_the_same_order(project):
     assert seen == [(count, 9) for count in range(1, 10)]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="replaces a function in forked processes")
+def test_an_interrupt_does_not_wait_for_files_that_are_being_checked(project, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    def check_slowly(job):
+        if not job.file.endswith("m0.osim"):
+            time.sleep(30.0)
+        return module.Report(job.file, [])
+
+    check_slowly.__qualname__, check_slowly.__module__ = "check_job", module.__name__
+    monkeypatch.setattr(module, "check_job", check_slowly)
+    files = [str(project / f"m{number}.osim") for number in range(4)]
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        check_files(files, Config(), cached=False, processes=2, progress=interrupt)
+    assert time.monotonic() - started < 10.0
+
+
 def test_a_missing_file_is_named_also_by_another_process(project):
     absent = str(project / "absent.osim")
     for processes in (1, 2):
