@@ -114,6 +114,8 @@ def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -
     child, terminal = pty.fork()
     if child == 0:
         os.chdir(folder)
+        # A shell starts jobs in the background with Ctrl-C ignored.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
         environment = {**os.environ, "TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
         environment.pop("COLUMNS", None)
         os.execve(sys.executable, [sys.executable, "-m", "osimlite", *arguments], environment)

@@ -8,6 +8,8 @@
   };
   const $ = (selector) => document.querySelector(selector);
   const ROW = 21;
+  // So many findings of one rule are shown beside each other; of more, the first.
+  const SAME = 3;
 
   // The tree shows only the rows in sight: a model has thousands of components.
   class Tree {
@@ -113,9 +115,12 @@
     }
   }
 
+  // Text whose paths may be broken behind a slash only, so that no word of them is.
+  const breakable = (text) => text.split(/(?<=[^\s'"][/\\])/).flatMap((part, k) => k ? [make("wbr"), part] : [part]);
+
   const finding = (viewer, item) => {
     const box = make("div", { className: `finding ${item.severity}` },
-      make("strong", { textContent: `${item.code} ` }), item.message);
+      make("strong", { textContent: `${item.code} ` }), ...breakable(item.message));
     if (item.place) box.append(make("div", { className: "path", textContent: item.place }));
     box.addEventListener("click", () => viewer.select(item.component || "/"));
     return box;
@@ -142,7 +147,16 @@
     if (!found.length) return;
     $("#findings").hidden = false;
     $("#findings h2").textContent = `Findings (${found.length})`;
-    $("#findings > div").append(...found.map((item) => finding(viewer, item)));
+    const order = ["error", "warning", "info"], groups = new Map();
+    for (const item of found) groups.set(item.code, [...(groups.get(item.code) || []), item]);
+    const worst = ([, items]) => Math.min(...items.map((item) => order.indexOf(item.severity)));
+    for (const [code, items] of [...groups].sort((one, other) => worst(one) - worst(other))) {
+      const boxes = items.map((item) => finding(viewer, item)), rest = boxes.splice(items.length > SAME ? 1 : SAME);
+      $("#findings > div").append(...boxes);
+      // A model whose meshes are missing has the same finding a hundred times.
+      if (rest.length) $("#findings > div").append(make("details", { className: "more" },
+        make("summary", { textContent: `${rest.length} more of ${code}` }), ...rest));
+    }
   };
 
   class Sliders {

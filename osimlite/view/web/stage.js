@@ -273,7 +273,7 @@
         const near = vector(point(pose, record.near));
         arrow.position.copy(on).addScaledVector(force, near.sub(on).dot(force) / (size * size));
         arrow.quaternion.setFromUnitVectors(up, force.divideScalar(size));
-        const length = 0.5 * this.data.size * size / motion.largest, thick = Math.min(0.013 * this.data.size, 0.2 * length);
+        const length = 0.5 * this.data.size * size / motion.largest, thick = Math.min(0.009 * this.data.size, 0.12 * length);
         const head = Math.min(length, 5 * thick);
         arrow.children[0].scale.set(thick, Math.max(length - head, 1e-6), thick);
         arrow.children[1].position.y = length - head;
@@ -344,7 +344,7 @@
       const { center, size } = this.data;
       const middle = vector(center), back = vector(direction).normalize();
       if (this.followed) middle.add(this.followed).sub(vector(this.data.motion.middle));
-      const tall = Math.min(1, this.camera.aspect) * Math.tan(0.5 * this.camera.fov * Math.PI / 180);
+      const tall = Math.min(this.free ?? 1, this.camera.aspect) * Math.tan(0.5 * this.camera.fov * Math.PI / 180);
       this.controls.target.copy(middle);
       this.camera.position.copy(middle).addScaledVector(back, 0.56 * size / tall);
       this.camera.near = 0.005 * size;
@@ -353,7 +353,7 @@
       if (this.gravity) {
         const side = new T.Vector3().crossVectors(this.up, back);
         if (side.lengthSq() < 1e-9) side.set(1, 0, 0);
-        this.gravity.position.copy(middle).addScaledVector(side.normalize(), -0.45 * size).addScaledVector(this.up, 0.3 * size);
+        this.gravity.position.copy(middle).addScaledVector(side.normalize(), -0.45 * size).addScaledVector(this.up, (0.3 - 0.5 * (1 - (this.free ?? 1))) * size);
       }
       this.controls.update();
       this.wanted();
@@ -382,6 +382,10 @@
       const at = new T.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height);
       ray.setFromCamera(at, this.camera);
       const lines = (this.tubed || []).map((tubes) => tubes.mesh).filter((mesh) => mesh.parent.visible);
+      // Arrows are drawn over all else, and so they are found before it.
+      const arrows = this.layers.forces.visible ? this.arrows.filter((arrow) => arrow.visible) : [];
+      const arrow = ray.intersectObjects(arrows, true)[0]?.object.parent;
+      if (arrow) return arrow.name;
       const hits = ray.intersectObjects([...this.shapes.filter((mesh) => mesh.visible), ...lines], false);
       // What shines through gives way to what is behind it.
       const hit = hits.find((h) => !(h.object.material.opacity < 0.45)) || hits[0];
@@ -401,6 +405,10 @@
       const { clientWidth, clientHeight } = this.canvas.parentElement;
       this.renderer.setSize(clientWidth, clientHeight, false);
       this.camera.aspect = clientWidth / Math.max(clientHeight, 1);
+      // What stands at the lower edge covers nothing of the model, which moves up and away.
+      const covered = Math.min(this.covered || 0, 0.5 * clientHeight);
+      this.camera.setViewOffset(clientWidth, clientHeight, 0, 0.5 * covered, clientWidth, clientHeight);
+      this.free = 1 - covered / Math.max(clientHeight, 1);
       this.camera.updateProjectionMatrix();
       this.wanted();
     }

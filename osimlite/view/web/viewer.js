@@ -3,6 +3,8 @@
 (() => {
   const { Curves, Mechanism, Stage, Tree, Sliders, showProperties, showFindings, make, $, bytes } = window.osimlite;
 
+  // Distance below which pins cover each other, pixels.
+  const PIN = 14;
   const VIEWS = ["home", "front", "side", "top"];
 
   class Viewer {
@@ -23,8 +25,8 @@
       this.keys();
       this.menus();
       this.stage.onDraw = () => this.placeLabels();
-      new ResizeObserver(() => this.stage.resize()).observe($("main"));
-      this.stage.resize();
+      new ResizeObserver(() => this.resize()).observe($("main"));
+      this.resize();
       this.time = 0;
       if (data.motion) this.setTime(data.motion.times[0]); else this.show(data.q);
       this.stage.look(data.directions.home);
@@ -45,6 +47,12 @@
           motion.largest = Math.max(motion.largest, Math.hypot(force.values[k], force.values[k + 1], force.values[k + 2]));
         }
       }
+    }
+
+    resize() {
+      const player = $("#player");
+      this.stage.covered = player.hidden ? 0 : player.offsetHeight + 12;
+      this.stage.resize();
     }
 
     title() {
@@ -258,6 +266,11 @@
     measured(path) {
       const words = [], motion = this.data.motion, row = this.stage.row;
       const line = this.data.lines.find((item) => item.path === path && item.route != null);
+      // A shape may hang on a frame, so its body is that which carries it in the scene.
+      const carrier = this.stage.shapes.find((mesh) => mesh.userData.path === path && mesh.userData.layer !== "contact")?.parent.name;
+      const body = this.data.tree.find((item) => item.kind === "Body" && (item.path === path || item.path === carrier));
+      const tags = body?.tags || this.data.tags.Body || [];
+      if (body && tags.includes("mass")) words.push(`${body.path === path ? "" : `${body.name}: `}mass ${body.values[tags.indexOf("mass")]} kg`);
       if (line) words.push(`length ${this.mechanism.length(line.route, this.q).toFixed(4)} m`);
       const level = motion?.activations[path]?.[row];
       if (level !== undefined) words.push(`activation ${(level / 255).toFixed(2)}`);
@@ -286,13 +299,16 @@
     labels() {
       const overlay = $("#overlay");
       this.named = this.data.bodies.map((body, k) => [make("span", { textContent: body.name }), k, body.center]);
-      this.pins = this.data.pins.map((pin) => {
-        const span = make("span", { className: `pin ${pin.severity}`, textContent: "!", title: `${pin.codes} ${pin.path}` });
+      const order = ["error", "warning", "info"];
+      // Of pins that cover each other the worst is shown.
+      const pins = [...this.data.pins].sort((one, other) => order.indexOf(one.severity) - order.indexOf(other.severity));
+      this.pins = pins.map((pin) => {
+        const span = make("span", { className: `pin ${pin.severity}` }), said = `${pin.codes} ${pin.path}`;
         span.addEventListener("click", () => this.select(pin.path));
-        return [span, pin.body, pin.at];
+        return { span, said, body: pin.body, at: pin.at };
       });
       this.weight = make("span", { className: "gravity", textContent: `gravity ${Math.hypot(...this.data.gravity).toFixed(2)} m/s²` });
-      overlay.append(...this.named.map(([span]) => span), ...this.pins.map(([span]) => span), this.weight);
+      overlay.append(...this.named.map(([span]) => span), ...this.pins.map(({ span }) => span), this.weight);
     }
 
     placeLabels() {
@@ -306,7 +322,19 @@
         Object.assign(span.style, { left: `${left}px`, top: `${place[1]}px` });
       };
       for (const [span, body, at] of this.named) put(span, this.data.labelled, this.stage.onPage(body, at));
-      for (const [span, body, at] of this.pins) put(span, !this.unpinned, this.stage.onPage(body, at));
+      const heaps = [];
+      for (const pin of this.pins) {
+        const place = this.stage.onPage(pin.body, pin.at);
+        const heap = place && heaps.find((other) => Math.hypot(other.place[0] - place[0], other.place[1] - place[1]) < PIN);
+        if (heap) heap.pins.push(pin); else if (place) heaps.push({ place, pins: [pin] });
+        pin.span.style.display = "none";
+      }
+      for (const { place, pins } of heaps) {
+        const { span } = pins[0];
+        span.textContent = pins.length > 1 ? pins.length : "!";
+        span.title = pins.map(({ said }) => said).join("\n");
+        put(span, !this.unpinned, place);
+      }
       const arrow = this.stage.gravity;
       const above = arrow && arrow.position.clone().addScaledVector(this.stage.up, 0.09 * this.data.size);
       put(this.weight, arrow && this.stage.layers.ground.visible, arrow && this.stage.onPage(-1, above.toArray()));
