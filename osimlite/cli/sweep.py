@@ -131,7 +131,12 @@ def sweep(
         variables = [variable.name for variable in plan.variables]
         with progress_bar("drawing", None):
             paths = plot_runs(
-                outcome.to_arrow().to_pydict(), variables, names, output.parent, output.stem
+                outcome.to_arrow().to_pydict(),
+                variables,
+                names,
+                output.parent,
+                output.stem,
+                {variable.name: variable.unit for variable in plan.variables},
             )
         say(describe_pictures(paths))
     # Some failures are expected in a sweep; if all runs fail, the setting is wrong.

@@ -27,13 +27,15 @@ class Band(NamedTuple):
     percent: Array  # points of the gait cycle (n,), %
     mean: Array  # mean (n,)
     deviation: Array  # standard deviation (n,)
+    source: str = ""  # where the numbers come from, shown below the panels
 
 
 def read_bands(path: str | Path) -> dict[str, Band]:
     """Read bands from a CSV file.
 
     The first column is the per cent of the gait cycle. The others are named after the titles of
-    panels, with ``_mean`` and ``_sd`` at the end.
+    panels, with ``_mean`` and ``_sd`` at the end. Lines before them that begin with ``#`` name the
+    source of the numbers, which is otherwise the name of the file.
 
     Args:
         path: the file.
@@ -45,11 +47,10 @@ def read_bands(path: str | Path) -> dict[str, Band]:
         DocumentError: the file has no such columns, or a cell is not a number.
     """
     file = str(path)
-    rows = [
-        row
-        for row in csv.reader(io.StringIO(read_file(path).decode("utf-8-sig", "replace")))
-        if row
-    ]
+    lines = io.StringIO(read_file(path).decode("utf-8-sig", "replace")).readlines()
+    comments = [line.lstrip("# \t").strip() for line in lines if line.startswith("#")]
+    source = " ".join(comments).removeprefix("source:").strip() or Path(path).name
+    rows = [row for row in csv.reader(line for line in lines if not line.startswith("#")) if row]
     labels = [label.strip() for label in rows[0]] if rows else []
     names = [label.removesuffix(MEAN) for label in labels[1:] if label.endswith(MEAN)]
     missing_labels = [f"{name}{DEVIATION}" for name in names if f"{name}{DEVIATION}" not in labels]
@@ -72,7 +73,7 @@ def read_bands(path: str | Path) -> dict[str, Band]:
         raise DocumentError("expected finite numbers, and per cents that increase", file=file)
     columns = dict(zip(labels, numbers.T, strict=True))
     return {
-        name: Band(numbers[:, 0], columns[f"{name}{MEAN}"], columns[f"{name}{DEVIATION}"])
+        name: Band(numbers[:, 0], columns[f"{name}{MEAN}"], columns[f"{name}{DEVIATION}"], source)
         for name in names
     }
 

@@ -340,7 +340,10 @@ def _draw_page(
             panel_axes.remove()
     add_legend(figure, [curve for row in rows for panel in row for curve in panel.curves])
     if note:
-        text = textwrap.fill(note, round(13 * width), break_on_hyphens=False)
+        text = "\n".join(
+            textwrap.fill(line, round(13 * width), break_on_hyphens=False)
+            for line in note.split("\n")
+        )
         figure.supxlabel(text, fontsize=8, color="0.35", x=0.02, ha="left")
     return figure
 
@@ -354,7 +357,7 @@ def draw_panel(panel_axes: Any, panel: Panel, abscissa: str, *, cyclic: bool = F
         _draw_curve(panel_axes, curve, cyclic=cyclic)
     _draw_limits(panel_axes, panel)
     if cyclic and panel.band is not None:
-        percent, mean, deviation = panel.band
+        percent, mean, deviation, _ = panel.band
         panel_axes.fill_between(percent, mean - deviation, mean + deviation, color="0.85", lw=0.0)
         panel_axes.plot(percent, mean, color="0.6", lw=1.0, zorder=1.0)
     style_axes(panel_axes, abscissa)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from osimlite.view.panels import COLORS, MAX_COLUMNS, MAX_PANELS, make_figure, w
 MAX_VARIABLES = 12
 """Variables over which a measure is drawn: those with the largest correlation."""
 
+MEASURE_UNITS = {"distance": "m", "largest_force": "N", "energy": "J"}
+"""Units of the measures that have names."""
+
 
 def plot_runs(
     columns: Mapping[str, Any],
@@ -23,6 +27,7 @@ def plot_runs(
     measures: Sequence[str],
     folder: str | Path,
     file_stem: str,
+    units: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Path]:
     """Draw each measure over the varied quantities: as a map over two of them, else as points.
 
@@ -32,6 +37,7 @@ def plot_runs(
         measures: names of the measures.
         folder: folder to write into; it is made if it does not exist.
         file_stem: name of the first file, without its suffix.
+        units: units of the varied quantities by name; measures have those of `MEASURE_UNITS`.
 
     Returns:
         The PNG files; none if no measure has a number.
@@ -56,7 +62,7 @@ def plot_runs(
             for measure in drawn_measures
             for name in _rank_variables(numbers, varied, measure)
         ]
-    return write_pages(_draw_pages(numbers, panels), make_folder(Path(folder)), file_stem)
+    return write_pages(_draw_pages(numbers, panels, {**MEASURE_UNITS, **units}), make_folder(Path(folder)), file_stem)
 
 
 def _to_numbers(column: Any) -> Array:
@@ -81,9 +87,15 @@ def _rank_variables(numbers: Mapping[str, Array], varied: Sequence[str], measure
 
 
 def _draw_pages(
-    numbers: Mapping[str, Array], panels: Sequence[tuple[str, str, str]]
+    numbers: Mapping[str, Array],
+    panels: Sequence[tuple[str, str, str]],
+    units: Mapping[str, str],
 ) -> Iterator[Any]:
     """Yield pages of panels, each with abscissa, ordinate, and what the color shows."""
+
+    def label(name: str) -> str:
+        return f"{name} ({units[name]})" if units.get(name) else name
+
     pages = ceil(len(panels) / MAX_PANELS)
     for number in range(pages):
         page = panels[number * MAX_PANELS : (number + 1) * MAX_PANELS]
@@ -100,10 +112,10 @@ def _draw_pages(
                 _draw_map(figure, panel, numbers[x], numbers[y], numbers[color])
             else:
                 panel.plot(numbers[x], numbers[y], ".", color=COLORS[0], ms=4, alpha=0.7)
-            panel.set_title(color or y, fontsize=10, loc="left")
-            panel.set_xlabel(x, fontsize=8)
+            panel.set_title(label(color or y), fontsize=10, loc="left")
+            panel.set_xlabel(label(x), fontsize=8)
             if color:
-                panel.set_ylabel(y, fontsize=8)
+                panel.set_ylabel(label(y), fontsize=8)
             if not color:
                 panel.grid(color="0.92", lw=0.8)
             panel.set_axisbelow(True)

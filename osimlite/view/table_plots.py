@@ -80,6 +80,12 @@ TABLE_UNITS = {
 }
 """Units of tables whose columns have one unit, by their first lines."""
 
+LABEL_UNITS = {"total_squared_error": "m²", "marker_error_RMS": "m", "marker_error_max": "m"}
+"""Units of the columns that OpenSim's inverse kinematics reports."""
+
+ACRONYMS = {"cmc", "grf", "id", "ik", "rra", "so"}
+"""Words in names of files that are written in capitals in titles."""
+
 STATE_UNITS = {
     "fiber_length": "m",
     "fiber_velocity": "m/s",
@@ -239,7 +245,7 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
             if unit.startswith("rad"):
                 factor, unit = np.degrees(1.0), unit.replace("rad", "deg", 1)
             return Column(column_name, unit, factor * values, group)
-    unit = TABLE_UNITS.get(table.name, "")
+    unit = LABEL_UNITS.get(label, TABLE_UNITS.get(table.name, ""))
     if table.name.startswith("MomentArm_"):
         unit = "m"
     elif table.name.startswith("Moment_"):
@@ -350,6 +356,9 @@ def plot_tables(
             panels = [panel._replace(band=(bands or {}).get(panel.title)) for panel in panels]
             titles += [panel.title for panel in panels]
             is_cyclic = is_cyclic or has_cycles(panels)
+            sources = {panel.band.source for panel in panels if panel.band is not None}
+            if sources and has_cycles(panels):
+                note = f"{note}\nGrey: mean and one standard deviation, {', '.join(sources)}".strip()
             paths += write_pages(
                 draw_pages(make_title(file_stem), panels, note=note), base, file_stem
             )
@@ -363,4 +372,6 @@ def plot_tables(
 def make_title(file_stem: str) -> str:
     """Return the title of a picture from the name of its file."""
     title = file_stem.strip("_").replace("_", " ")
-    return title[:1].upper() + title[1:]
+    words = [word.upper() if word in ACRONYMS else word for word in title.split(" ")]
+    text = " ".join(words)
+    return text[:1].upper() + text[1:]

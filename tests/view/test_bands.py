@@ -65,3 +65,23 @@ def test_a_band_that_nothing_shows_is_an_error(tmp_path: Path) -> None:
         plot_tables({"a.sto": table}, tmp_path, NO_NAMES, bands={"hip": band})
     with pytest.raises(SettingError, match="complete gait cycle"):
         plot_tables({"a.sto": table}, tmp_path, NO_NAMES, bands={"knee": band})
+
+
+def test_the_source_of_a_band_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "walking.csv"
+    path.write_text(TEXT)
+    assert read_bands(path)["knee"].source == "walking.csv"
+    path.write_text("# source: Adults,\n# own laboratory\n" + TEXT)
+    bands = read_bands(path)
+    assert bands["knee"].source == "Adults, own laboratory"
+    table = StoTable("", TIMES, ("knee",), np.sin(TIMES)[:, None])
+    drawn = []
+    plot_tables(
+        {"ik.mot": table},
+        tmp_path,
+        NO_NAMES,
+        steps={"r": Steps((0.2, 1.2), (0.8,))},
+        bands=bands,
+        report=lambda *counts: drawn.append(counts),
+    )
+    assert drawn == [(1, 1)] and (tmp_path / "ik.png").is_file()

@@ -149,6 +149,7 @@ class Variable:
         count: number of values in a grid, or None.
         is_log: whether the range is logarithmic.
         warning: sentence about a suspicious range, or "".
+        unit: unit of the values, such as rad/s; "" if they have none, or it is not known.
     """
 
     name: str
@@ -158,6 +159,7 @@ class Variable:
     count: int | None = None
     is_log: bool = False
     warning: str = ""
+    unit: str = ""
 
     def interpolate(self, fraction: Floats) -> Floats:
         """Return the values at fractions of the range, clipped to it, and exact at either end."""
@@ -443,7 +445,11 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
         )
     if count == 1 and lower != upper:
         raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
-    return Variable(name, target, lower, upper, count, is_log)
+    # "rad | m" is either, by a coordinate that is not known here.
+    known_unit = "" if "|" in unit or unit == "parameter" else unit
+    if known_unit and isinstance(target, Start) and target.is_speed:
+        known_unit += "/s"
+    return Variable(name, target, lower, upper, count, is_log, unit=known_unit)
 
 
 def _refuse_mixed_units(name: str, bound_texts: Sequence[object], unit: str) -> None:
