@@ -414,7 +414,8 @@ def test_what_a_finding_concerns_glows(fixtures, open_page, tmp_path):
     assert bad in page.run(glowing)
     assert page.page.locator(f'#overlay .pin[title*="{bad}"]').is_visible()
     page.page.locator("#findings .finding").first.click()
-    assert page.run("v.selected") == view.findings[0].component
+    # Errors come first.
+    assert page.run("v.selected") == bad
     page.run("v.select('/')")
     page.run("v.stage.showMarks(false)")
     assert bad not in page.run(glowing)
@@ -514,3 +515,31 @@ def test_values_with_units_are_said_under_the_pointer(open_page, tmp_path):
 
 def shown_walker() -> Shown:
     return Shown.of(dynamic_walker())
+
+
+def test_signs_that_cover_each_other_are_one(fixtures, open_page, tmp_path):
+    text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text()
+    path = tmp_path / "bad.osim"
+    path.write_text(text.replace("<radius>0.05", "<radius>-0.05"))
+    page = open_page(shown(path).write_page(tmp_path / "page.html"))
+    signs = page.page.locator("#overlay .pin:visible")
+    page.run("v.stage.look([0, 0, 1])")
+    page.until("!v.stage.waiting")
+    assert 0 < signs.count() < page.run("v.pins.length")
+    assert any(text.isdigit() for text in signs.all_inner_texts())
+    # Many findings of one rule are folded.
+    folded = page.run("v.data.findings.length") - page.page.locator(".finding:visible").count()
+    assert page.page.locator("#findings .more").count() == (folded > 0)
+
+
+def test_nothing_of_the_model_is_below_the_player(open_page, tmp_path):
+    model = dynamic_walker()
+    view = Shown.of(model, build_mechanism(model), motion=stroll())
+    page = open_page(view.write_page(tmp_path / "page.html"))
+    page.page.set_viewport_size({"width": 400, "height": 800})
+    page.until("v.stage.covered > 60")
+    page.run("v.stage.look(v.data.directions.home)")
+    page.until("!v.stage.waiting")
+    lowest = page.run("Math.max(...[1, 2, 3, 4, 5].map((k) => v.stage.onPage(k, [0, 0, 0])[1]))")
+    player = page.run("document.querySelector('#player').offsetTop")
+    assert lowest < player
