@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from osimlite.cli._command import Command
 
-NAME_WIDTH = 24
+NAME_WIDTH = 22
 """Width of the column of options; a longer option stands in a line of its own."""
 MAX_WIDTH = 120
 """Longer lines are hard to read."""

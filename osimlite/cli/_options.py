@@ -99,7 +99,7 @@ Foot = Annotated[
     list[str] | None,
     Option(
         metavar="CONTACT",
-        help="Contact force of a foot, with + between several of one foot; once for each foot.",
+        help="Contact forces of a foot, joined by +; once per foot.",
         show_default="the ends of the legs",
     ),
 ]
@@ -108,7 +108,7 @@ Controls = Annotated[
     Option(
         "--controls",
         metavar="CONTROLS",
-        help="Controls of actuators: a file with a table over time, or NAME=VALUE; may be repeated.",
+        help="Controls: a table over time, or NAME=VALUE; repeatable.",
         show_default=False,
     ),
 ]

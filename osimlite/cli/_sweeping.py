@@ -19,9 +19,9 @@ Vary = Annotated[
         metavar="NAME=RANGE",
         help="Range LOW:HIGH (in a sweep also LOW:HIGH:COUNT; :log at the end for a logarithmic scale) of a "
         "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a parameter of "
-        "the model function or of the controller (without --vary, all of its parameters). MUSCLE/control@0:0.5:6 are "
-        "six nodes of a control over time, @switch1 is a time at which it switches. Names may have * and ?, or be "
-        "several with commas; they get the same value. {*} makes one variable for each match.",
+        "the model function or of the controller (default: all of its). MUSCLE/control@0:0.5:6 are six nodes over "
+        "time, @switch1 is a time at which it switches. Names may have * and ? or commas and get the same value; "
+        "{*} makes one variable for each match.",
         show_default=False,
     ),
 ]
@@ -58,7 +58,7 @@ Planted = Annotated[
     bool,
     Option(
         "--planted",
-        help="Start each run with the lower foot at rest on the ground.",
+        help="Start with the lower foot at rest on the ground.",
     ),
 ]
 Workers = Annotated[
@@ -66,8 +66,8 @@ Workers = Annotated[
     Option(
         min=1,
         metavar="N",
-        help="Number of threads or processes on this machine.",
-        show_default="one for each core",
+        help="Number of threads or processes.",
+        show_default="one per core",
     ),
 ]
 Cluster = Annotated[

@@ -31,29 +31,29 @@ def optimize(
     method: Annotated[
         str,
         Option(
-            help="cma, sobol-cma (for a few hundred runs), differential-evolution, nelder-mead or gradient (exact "
-            "derivatives; for many variables and smooth objectives)."
+            help="cma, sobol-cma (few hundred runs), differential-evolution, nelder-mead or gradient (exact "
+            "derivatives, for many variables)."
         ),
     ] = "cma",
     popsize: Annotated[
         int | None,
         Option(
-            metavar="N", help="Number of runs per iteration.", show_default="depends on the method"
+            metavar="N", help="Number of runs per iteration.", show_default="by the method"
         ),
     ] = None,
     sigma: Annotated[
         float,
-        Option(help="Initial standard deviation of the search, as a fraction of the ranges."),
+        Option(help="Initial standard deviation, as a fraction of the ranges."),
     ] = 0.25,
     seed: Annotated[
-        int, Option(help="Seed of the random numbers; equal seeds give equal searches.")
+        int, Option(help="Seed of the random numbers.")
     ] = 0,
     start: Annotated[
         Path | None,
         Option(
             metavar="FOLDER",
-            help="Begin at the result of another search, for variables with the same names.",
-            show_default="the model's values",
+            help="Begin at the result of another search.",
+            show_default="the model",
         ),
     ] = None,
     maximize: Annotated[
@@ -63,18 +63,18 @@ def optimize(
         ),
     ] = None,
     unbounded: Annotated[
-        bool, Option("--unbounded", help="Use the ranges only as initial ranges, not as bounds.")
+        bool, Option("--unbounded", help="Use the ranges at the start only, not as bounds.")
     ] = False,
     tolerance: Annotated[
         float | None,
-        Option(help="Tolerance of convergence.", show_default="depends on the method"),
+        Option(help="Tolerance of convergence.", show_default="by the method"),
     ] = None,
     measure: Annotated[
         list[str] | None,
         Option(
             "--measure",
             metavar="NAME",
-            help="Another measure to write to the history.",
+            help="Another measure for the history.",
             show_default=False,
         ),
     ] = None,
@@ -94,7 +94,7 @@ def optimize(
             "-o",
             "--output",
             metavar="FOLDER",
-            help="Folder for history.parquet, best.osim, summary.json (and best.par).",
+            help="Folder of the history, best.osim and summary.json.",
         ),
     ] = Path("optimum"),
     resume: Annotated[
@@ -110,12 +110,6 @@ def optimize(
     **option_values: Any,
 ) -> None:
     """Search for the initial state, controls or parameters that optimize an objective, and write the best model.
-
-    With muscles: osimlite optimize jumper --objective 'max(center_of_mass_Y)' --maximize
-    --vary '{*}_?/control@0:0.3:4=0:1'
-
-    With reflexes: osimlite optimize arm.osim --objective 'elbow/value' --maximize --controller
-    hold.yaml
 
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary
         Pelvis_tx/speed=0:2

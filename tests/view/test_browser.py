@@ -523,7 +523,9 @@ def test_signs_that_cover_each_other_are_one(fixtures, open_page, tmp_path):
     path.write_text(text.replace("<radius>0.05", "<radius>-0.05"))
     page = open_page(shown(path).write_page(tmp_path / "page.html"))
     signs = page.page.locator("#overlay .pin:visible")
-    page.run("v.stage.look([0, 0, 1])")
+    # From far away all are near each other.
+    page.run("v.stage.camera.position.multiplyScalar(9.0), v.stage.controls.update()")
+    page.run("v.stage.wanted()")
     page.until("!v.stage.waiting")
     assert 0 < signs.count() < page.run("v.pins.length")
     assert any(text.isdigit() for text in signs.all_inner_texts())
