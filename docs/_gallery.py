@@ -45,7 +45,12 @@ def made(section: str) -> tuple[str, bytes]:
             command = (
                 [sys.executable, "-c", code] if language == "python" else ["bash", "-euc", code]
             )
-            environment = {**os.environ, "PATH": path, "MPLBACKEND": "Agg"}
+            environment = {
+                **os.environ,
+                "PATH": path,
+                "MPLBACKEND": "Agg",
+                "PYTHONPATH": str(PAGE.parents[1]),
+            }
             subprocess.run(
                 command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL
             )

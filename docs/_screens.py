@@ -1,11 +1,15 @@
 """Show what is on a terminal of 80 columns while each command works on something slow.
 
-    python docs/_screens.py [WORD ...]     all commands, or those whose names contain a WORD
+    python docs/_screens.py [WORD ...]               all commands, or those whose names contain a WORD
+    python docs/_screens.py --picture FILE NAME ...  draw the screens of the commands of these rows
 
 Each command runs at a terminal that this program emulates. The screen is read after 0.5, 2 and 5
 seconds, then Ctrl-C is sent. The table that is printed has one row for each command: the last line
 on the screen at these times, and the seconds until the command ended after Ctrl-C. A command that
 ended before has "finished" there. Run it after a change of what commands print while they work.
+
+On a machine that is busy with other work, set SCREENS_CLOCK=processor (on Linux): the times are then
+the seconds of processor time that the command has used, nearly those of a quiet machine.
 """
 
 from __future__ import annotations
@@ -18,9 +22,11 @@ import select
 import shutil
 import signal
 import struct
+import subprocess
 import sys
 import termios
 import time
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,10 +41,17 @@ MOMENTS_S = (0.5, 2.0, 5.0)
 """Times after the start of a command at which its screen is read, s."""
 MAX_END_S = 20.0
 """Longest wait for the end of a command after Ctrl-C, s."""
+MAX_SLOWDOWN = 30.0
+"""Largest ratio of time to processor time that is waited for."""
+POLL_S = 0.02
+"""Time between two looks at the processor time, s."""
 REPETITIONS = 60
 """Number of times that a recorded motion is repeated, so that work on it takes seconds."""
 MODELS = 40
 """Number of models in the folder of many models."""
+
+FONT_SIZE = 15
+"""Height of the letters in pictures, pixels."""
 
 COMMANDS = {
     "build": "build human -o built.osim",
@@ -102,13 +115,16 @@ class Recording:
     last: list[str] = field(default_factory=list)
 
 
-def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -> Recording:
+def record_command(
+    arguments: list[str], folder: Path, columns: int = COLUMNS, clone: Path = ROOT
+) -> Recording:
     """Run osimlite at an emulated terminal, and read its screen at `MOMENTS_S`.
 
     Args:
         arguments: arguments of osimlite.
         folder: current folder of the command.
         columns: width of the terminal.
+        clone: clone of the repository whose osimlite runs.
     """
     started = time.monotonic()
     child, terminal = pty.fork()
@@ -116,7 +132,7 @@ def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -
         os.chdir(folder)
         # A shell starts jobs in the background with Ctrl-C ignored.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-        environment = {**os.environ, "TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
+        environment = {**os.environ, "TERM": "xterm-256color", "PYTHONPATH": str(clone)}
         environment.pop("COLUMNS", None)
         os.execve(sys.executable, [sys.executable, "-m", "osimlite", *arguments], environment)
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", LINES, columns, 0, 0))
@@ -124,7 +140,7 @@ def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -
     stream = pyte.ByteStream(screen)
     recording = Recording()
     for moment in MOMENTS_S:
-        is_open = _feed_until(terminal, stream, started + moment)
+        is_open = _feed_until(terminal, stream, moment, _make_clock(child, started))
         if not is_open:
             recording.ended = time.monotonic() - started
             break
@@ -133,7 +149,7 @@ def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -
         stopped = time.monotonic()
         # The terminal interrupts all processes in its foreground, as when a key is pressed.
         os.write(terminal, b"\x03")
-        if _feed_until(terminal, stream, stopped + MAX_END_S):
+        if _feed_until(terminal, stream, MAX_END_S, lambda: time.monotonic() - stopped):
             os.kill(child, signal.SIGKILL)
         recording.stopping = time.monotonic() - stopped
     _, status = os.waitpid(child, 0)
@@ -143,10 +159,29 @@ def record_command(arguments: list[str], folder: Path, columns: int = COLUMNS) -
     return recording
 
 
-def _feed_until(terminal: int, stream: pyte.ByteStream, end: float) -> bool:
+def _make_clock(process: int, started: float) -> Callable[[], float]:
+    """Return a function that returns how long a process has worked, s."""
+    if os.environ.get("SCREENS_CLOCK") != "processor":
+        return lambda: time.monotonic() - started
+
+    def read_processor_time() -> float:
+        # Fields 14 and 15 are the times in the program and in the kernel, in ticks. The name of the
+        # program before them may have blanks, and ends with the last bracket.
+        status = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2]
+        fields = status.split()
+        used = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        # A process that waits for its own processes uses no time.
+        return max(used, (time.monotonic() - started) / MAX_SLOWDOWN)
+
+    return read_processor_time
+
+
+def _feed_until(
+    terminal: int, stream: pyte.ByteStream, end: float, clock: Callable[[], float]
+) -> bool:
     """Feed the output of a command to a screen; return whether it still runs at the end time."""
-    while (left := end - time.monotonic()) > 0.0:
-        if select.select([terminal], [], [], left)[0]:
+    while (left := end - clock()) > 0.0:
+        if select.select([terminal], [], [], min(left, POLL_S))[0]:
             try:
                 output = os.read(terminal, 65536)
             except OSError:
@@ -184,10 +219,11 @@ def make_inputs(folder: Path) -> None:
     for number in range(MODELS):
         # Equal files would be checked once.
         (many / f"model{number}.osim").write_bytes(model + b"<!-- %d -->\n" % number)
-    for name in ("human", "jumper"):
-        record_command(["build", name, "-o", f"{name}.osim"], folder)
-    # The study is written beside its model.
-    record_command(["build", "human-walks", "-o", "walks.osim"], folder)
+    # The study of the third is written beside its model.
+    for name, file in (("human", "human"), ("jumper", "jumper"), ("human-walks", "walks")):
+        command = [sys.executable, "-m", "osimlite", "build", name, "-o", f"{file}.osim"]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
 
 
 def repeat_rows(source: Path, target: Path, time_column: int) -> None:
@@ -251,5 +287,52 @@ def print_table(words: list[str]) -> None:
                 print(f"| {' | '.join(describe_row(row, recording))} |", flush=True)
 
 
+def draw_screens(recordings: dict[str, Recording], path: str | Path) -> None:
+    """Draw what a terminal showed: each command, and the last line of its screen at each time.
+
+    Args:
+        recordings: recordings by the line that was typed.
+        path: PNG file to write.
+    """
+    import matplotlib
+    from PIL import Image, ImageDraw, ImageFont
+
+    lines = []
+    for command, recording in recordings.items():
+        lines.append((f"$ {command}"[:COLUMNS], "#7ee787"))
+        for moment in MOMENTS_S:
+            screen = recording.screens.get(moment)
+            # The line of progress is the last one.
+            shown = "(finished)" if screen is None else screen[-1]
+            lines.append((f"{moment:>4g} s  {shown}", "#e6edf3"))
+        lines.append(("", "#e6edf3"))
+    lines.pop()
+    font = ImageFont.truetype(
+        str(Path(matplotlib.get_data_path()) / "fonts/ttf/DejaVuSansMono.ttf"), FONT_SIZE
+    )
+    width, height = round(font.getlength("m" * (COLUMNS + 8))) + 24, round(1.35 * FONT_SIZE)
+    image = Image.new("RGB", (width, height * len(lines) + 24), "#0d1117")
+    draw = ImageDraw.Draw(image)
+    for number, (text, color) in enumerate(lines):
+        draw.text((12, 12 + number * height), text, font=font, fill=color)
+    image.save(path)
+
+
+def draw_picture(path: str, rows: list[str]) -> None:
+    """Record the commands of some rows, and draw their screens."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        make_inputs(folder)
+        recordings = {
+            f"osimlite {arguments}": record_command(arguments.split(), folder)
+            for row, arguments in COMMANDS.items()
+            if row in rows
+        }
+    draw_screens(recordings, path)
+
+
 if __name__ == "__main__":
-    print_table(sys.argv[1:])
+    if sys.argv[1:2] == ["--picture"]:
+        draw_picture(sys.argv[2], sys.argv[3:])
+    else:
+        print_table(sys.argv[1:])

@@ -37,17 +37,13 @@ def optimize(
     ] = "cma",
     popsize: Annotated[
         int | None,
-        Option(
-            metavar="N", help="Number of runs per iteration.", show_default="by the method"
-        ),
+        Option(metavar="N", help="Number of runs per iteration.", show_default="by the method"),
     ] = None,
     sigma: Annotated[
         float,
         Option(help="Initial standard deviation, as a fraction of the ranges."),
     ] = 0.25,
-    seed: Annotated[
-        int, Option(help="Seed of the random numbers.")
-    ] = 0,
+    seed: Annotated[int, Option(help="Seed of the random numbers.")] = 0,
     start: Annotated[
         Path | None,
         Option(

@@ -62,7 +62,11 @@ def plot_runs(
             for measure in drawn_measures
             for name in _rank_variables(numbers, varied, measure)
         ]
-    return write_pages(_draw_pages(numbers, panels, {**MEASURE_UNITS, **units}), make_folder(Path(folder)), file_stem)
+    return write_pages(
+        _draw_pages(numbers, panels, {**MEASURE_UNITS, **units}),
+        make_folder(Path(folder)),
+        file_stem,
+    )
 
 
 def _to_numbers(column: Any) -> Array:

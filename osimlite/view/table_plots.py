@@ -358,7 +358,9 @@ def plot_tables(
             is_cyclic = is_cyclic or has_cycles(panels)
             sources = {panel.band.source for panel in panels if panel.band is not None}
             if sources and has_cycles(panels):
-                note = f"{note}\nGrey: mean and one standard deviation, {', '.join(sources)}".strip()
+                note = (
+                    f"{note}\nGrey: mean and one standard deviation, {', '.join(sources)}".strip()
+                )
             paths += write_pages(
                 draw_pages(make_title(file_stem), panels, note=note), base, file_stem
             )

@@ -12,7 +12,9 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 MAX_GROUP = 7
 """Largest number of entries of a group of the navigation, and of links in a cell of the first page."""
-GENERATED = re.compile(r"reference/(commands|components)\.md|rules/OSIM\d+\.md|reference/library\.md")
+GENERATED = re.compile(
+    r"reference/(commands|components)\.md|rules/OSIM\d+\.md|reference/library\.md"
+)
 """Pages that exist on the site only; see `docs/_generated.py`."""
 LINK = re.compile(r"!?\[[^]]*\]\(([^)\s]+)(?:\s+\"[^\"]*\")?\)")
 
