@@ -58,7 +58,9 @@ def test_a_rule_that_reads_the_model_needs_no_numeric_library(tmp_path: Path):
     for name, case in zip(files, CASES, strict=True):
         (tmp_path / name).write_text(case.text)
     done = environment.call("validate", "--no-cache", "--format", "json", *files, folder=tmp_path)
-    assert done.stderr == ""
+    # A busy machine takes so long that the command says how far it is.
+    lines = done.stderr.splitlines()
+    assert [line for line in lines if not line.startswith("osimlite: checking: ")] == []
     codes: dict[str, set[str]] = {name: set() for name in files}
     for finding in json.loads(done.stdout):
         if finding["name"] == "not-measured":
