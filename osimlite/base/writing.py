@@ -422,10 +422,19 @@ def find_shared_folders() -> set[str]:
     }
 
 
-def _find_marked_folder(folder: Path, shared: set[str]) -> str | None:
-    """Return the nearest folder above that is marked as the top of a project."""
+def _find_marked_folder(folder: Path, shared_folders: set[str]) -> str | None:
+    """Return the nearest of a folder and those above it that is marked as the top of a project.
+
+    Args:
+        folder: absolute path.
+        shared_folders: folders above projects, such as the home folder, where the search ends: a
+            mark there does not make one project of all that is below.
+
+    Returns:
+        Path of the project; None without a mark.
+    """
     for ancestor in _list_ancestors(folder):
-        if str(ancestor) in shared:
+        if str(ancestor) in shared_folders:
             return None
         if any((ancestor / mark).exists() for mark in _PROJECT_MARKS):
             return str(ancestor)

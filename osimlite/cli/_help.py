@@ -44,9 +44,9 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
         for parameter in group:
             is_argument = parameter.declared.maker == "Argument"
             name_text = _name_argument(parameter) if is_argument else _name_option(parameter)
-            lines += _describe(name_text, _explain(parameter), width, start, end)
+            lines += _format_entry(name_text, _explain(parameter), width, start, end)
         lines.append("")
-    lines[-1:] = [*_describe("-h, --help", "Show this text.", width, start, end), ""]
+    lines[-1:] = [*_format_entry("-h, --help", "Show this text.", width, start, end), ""]
     return "\n".join(lines)
 
 
@@ -87,8 +87,16 @@ def _explain(parameter: Any) -> str:
     return f"{text} [{default_note}]" if default_note else text
 
 
-def _describe(name_text: str, text: str, width: int, start: str, end: str) -> list[str]:
-    """Return the lines of an option or argument with its help."""
+def _format_entry(name_text: str, text: str, width: int, start: str, end: str) -> list[str]:
+    """Return the lines of the help about one option or argument, the text in a second column.
+
+    Args:
+        name_text: option with its metavariable.
+        text: its help.
+        width: width of the terminal.
+        start: escape sequence before the name, to colour it.
+        end: escape sequence after it.
+    """
     beginning = f"  {start}{name_text}{end}"
     indent = NAME_WIDTH + 4
     lines = _wrap(text, width, indent)

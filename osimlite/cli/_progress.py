@@ -137,7 +137,9 @@ class _Line:
     """The line on standard error; it is erased before anything else is printed."""
 
     def __init__(self) -> None:
+        # Innermost task last; the line shows that one.
         self.tasks: list[_Task] = []
+        # Number of characters on the line now.
         self._shown = 0
         self._last_output = time.monotonic()
         self._last_drawn = 0.0

@@ -89,15 +89,16 @@ def describe_differences(differences: list[Difference]) -> list[str]:
             last = path
         if old_value is None or new_value is None:
             sign, value = ("+", new_value) if old_value is None else ("-", old_value)
-            lines.append(f"    {sign} {property_name}: {_format_value(value)}")
+            lines.append(f"    {sign} {property_name}: {_format_property_value(value)}")
         else:
             lines.append(
-                f"    {property_name}: {_format_value(old_value)} -> {_format_value(new_value)}"
+                f"    {property_name}: {_format_property_value(old_value)} -> {_format_property_value(new_value)}"
             )
     return lines
 
 
-def _format_value(value: Any) -> str:
+def _format_property_value(value: Any) -> str:
+    """Return the value of a property as a file has it, or "(empty)"."""
     if isinstance(value, float):
         from osimlite.io.document.lexical import format_shortest
 
@@ -105,5 +106,5 @@ def _format_value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple):
-        return " ".join(map(_format_value, value)) or "(empty)"
+        return " ".join(map(_format_property_value, value)) or "(empty)"
     return str(value) or "(empty)"

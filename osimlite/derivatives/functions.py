@@ -154,8 +154,7 @@ class CasadiModel(DifferentiableModel):
 
         Returns:
             Numbers of the kernels, points and frames, and lengths of paths around surfaces; none if
-            the
-                structure of the model changes.
+            the structure of the model changes.
         """
         mechanism = build_mechanism(changed_model)
         searched = self._find_wrapped_paths(changed_model, mechanism)

@@ -198,8 +198,7 @@ class SymbolicEvaluator:
 
         Returns:
             Workspace whose result has the wrench of a unit multiplier, by the index of the equation
-            and the
-                link on which it acts.
+            and the link on which it acts.
         """
         rows_offset = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]

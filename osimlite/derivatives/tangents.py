@@ -548,8 +548,7 @@ def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
 
     Yields:
         Slice of the directions, and slice of their columns in a row of dual numbers. Without
-        directions
-            there is one empty slice, so that the values are computed.
+        directions there is one empty slice, so that the values are computed.
     """
     for start in range(0, max(count, 1), DIRECTIONS):
         size = min(DIRECTIONS, max(count - start, 0))

@@ -397,12 +397,12 @@ class _PersonFit:
         prior_weights = np.repeat(1.0 / (MARKER_OFFSET_M**2 + (movable_offsets**2).sum(axis=1)), 3)
         np.fill_diagonal(matrix[self._sizes :, self._sizes :], prior_weights)
         slope[self._sizes :] = prior_weights * movable_offsets.ravel()
-        for frame, moves in enumerate(estimate.posed.compute_free_motions(values)):
+        for frame, jacobian in enumerate(estimate.posed.compute_marker_jacobians(values)):
             is_seen = is_measured[frame]
             scaled = roots[is_seen, None, None]
             rows = (scaled * derivatives[frame, is_seen]).reshape(-1, size)
             # Errors that a change of the pose removes do not count: project them out.
-            pose_derivatives = (scaled * moves[is_seen]).reshape(len(rows), moves.shape[-1])
+            pose_derivatives = (scaled * jacobian[is_seen]).reshape(len(rows), jacobian.shape[-1])
             # Orthonormal directions in which a change of the pose moves the markers.
             squares, axes = np.linalg.eigh(pose_derivatives.T @ pose_derivatives)
             # Directions in which the markers do not move are rounding errors.

@@ -134,13 +134,20 @@ class ScaledPoseFit:
             [frame.places for frame in frames]
         )
 
-    def compute_free_motions(self, values: Array) -> list[Array]:
-        """Return, for each pose (t, n), the free motions of the markers.
+    def compute_marker_jacobians(self, values: Array) -> list[Array]:
+        """Return, for each pose, the derivatives of marker positions along the model's degrees of freedom.
+
+        A degree of freedom is here a vector of coordinate speeds that fulfils the constraints and
+        moves neither locked coordinates nor clamped ones at the end of their range. Their number f
+        can therefore differ from pose to pose.
+
+        Args:
+            values: poses (t, n).
 
         Returns:
-            Velocities of the markers (m, 3, f) for each pose, a column for each free direction.
+            Jacobian of the markers (m, 3, f) for each pose, m per unit of the degree of freedom.
         """
-        return self._points.compute_free_motions(values)
+        return self._points.compute_marker_jacobians(values)
 
 
 class _MarkerPoints:
@@ -152,21 +159,21 @@ class _MarkerPoints:
         self._system = System(unconstrained, Forces(()), apart=True)
         links = [self._system.placements[station.body][0] for station in stations]
         # Several markers are on one link, whose motion is computed once.
-        self._carrying, self._links = np.unique(links, return_inverse=True)
+        self._marker_links, self._links = np.unique(links, return_inverse=True)
         frames = [self._system.placements[station.body][1] for station in stations]
         located = zip(frames, stations, strict=True)
-        self._own = np.array(
+        self._locations = np.array(
             [frame[:3, :3] @ station.location + frame[:3, 3] for frame, station in located]
         )
-        self._turned = np.array([frame[:3, :3] for frame in frames])
+        self._rotations = np.array([frame[:3, :3] for frame in frames])
         constraints = [
             constraint
             for constraint in mechanism.constraints
             if not isinstance(constraint, Lock | PrescribedCoordinate)
         ]
         self._couplers, _ = separate_couplers(constraints, set())
-        self._holds = constraints
-        self._still = [
+        self._constraints = constraints
+        self._fixed_coordinates = [
             k
             for k, info in enumerate(mechanism.coordinates)
             if info.locked or info.prescribed is not None
@@ -189,25 +196,27 @@ class _MarkerPoints:
                 coupler.function.evaluate(row[arguments])[0] for row in coupled_values
             ]
         links = self._compute_link_motion(coupled_values, np.zeros_like(coupled_values))
-        rotations = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._turned
-        return locate_points(links, self._own)[..., :3], rotations
+        rotations = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._rotations
+        return locate_points(links, self._locations)[..., :3], rotations
 
-    def compute_free_motions(self, values: Array) -> list[Array]:
-        """Return the free motions; see :meth:`ScaledPoseFit.compute_free_motions`."""
+    def compute_marker_jacobians(self, values: Array) -> list[Array]:
+        """Return the Jacobians of the markers; see :meth:`ScaledPoseFit.compute_marker_jacobians`."""
         count, size = values.shape
+        # Velocities are linear in the speeds, so that unit speeds give the columns exactly.
         link_motions = [
             self._compute_link_motion(values, np.tile(unit, (count, 1))) for unit in np.eye(size)
         ]
-        moves = np.stack(
-            [locate_points(links, self._own)[..., 3:] for links in link_motions], axis=-1
+        jacobians = np.stack(
+            [locate_points(links, self._locations)[..., 3:] for links in link_motions], axis=-1
         )
         return [
-            rates @ self._compute_free_speeds(q) for rates, q in zip(moves, values, strict=True)
+            jacobian @ self._compute_null_space(q)
+            for jacobian, q in zip(jacobians, values, strict=True)
         ]
 
-    def _compute_free_speeds(self, q: Array) -> Array:
-        """Return the speeds (n, f) that joints, constraints and ends of ranges allow in a pose."""
-        fixed_coordinates = [
+    def _compute_null_space(self, q: Array) -> Array:
+        """Return orthonormal speeds (n, f) that joints, constraints and ends of ranges allow in a pose."""
+        at_range_end = [
             k
             for k, (info, value) in enumerate(
                 zip(self._mechanism.coordinates, q.tolist(), strict=True)
@@ -218,18 +227,20 @@ class _MarkerPoints:
             and not info.range[0] + RANGE_TOLERANCE < value < info.range[1] - RANGE_TOLERANCE
         ]
         # Rows of the constraint matrix; free motions are its null space.
-        rows = [np.eye(len(q))[[*self._still, *fixed_coordinates]]]
-        if self._holds:
+        rows = [np.eye(len(q))[[*self._fixed_coordinates, *at_range_end]]]
+        if self._constraints:
             state = self._mechanism.at(q)
-            rows += [constraint.velocity_equations(state)[0] for constraint in self._holds]
-        _, lengths, directions = np.linalg.svd(np.vstack(rows))
-        return np.asarray(directions[int((lengths > RANGE_TOLERANCE).sum()) :].T)
+            rows += [constraint.velocity_equations(state)[0] for constraint in self._constraints]
+        # The singular vectors beyond the rank span the null space, also of redundant constraints.
+        _, singular_values, directions = np.linalg.svd(np.vstack(rows))
+        rank = int((singular_values > RANGE_TOLERANCE).sum())
+        return np.asarray(directions[rank:].T)
 
     def _compute_link_motion(self, values: Array, speeds: Array) -> Array:
-        """Return the records of the markers' links (t, m, ...)."""
+        """Return the records of the markers' links (t, m, ...) for poses and speeds (t, n)."""
         order = list(self._system.order)
         zero_times = np.zeros((len(values), 1))
         result = self._system.evaluate_links(
-            np.hstack((zero_times, values[:, order], speeds[:, order])), self._carrying.tolist()
+            np.hstack((zero_times, values[:, order], speeds[:, order])), self._marker_links.tolist()
         )
         return result[:, self._links]

@@ -51,6 +51,9 @@ class CheckTarget:
     def measure(self, *, anew: bool = True) -> str:
         """Measure paths and muscles or recall the results; return why not, if that fails.
 
+        Args:
+            anew: measure if there is no result yet; otherwise only recall one.
+
         Returns:
             The reason why nothing was measured; empty on success.
         """

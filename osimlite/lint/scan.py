@@ -216,7 +216,7 @@ class RowScanner:
         if not times[0] > self._get_last_time() or not all(map(lt, times, islice(times, 1, None))):
             for number, (before, now) in enumerate(pairwise([self._get_last_time(), *times])):
                 if not now > before:
-                    self._note_order(lines[number], line + number, now, before)
+                    self._note_time_order_fault(lines[number], line + number, now, before)
         rows.times.extend(times)
         rows.count += len(lines)
         if self._count_missing_samples() > 0:
@@ -330,7 +330,7 @@ class RowScanner:
                 if value != value:
                     self._note_fault("time", time, line, start, cell)
                 elif not value > self._get_last_time():
-                    self._note_order(text, line, value, self._get_last_time())
+                    self._note_time_order_fault(text, line, value, self._get_last_time())
             elif not (self.markers and cell.lower() in (b"", b"nan")):
                 parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
                 if len(parts) != self.parts or any(
@@ -385,7 +385,18 @@ class RowScanner:
         # After a wrong frame number the count continues from it: one shift is one finding.
         self._frame = number if number is not None else self._frame + 1
 
-    def _note_order(self, text: bytes, line: int, time: float, previous_time: float) -> None:
+    def _note_time_order_fault(
+        self, text: bytes, line: int, time: float, previous_time: float
+    ) -> None:
+        """Note that a row's time is not later than that of the row before, at the cell of the time.
+
+        Args:
+            text: text of the row.
+            line: number of its line.
+            time: its time, s.
+            previous_time: time of the row before, s.
+        """
+        # Rows of marker files have a frame number before the time.
         match = _WORD.search(text, text.find(b"\t") if self.markers else 0)
         start, word = (match.start(), match[0]) if match else (0, b"")
         self._note_fault(

@@ -174,20 +174,31 @@ class Setup(Subject):
         if self.folder is None:
             return []
         folder = self.folder.resolve()
-        return self._find_tools(
+        return self._read_tools(
             [folder, folder.parent, *list_folders(folder), *list_folders(folder.parent)]
         )
 
-    def _find_tools(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
-        result = []
+    def _read_tools(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
+        """Return the tools that name a model in setup files directly in folders, and note what was read.
+
+        Args:
+            folders: folders to search, without those below them; of each the first
+                `_MAX_NEIGHBOURS` documents.
+
+        Returns:
+            Path of each setup, and its tool.
+        """
+        tools = []
         for folder in dict.fromkeys(folders):
+            # The cache of reports must expire when a file in the folder appears or changes.
             self._looked_at[str(folder)] = None
             for file in (list_documents(str(folder)) or [])[:_MAX_NEIGHBOURS]:
+                # Most documents are no tools, which their first bytes show without parsing.
                 top = get_object(file) if _NAMES_MODEL.search(read_beginning(file)) else None
                 if top is not None and _find_model_file(top) is not None:
-                    result.append((file, top))
+                    tools.append((file, top))
                     self._looked_at[file] = None
-        return result
+        return tools
 
     @cached_property
     def tool(self) -> tuple[str, Object] | None:
@@ -317,7 +328,7 @@ class Setup(Subject):
     def find_writer(self, path: str) -> str | None:
         """Return another setup of the project that writes a file; None without one."""
         target = os.path.realpath(path)
-        around = self._find_tools(list(Path(target).parents)[:3])
+        around = self._read_tools(list(Path(target).parents)[:3])
         files_by_name_length: dict[int, str] = {}
         for file, top in dict(self.neighbours + around).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):

@@ -130,14 +130,18 @@ class Trial(CheckTarget):
         advice: str,
         kind: str = "",
     ) -> None:
-        """Compare the measurements of a rule with limits: bad beyond the largest, okay beyond the smallest.
+        """Compare the measurements of a rule with limits, and record a verdict on each.
+
+        A measurement is good up to the smallest limit, acceptable up to the largest, and bad beyond.
+        What is not good is reported as well.
 
         Args:
             report: the collector of the rule's findings.
-            limits: settings, or numbers that are parts of what a number is compared with.
-            source: of the limits.
-            advice: what to look at.
-            kind: only numbers of this kind.
+            limits: one or two limits, settings or numbers; a setting in % is relative to the scale of
+                the measurement. Infinite ones do not count.
+            source: publication or document that the limits are from.
+            advice: next step, the end of the message.
+            kind: compare only measurements of this kind (key of `STATISTICS`).
         """
         (rule,) = report.rules.values()
         for number in self.numbers:

@@ -254,8 +254,7 @@ class StateEvaluator:
 
         Returns:
             Generalized forces (k, n) that the accelerations need beyond gravity and the forces of
-            the
-                model.
+            the model.
         """
         # The kernel of inverse dynamics writes its result in place of the derivatives of the
         # speeds.
@@ -313,7 +312,7 @@ class StateEvaluator:
 
         Returns:
             The state (y,), in which muscles without equilibrium keep their states, and the reasons
-                by the paths of these muscles.
+            by the paths of these muscles.
 
         Raises:
             SimulationError: the rates of coordinates are not defined at this state.
@@ -554,8 +553,8 @@ class StateEvaluator:
 
         Returns:
             Generalized forces that are missing without actuators (k, n), generalized forces of each
-                actuator (k, a, n), and the forces (N) of muscles (k, a), which are 1 for other
-                actuators.
+            actuator (k, a, n), and the forces (N) of muscles (k, a), which are 1 for other
+            actuators.
         """
         code, size = self.program.code, len(self.order)
         code.make_ready(("push_each", "inverse"))

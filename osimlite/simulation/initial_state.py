@@ -88,7 +88,7 @@ def resolve_initial_values(
 
     Returns:
         Values (n,) and speeds (n,) of all coordinates, and two lists of indices: of the coordinates
-            whose values stay, and of those whose speeds stay.
+        whose values stay, and of those whose speeds stay.
 
     Raises:
         ModelError: there is no such coordinate.

@@ -189,8 +189,7 @@ class LinkMotion:
 
         Returns:
             Link records (t, n), None for a body that is fixed to ground, and the body's frame in
-            the link
-                (4, 4).
+            the link (4, 4).
         """
         link, frame = self.system.placements[body] if body != GROUND else (GROUND, np.eye(4))
         return None if link == GROUND else self.links[:, link], frame

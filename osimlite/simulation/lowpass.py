@@ -71,7 +71,7 @@ def filter_lowpass_by_sinc(
 
     Returns:
         Evenly spaced times (s,), s, and values (s, n). A record that is too short is returned
-            unchanged, as in OpenSim.
+        unchanged, as in OpenSim.
     """
     times, values, step = _resample_evenly(times, values)
     if len(times) < 2 * order:
@@ -94,7 +94,7 @@ def _resample_evenly(times: Array, values: Array) -> tuple[Array, Array, float]:
 
     Returns:
         Times (s,), s, values (s, n), and the step between the times, s. An even record is returned
-            unchanged.
+        unchanged.
     """
     step = float(np.diff(times).min())
     span = float(times[-1] - times[0])

@@ -150,7 +150,7 @@ def static_optimization(
 
     Returns:
         A column for each actuator. Times without a solution are NaN, and `describe_unsolved` says
-            what is missing there.
+        what is missing there.
 
     Raises:
         OsimliteError: the source is not a motion of the model, or forces or loads cannot be read.

@@ -98,8 +98,7 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
 
     Returns:
         Kind of the joint (`JOINT_KIND`), source (index of an operation or of a degree of freedom),
-        part
-            (a component, or the index of a number), and the degrees of freedom that move it.
+        part (a component, or the index of a number), and the degrees of freedom that move it.
     """
     function, coordinates = joint.function, list(joint.coordinates)
     freedoms = [packer.places.freedom(coordinate) for coordinate in coordinates]
@@ -175,8 +174,7 @@ def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[i
 
     Returns:
         Records with the link, the last degree of freedom on the path to it, and the offset of the
-        added
-            moment in the numbers. Bodies that cannot move have none.
+        added moment in the numbers. Bodies that cannot move have none.
     """
     result: list[int] = []
     for body, moment in excess:

@@ -131,7 +131,7 @@ class PathSystem(System):
 
         Returns:
             For each owner the index and the position (3,) in ground (m) of each node, from end to
-                end.
+            end.
         """
         self._evaluate_state(q, np.zeros(len(q)))
         result = {}
@@ -183,9 +183,8 @@ class PathSystem(System):
 
         Yields:
             Owner, surface, and the lengths (k,) of the path on the surface, m. NaN has the meaning
-            of
-                :meth:`Paths.lengths_on_surfaces`; 0 stands for a pose in which paths cannot be
-                computed.
+            of :meth:`Paths.lengths_on_surfaces`; 0 stands for a pose in which paths cannot be
+            computed.
         """
         passages = [*self._iterate_surfaces(routes)]
         offsets = sorted(

@@ -279,8 +279,7 @@ class Paths:
 
         Returns:
             Matrix (n, n), whose column i has the speeds that go with a speed of 1 of coordinate i.
-            Columns
-                of coordinates that cannot move are NaN.
+            Columns of coordinates that cannot move are NaN.
         """
         q = self.mechanism.values(q)
         constraints = self.mechanism.constraints
@@ -335,8 +334,7 @@ def _compute_coupled_speeds(
 
     Returns:
         Matrix (n, n) with the speeds in the columns of `indices`; the others have a single 1. NaN
-        where
-            the coordinate cannot move.
+        where the coordinate cannot move.
     """
     coupling = np.eye(len(state.q))
     if constraints and indices:

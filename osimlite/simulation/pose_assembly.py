@@ -66,7 +66,7 @@ def assemble_motion(
         np.zeros(int(ints[MODEL.WORK_SIZE])),
         np.zeros(2 * size),
         np.zeros(2 * size),
-        np.array(_list_integers(mechanism, order), dtype=np.int64),
+        np.array(_pack_integers(mechanism, order), dtype=np.int64),
         np.array(_list_numbers(mechanism, order)),
         np.zeros(assembly.assembly_work_size(equations, size)),
     )
@@ -81,8 +81,8 @@ def assemble_motion(
     return result
 
 
-def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
-    """Return the integers of the assembly, see :mod:`osimlite.mechanics.kernels.assembly`.
+def _pack_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
+    """Pack the structure of a mechanism for the kernel :mod:`osimlite.mechanics.kernels.assembly`.
 
     Args:
         mechanism: the mechanism.
@@ -90,8 +90,7 @@ def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
 
     Returns:
         Whether links must be evaluated, the number of couplers, four flags for each coordinate, and
-        the
-            dependent coordinate and equation of each coupler.
+        the dependent coordinate and equation of each coupler.
     """
     program = mechanism.program
     infos = [mechanism.coordinates[index] for index in order]

@@ -412,7 +412,7 @@ class Simulation:
 
         Returns:
             Times (s), the states at the start and at the end of each step, and the error that ended
-                the motion early, if any.
+            the motion early, if any.
 
         Raises:
             SimulationError: the motion cannot begin.

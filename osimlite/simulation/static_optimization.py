@@ -293,7 +293,7 @@ class StaticOptimization:
 
         Returns:
             Required generalized forces (t, m), contributions of each actuator at a control of 1 (t,
-                a, m), and forces of muscles (t, a), which are 1 for other actuators.
+            a, m), and forces of muscles (t, a), which are 1 for other actuators.
         """
         system, order = self._system, list(self._system.order)
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
@@ -377,7 +377,7 @@ class StaticOptimization:
 
         Returns:
             Required generalized forces (t, f), contributions of each actuator per 1 N (t, f, a),
-                and rows G of the constraint equations (t, c, f); multipliers λ push with -Gᵀ λ.
+            and rows G of the constraint equations (t, c, f); multipliers λ push with -Gᵀ λ.
         """
         order = list(self._system.order)
         directions = np.broadcast_to(
@@ -446,7 +446,7 @@ class StaticOptimization:
 
         Returns:
             Accelerations without actuators (n,), by a force of 1 of each actuator (n, a), and by a
-                generalized force of 1 of each coordinate (n, n).
+            generalized force of 1 of each coordinate (n, n).
         """
         system, order = self._system, list(self._system.order)
         udot, directions = self._project_accelerations(times, values, speeds, np.zeros_like(values))

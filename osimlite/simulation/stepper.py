@@ -135,8 +135,7 @@ class Stepper(ABC):
 
         Returns:
             One state (y,) for each time, up to the time that was reached if the motion ended early.
-            The
-                exception that ended it is in `ended`.
+            The exception that ended it is in `ended`.
         """
         rows: list[list[float]] = []
         try:

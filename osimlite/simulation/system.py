@@ -226,8 +226,7 @@ class System(StateEvaluator):
 
         Returns:
             Kinetic energy ½ Σ (m v² + ωᵀ I ω) and potential energy -Σ m gᵀ c of gravity, J, with
-            mass
-                centres c and inertias I about them.
+            mass centres c and inertias I about them.
         """
         w, inertia = self._links, self.inertia
         motion = locate_points(w, inertia[:, 1:4])

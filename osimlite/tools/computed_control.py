@@ -438,7 +438,9 @@ class ComputedControl:
     def _predict_auxiliary_states(
         self, t: float, target: float, z: Array, controls: Array, *, is_pose_fixed: bool = False
     ) -> Array:
-        """Integrate the auxiliary states over a window along predicted poses, by Merson's method.
+        """Integrate the auxiliary states over a window along predicted poses, by Kutta-Merson's method.
+
+        Only these states are integrated, since the task controller prescribes the accelerations.
 
         Args:
             t: start of the window, s.

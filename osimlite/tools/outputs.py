@@ -137,16 +137,20 @@ def _create_momentum_reader(about_origin: bool, components: slice) -> Reader:
 
 
 def _create_system_reader(name: str) -> Reader:
-    """Return a reader of a quantity of all bodies together."""
+    """Return a reader of a quantity of the system of all bodies, such as its momentum.
 
-    def read_total(motion: Motion, model: Model, path: str) -> Array:
+    Args:
+        name: key of `SYSTEM_OUTPUTS`.
+    """
+
+    def read_rows(motion: Motion, model: Model, path: str) -> Array:
         mechanism = motion.mechanism
         rows = []
         for q, u, udot in zip(motion.values, motion.speeds, motion.accelerations, strict=True):
             rows.append(np.atleast_1d(SYSTEM_OUTPUTS[name](mechanism, q, u, udot)))
         return np.array(rows)
 
-    return read_total
+    return read_rows
 
 
 def _compute_central_momentum(mechanism: Any, q: Array, u: Array) -> Array:

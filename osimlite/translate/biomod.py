@@ -137,7 +137,7 @@ def _format_segments(robot: Robot) -> Iterator[str]:
             # A segment moves along its own axes only: turn to the axis before, and back after.
             axis_frame = np.eye(4)
             # The helper segment has the axis of the joint as its z axis.
-            axis_frame[:3, :3] = _align(joint.axis)
+            axis_frame[:3, :3] = _make_rotation_to_axis(joint.axis)
             yield from _format_segment(
                 f"{link.name}_axis", parent, origin @ axis_frame, joint, "z", robot
             )
@@ -190,9 +190,9 @@ def _find_axis(joint: RobotJoint) -> str | None:
     return AXES.get(tuple((joint.axis + 0.0).tolist()))
 
 
-def _align(axis: Array) -> Array:
+def _make_rotation_to_axis(axis: Array) -> Array:
     """Return a rotation (3, 3) whose third column is an axis."""
-    # The axis that is farthest from parallel.
+    # The coordinate axis that is farthest from parallel: its cross product is well conditioned.
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)

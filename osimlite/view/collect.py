@@ -156,6 +156,7 @@ class _SceneCollector:
 
     # ------------------------------------------------------------------------------------- kinds of components
     def _add_component(self, component: Component, path: str) -> None:
+        """Add what represents a component in the scene; components without a visible part add nothing."""
         match component:
             # Axes of frames are shown as frames, by their own switch.
             case geometry.FrameGeometry():
@@ -163,9 +164,9 @@ class _SceneCollector:
             case geometry.Geometry():
                 self._add_geometry(component, path)
             case contact.ContactGeometry():
-                self._add_contact(component, path)
+                self._add_contact_geometry(component, path)
             case wrapping.WrapObject():
-                self._add_wrap(component, path)
+                self._add_wrap_object(component, path)
             case Marker():
                 body, point = self.mechanism.stations[path]
                 color = self.model.model_visual_preferences.model_display_hints.marker_color
@@ -186,6 +187,7 @@ class _SceneCollector:
                 self.axes.append(Axes(path, *self.mechanism.frames[path]))
 
     def _add_geometry(self, shape: geometry.Geometry, path: str) -> None:
+        """Add a mesh, analytical shape or line that is attached to a frame, in its own colour."""
         frame = frame_of(self.tree, shape)
         if frame is None or frame not in self.mechanism.frames:
             raise UnsupportedError("is in a frame that is not fixed to a body")
@@ -209,7 +211,8 @@ class _SceneCollector:
             visible,
         )
 
-    def _add_contact(self, surface: contact.ContactGeometry, path: str) -> None:
+    def _add_contact_geometry(self, surface: contact.ContactGeometry, path: str) -> None:
+        """Add a contact surface, translucent, and note half spaces, whose size depends on the rest of the scene."""
         body, frame_in_body = self._find_placement(surface, "socket_frame")
         transform = frame_in_body @ make_offset(surface.location, surface.orientation)
         appearance = surface.appearance
@@ -230,7 +233,8 @@ class _SceneCollector:
             visible,
         )
 
-    def _add_wrap(self, surface: wrapping.WrapObject, path: str) -> None:
+    def _add_wrap_object(self, surface: wrapping.WrapObject, path: str) -> None:
+        """Add the translucent surface of a wrap object."""
         # A wrap object stands in a set of its body.
         frame = self.tree.parent_of(surface)
         while frame is not None and not isinstance(frame, PhysicalFrame):
@@ -414,9 +418,24 @@ class _SceneCollector:
         opacity: float = 1.0,
         visible: bool = True,
     ) -> None:
+        """Add a surface to the scene in the frame of a body.
+
+        Args:
+            path: path of the component that it shows.
+            layer: layer that the viewer can switch off.
+            body: index of its body.
+            surface: surface in a frame of its own.
+            matrix: affine matrix (4, 4) from that frame to the body, m.
+            color: red, green and blue, 0 to 1.
+            opacity: 0 to 1; clipped.
+            visible: whether it is shown at first.
+
+        Raises:
+            ModelError: the matrix has a number that is not finite.
+        """
         # NaN in a matrix would spoil the picture and the page.
         if not np.isfinite(matrix).all():
-            raise ModelError("has a size or a place that is no number")
+            raise ModelError("has a size or position that is not a finite number")
         # Unit shapes are shared by all components that use them.
         if id(surface) not in self.places:
             self.places[id(surface)] = len(self.surfaces)

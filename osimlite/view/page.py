@@ -161,7 +161,7 @@ def page_data(
 def _describe_items(scene: Scene) -> dict[str, Any]:
     routes = count()
     return {
-        "surfaces": [_describe_surface(surface) for surface in scene.surfaces],
+        "surfaces": [_encode_surface(surface) for surface in scene.surfaces],
         "items": [
             {
                 **vars(drawn_item),
@@ -194,7 +194,8 @@ def _describe_items(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _describe_surface(surface: Surface) -> dict[str, str]:
+def _encode_surface(surface: Surface) -> dict[str, str]:
+    """Return points, normals and triangles of a surface as base64 texts for the page."""
     # Normals in one byte per component: their error is below half a degree.
     normals = np.rint(127.0 * np.clip(compute_normals(surface), -1.0, 1.0)).astype(np.int8)
     return {

@@ -85,7 +85,7 @@ def list_names(
     """
     setup = analysis.document if isinstance(analysis.document, Setup) else None
     if reference.rule == "file":
-        yield from _list_files(
+        yield from _suggest_files(
             os.path.dirname(analysis.file),
             reference.target.removesuffix(" file").partition(" or ")[0],
         )
@@ -183,8 +183,16 @@ def find_marker_labels(setup: Setup) -> tuple[str, list[str]] | None:
     return None
 
 
-def _list_files(folder: str, content: str) -> Iterator[Name]:
-    """Yield files in a folder and the folders directly in it that may have a content."""
+def _suggest_files(folder: str, content: str) -> Iterator[Name]:
+    """Yield the files that a property could name, in a folder and in the folders directly below it.
+
+    Args:
+        folder: folder to search.
+        content: what the file holds: a key of `_SUFFIXES`, or the class of the objects in it.
+
+    Yields:
+        Paths relative to the folder. Files without the class in their first bytes are unlikely.
+    """
     suffixes = _SUFFIXES.get(content, (".xml",))
     for searched_folder in (folder, *map(str, list_folders(Path(folder))[:50])):
         for path in _list_entries(searched_folder, suffixes):

@@ -60,15 +60,27 @@ def decode_frames(
 
 
 def _find_layout(frame: memoryview) -> Layout:
-    """Return where the fields of a frame are."""
+    """Return where the numbers of each field are in the bytes of a frame.
+
+    Raises:
+        DamagedMessageError: a field does not hold numbers of 64 bits, or occurs twice.
+    """
     layout: Layout = {}
     for field in split_message(frame):
         if not isinstance(field.value, memoryview) or field.wire_type not in (BYTES, FIXED64):
-            raise DamagedMessageError(f"field {field.number} of a frame has another type")
+            raise DamagedMessageError(
+                f"field {field.number} of a frame has wire type {field.wire_type}; expected "
+                f"numbers of 64 bits (wire type {FIXED64}) or a list of them ({BYTES})"
+            )
         if field.number in layout:
-            raise DamagedMessageError(f"field {field.number} occurs twice in a frame")
+            raise DamagedMessageError(
+                f"field {field.number} occurs twice in a frame; expected it once"
+            )
         if len(field.value) % NUMBER_BYTES:
-            raise DamagedMessageError(f"field {field.number} of a frame ends within a number")
+            raise DamagedMessageError(
+                f"field {field.number} of a frame has {len(field.value)} bytes, which is no "
+                f"multiple of {NUMBER_BYTES}"
+            )
         layout[field.number] = (field.offset, len(field.value))
     return layout
 

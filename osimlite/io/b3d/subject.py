@@ -45,6 +45,9 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 
+RETRY = "download or copy the file again"
+"""Next step after an error in the bytes of a file."""
+
 LENGTH_BYTES = 8
 """Size of the length of the header at the beginning of a file."""
 
@@ -207,7 +210,7 @@ class B3dTrial:
                     subject.check_sizes(block)
                 except DamagedMessageError as error:
                     raise DocumentError(
-                        f"the trial '{self.name}' is damaged in or after frame {first}: {error}",
+                        f"the trial '{self.name}' is damaged in or after frame {first}: {error}; {RETRY}",
                         file=str(subject.path),
                     ) from None
                 yield block
@@ -228,7 +231,7 @@ class B3dTrial:
         # A damaged file may have frames of different layouts.
         if any(block.keys() != blocks[0].keys() for block in blocks):
             raise DocumentError(
-                f"the trial '{self.name}' is damaged: its frames have different fields",
+                f"the trial '{self.name}' is damaged: its frames have different fields; {RETRY}",
                 file=str(self.subject.path),
             )
         return (
@@ -553,7 +556,9 @@ def read_b3d(path: str | Path) -> B3dSubject:
         _expect_version(data, file)
         header = decode_message(data, HEADER)
     except DamagedMessageError as error:
-        raise DocumentError(f"the header of the file is damaged: {error}", file=file) from None
+        raise DocumentError(
+            f"the header of the file is damaged: {error}; {RETRY}", file=file
+        ) from None
     sensor, processed = header["sensor_frame_size"], header["pass_frame_size"]
     # 2. The trials: their frames follow each other without gaps.
     trials: list[B3dTrial] = []
@@ -570,7 +575,7 @@ def read_b3d(path: str | Path) -> B3dSubject:
     # 3. Header and file must agree to the byte.
     if offset != size:
         raise DocumentError(
-            f"the file has {size} bytes, but its header describes {offset}; it was cut off or is damaged",
+            f"the file has {size} bytes, but its header describes {offset}; it was cut off or is damaged; {RETRY}",
             file=file,
         )
     subject.trials = tuple(trials)
@@ -604,7 +609,10 @@ def _expect_version(data: memoryview, file: str) -> None:
     elif version > VERSION:
         reason = f"the file has version {version} of the format; osimlite reads version 4"
     elif has_other_numbers and version == VERSION:
-        reason = "the header of the file is damaged: its fields are those of different versions"
+        reason = (
+            "the header of the file is damaged: its fields are those of different versions; "
+            f"{RETRY}"
+        )
     else:
         reason = (
             f"the file has version {version} of the format; osimlite reads version 4, which AddBiomechanics writes "
@@ -632,7 +640,7 @@ def _expect_plausible(header: Mapping[str, Any], file: str) -> None:
         elif len(trial["passes"]) > len(header["passes"]):
             problems.append(f"trial {index} has more processing passes than the file")
     if problems:
-        raise DocumentError(f"the header of the file is damaged: {problems[0]}", file=file)
+        raise DocumentError(f"the header of the file is damaged: {problems[0]}; {RETRY}", file=file)
 
 
 def _read_at(stream: BinaryIO, offset: int, size: int, path: Path) -> bytes:

@@ -74,7 +74,7 @@ def split_message(data: memoryview) -> Iterator[WireField]:
         elif wire_type == FIXED32:
             length = 4
         else:
-            raise DamagedMessageError(f"field {number} has the unknown type {wire_type}")
+            raise DamagedMessageError(f"field {number} has the unknown wire type {wire_type}")
         if length > size - position:
             raise DamagedMessageError(f"field {number} is longer than its message")
         yield WireField(number, wire_type, data[position : position + length], position)
@@ -188,7 +188,11 @@ def _decode_values(field: WireField, declared: Field) -> list[Any]:
             except UnicodeDecodeError:
                 raise DamagedMessageError(f"'{declared.name}' is not text in UTF-8") from None
         return [decode_message(value, kind)]
-    raise DamagedMessageError(f"'{declared.name}' (field {field.number}) has another type")
+    expected = kind if isinstance(kind, str) else "message"
+    raise DamagedMessageError(
+        f"'{declared.name}' (field {field.number}) has wire type {field.wire_type}, which holds no "
+        f"{expected}"
+    )
 
 
 def _convert_integer(value: int, kind: str | Schema) -> int | bool:

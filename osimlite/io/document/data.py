@@ -162,7 +162,7 @@ class _Writer:
         if isinstance(spec.kind, ObjectField):
             if isinstance(value, list):
                 return [self.convert_object(member, spec.accepts) for member in value]
-            return None if value is None else self._convert_object(spec, value)
+            return None if value is None else self._convert_property_object(spec, value)
         if isinstance(spec.kind, Reference):
             return self._convert_reference(item, spec.kind, value)
         return (
@@ -171,7 +171,15 @@ class _Writer:
             else _format_number(value)
         )
 
-    def _convert_object(self, spec: FieldSpec, value: Object) -> Any:
+    def _convert_property_object(self, spec: FieldSpec, value: Object) -> Any:
+        """Return the object of a property in its shortest form.
+
+        The reader adds what is left out: the name that the property gives to its object by default,
+        and the word "objects" around the members of a set.
+
+        Returns:
+            A list for a set with members only, else a mapping.
+        """
         data = self.convert_object(value, spec.accepts)
         default_name = (
             spec.tag if isinstance(spec.kind, ObjectField) and spec.kind.form == "single" else ""
@@ -179,10 +187,8 @@ class _Writer:
         if spec.factory is not None and not default_name:
             default = spec.factory()
             default_name = default.name if isinstance(default, Object) else ""
-        # A name that the property gives anyway is left out.
         if data.get("name") == default_name:
             del data["name"]
-        # A set is written as the list of its members.
         return data["objects"] if data.keys() == {"objects"} else data
 
     def _convert_reference(self, item: Object, reference: Reference, value: Any) -> Any:

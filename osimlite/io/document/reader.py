@@ -382,13 +382,12 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
-    # Namespaces: OpenSim's parser takes a colon for a part of the name.
     # lxml gets UTF-8 whatever the text declares, because the encoding was detected before.
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
+    # OpenSim knows no namespaces: its parser takes a colon for a part of the name.
     data = replace_colons(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark
-    # The parser would refuse the blanks; their lines are added to positions.
-    # before them.
+    # before them. lxml rejects them, so they are removed, and their number is added to positions.
     unmarked = data.removeprefix(BOM_UTF8)
     body = unmarked.lstrip()
     if body.startswith(BOM_UTF8):
@@ -396,9 +395,9 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     blank = data[: len(data) - len(body)].count(b"\n")
     plain = has_only_generated_comments(data)
     parser = etree.XMLParser(
+        encoding="utf-8",
         # No entities, network or DTD: a model file must not read other files, nor expand to
         # gigabytes.
-        encoding="utf-8",
         resolve_entities=False,
         no_network=True,
         load_dtd=False,

@@ -149,6 +149,7 @@ class Source:
         return list(self._iterate_children(number))
 
     def _iterate_children(self, number: int) -> Iterator[int]:
+        """Yield the indices of the child elements of element `number`, in document order."""
         if isinstance(self.spans, PlainSpans):
             yield from self.spans.inside(number)
             return

@@ -56,7 +56,7 @@ def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Su
         if fault.version is not None:
             return Survey(source, None, [fault])
         try:
-            return _add_document(
+            return _read_survey_document(
                 Survey(source, None, [fault]), parse_source(source), expected_class
             )
         except NotWellFormedError:
@@ -72,7 +72,7 @@ def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Su
             return _survey_damaged(source, damage, expected_class)
         # The root is probably a misspelt <OpenSimDocument>: read on as if it were not.
         root.tag = ROOT
-        return _add_document(result, root, expected_class)
+        return _read_survey_document(result, root, expected_class)
 
 
 def _survey_damaged(
@@ -93,10 +93,23 @@ def _survey_damaged(
         return result
     if root.tag != ROOT or not _has_same_elements(source, root, result.sure_until):
         return result
-    return _add_document(result, root, expected_class)
+    return _read_survey_document(result, root, expected_class)
 
 
-def _add_document(survey: Survey, root: etree._Element, expected_class: type[Object]) -> Survey:
+def _read_survey_document(
+    survey: Survey, root: etree._Element, expected_class: type[Object]
+) -> Survey:
+    """Read the document of a survey from its tree, or add the error that prevents it.
+
+    Args:
+        survey: survey of the text; changed.
+        root: root of the parsed, maybe repaired, text.
+        expected_class: class of the top object.
+
+    Returns:
+        The survey.
+    """
+    # A wrong version has its own error already; the current rules fit most documents.
     try:
         version = read_version(survey.source, root)
     except DocumentError:

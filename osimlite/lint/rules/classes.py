@@ -100,7 +100,7 @@ def _find_nearest_class(subject: Subject, note: Note, accepted_tags: Iterable[st
     cls = find_class(best)
     specs = get_field_specs(cls) if cls is not None else {}
     # Elements that the class does not have point to another class.
-    fitting = sum(tag in specs or _is_part(specs, tag) or is_old(cls, tag) for tag in children)
+    fitting = sum(tag in specs or _can_contain(specs, tag) or is_old(cls, tag) for tag in children)
     return best if 2 * fitting >= len(children) else None
 
 
@@ -128,8 +128,13 @@ def is_old(cls: type[Object] | None, tag: str) -> bool:
     return cls is not None and successor(cls, tag) is not None
 
 
-def _is_part(specs: Mapping[str, FieldSpec], tag: str) -> bool:
-    """Return whether an object of a class may be a part of an object with these properties."""
+def _can_contain(specs: Mapping[str, FieldSpec], tag: str) -> bool:
+    """Return whether an object with these properties may contain an object of the class `tag`.
+
+    Args:
+        specs: properties of the outer object.
+        tag: class of the inner object, as the file writes it.
+    """
     part = find_class(tag)
     if part is None:
         return False

@@ -190,7 +190,7 @@ def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
             _report_obstacle(subject, report, obstacle, obstacle.message)
     for obstacle in _select_unreported(subject, report, Stage.RATE):
         _report_obstacle(subject, report, obstacle, obstacle.message, severity=WARNING)
-    for function in _find_infinite_formulas(subject):
+    for function in _find_undefined_formulas(subject):
         report(
             f"expression of {subject.describe_part(function)} is '{function.expression}', which is "
             "no finite number at 0 s, so every acceleration is NaN or infinite",
@@ -199,8 +199,8 @@ def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-def _find_infinite_formulas(subject: Subject) -> Iterator[ExpressionBasedFunction]:
-    """Yield the formulas of time, of prescribed forces and controls, that have no value at 0 s.
+def _find_undefined_formulas(subject: Subject) -> Iterator[ExpressionBasedFunction]:
+    """Yield the formulas of time, of prescribed forces and controls, that are infinite or undefined at 0 s.
 
     Simulations do not compute them, so that evaluating the accelerations does not find them.
     """

@@ -210,13 +210,13 @@ def report_missing_name(subject: Subject, report: FindingCollector) -> None:
             continue
         if isinstance(component, (Model, ModelComponentSet)):
             continue
-        frame = isinstance(component, PhysicalOffsetFrame) and isinstance(
+        is_joint_frame = isinstance(component, PhysicalOffsetFrame) and isinstance(
             tree.parent_of(component), Joint
         )
-        if not frame and not _should_have_name(subject, component):
+        if not is_joint_frame and not _is_named_by_users(subject, component):
             continue
         missing_names = _list_missing_names(subject, component)
-        if not missing_names and (frame or component.name):
+        if not missing_names and (is_joint_frame or component.name):
             continue
         last_name = _get_last_part(tree.path_of(component) or "")
         message = f"this {type(component).tag} has no name; OpenSim names it '{last_name}'"
@@ -241,7 +241,14 @@ def report_missing_name(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-def _should_have_name(subject: Subject, component: Component) -> bool:
+def _is_named_by_users(subject: Subject, component: Component) -> bool:
+    """Return whether users choose the name of a component, so that its absence is an omission.
+
+    They name coordinates of joints, members of sets, and members of lists such as the additional
+    frames of a component. Components that stand for one property, such as the path of a muscle,
+    have the name of the property.
+    """
+    # The reader made this component; the file has no element that could have a name.
     if subject.source is not None and component._index is None:
         return False
     parent = subject.tree.parent_of(component)

@@ -221,8 +221,7 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
                 tag=naming.spec.tag,
                 severity=INFO,
             )
-    # A tool makes its own folder before it writes.
-    # Folders that a tool makes exist when it writes.
+    # A tool creates its results_directory before it writes other files, which may be in it.
     created_folders = {
         os.path.normpath(naming.name) for naming in setup.find_named_files("output-folder")
     }

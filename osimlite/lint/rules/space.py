@@ -65,19 +65,24 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
             followed.add(id(current))
             visited[id(current)] = current
             current = subject.target_of(current, "socket_parent")
-        # The chain ends on itself: the frames since the first visit of the current one form the circle.
-        circle = (
+        # The chain ends on itself: the frames since the first visit of the current one form the cycle.
+        cycle = (
             list(visited.values())[list(visited).index(id(current)) :]
             if id(current) in visited
             else []
         )
-        consequence = _describe_circle(subject, circle) if circle else ""
-        for link in circle:
-            report(f"{describe_object(link)} is fixed to {consequence}", link, tag="socket_parent")
-    laid = list(subject.find_instances(StationDefinedFrame))
-    circles = _find_circles(subject, laid)
-    for frame in laid:
-        if id(frame) in circles:
+        end = _describe_frame_cycle(subject, cycle) if cycle else ""
+        for link in cycle:
+            report(
+                f"{describe_object(link)} is fixed to {end}; give its socket_parent the path "
+                "of a body",
+                link,
+                tag="socket_parent",
+            )
+    station_defined_frames = list(subject.find_instances(StationDefinedFrame))
+    ids_in_cycles = _find_frames_in_cycles(subject, station_defined_frames)
+    for frame in station_defined_frames:
+        if id(frame) in ids_in_cycles:
             report(
                 f"{describe_object(frame)} is defined through a point that is fixed to it: "
                 "OpenSim hangs",
@@ -97,17 +102,17 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
             find_base(subject, subject.target_of(station, "socket_parent_frame"))
             for station in stations
         ]
-        stray = next(
+        stray_index = next(
             (n for n, base in enumerate(fixed_to) if base is not None and base is not fixed_to[0]),
             None,
         )
-        if fixed_to[0] is not None and stray is not None:
+        if fixed_to[0] is not None and stray_index is not None:
             report(
-                f"{describe_object(stations[stray])} of {describe_object(frame)} is fixed to "
-                f"{describe_object(fixed_to[stray] or frame)}, {describe_object(stations[0])} to "
+                f"{describe_object(stations[stray_index])} of {describe_object(frame)} is fixed to "
+                f"{describe_object(fixed_to[stray_index] or frame)}, {describe_object(stations[0])} to "
                 f"{describe_object(fixed_to[0])}: OpenSim rejects the model",
                 frame,
-                tag=POINTS[stray],
+                tag=POINTS[stray_index],
             )
             continue
         points_in_frame = [
@@ -129,13 +134,17 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
                 break
 
 
-def _describe_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) -> str:
-    """Return what frames in a circle are fixed to, and what OpenSim 4.6 does (measured)."""
-    if len(circle) == 1:
+def _describe_frame_cycle(subject: Subject, cycle: Sequence[PhysicalOffsetFrame]) -> str:
+    """Return the end of a sentence: what the frames of a cycle are fixed to, and what OpenSim 4.6 does.
+
+    Measured: OpenSim hangs if a joint leads into a cycle of several frames. It rejects a frame that
+    is its own parent, and cycles to which no joint leads.
+    """
+    if len(cycle) == 1:
         return "itself: OpenSim rejects the model"
-    names = join_words([f"'{frame.name}'" for frame in circle])
+    names = join_words([f"'{frame.name}'" for frame in cycle])
     through = f"itself, through {names}"
-    members = {id(frame) for frame in circle}
+    members = {id(frame) for frame in cycle}
     for joint in subject.find_instances(Joint):
         for tag in ("socket_parent_frame", "socket_child_frame"):
             frame = subject.target_of(joint, tag)
@@ -305,7 +314,7 @@ def report_no_direction(subject: Subject, report: FindingCollector) -> None:
                 )
 
 
-def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
+def _find_frames_in_cycles(subject: Subject, frames: Sequence[Component]) -> set[int]:
     """Return the identities of frames and stations that depend on themselves.
 
     R. Tarjan's strongly connected components (1972), each looked at once.
@@ -332,7 +341,7 @@ def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
             entering = next(
                 (item for item in below if id(item) not in number or id(item) in open_ids), None
             )
-            # 3. One on the path closes a circle; a component that depends on itself is a circle of
+            # 3. One on the path closes a cycle; a component that depends on itself is a cycle of
             # one.
             if entering is not None and id(entering) in open_ids:
                 lowest[id(owner)] = min(lowest[id(owner)], number[id(entering)])
@@ -348,10 +357,10 @@ def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
                 # of the graph.
                 if lowest[id(owner)] == number[id(owner)]:
                     size = next(k for k in range(1, len(path) + 1) if path[-k] is owner)
-                    circle = {id(item) for item in path[-size:]}
+                    cycle = {id(item) for item in path[-size:]}
                     del path[-size:]
-                    open_ids -= circle
-                    result |= circle if size > 1 else set()
+                    open_ids -= cycle
+                    result |= cycle if size > 1 else set()
     return result
 
 

@@ -149,7 +149,12 @@ def linearise_state(
     work: Floats,
     is_evaluated: float,
 ) -> int:
-    """Fill the workspace with masses, generalized forces per newton, and derivatives at a state.
+    """Linearise the equations of motion at a state: mass matrix M, stiffness K and damping D.
+
+    M d(udot) = -K dq - D du for forces that depend on positions and speeds. Each contact or spring
+    contributes one row: its generalized force r per newton, and the derivatives k and d of the
+    force by its displacement and speed, so that K and D grow by the rank-one matrices k r rᵀ and
+    d r rᵀ.
 
     Args:
         model: integers of the model.
@@ -168,9 +173,9 @@ def linearise_state(
     if is_evaluated == 0.0:
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION)
     if status != OUTCOME.OK:
-        # Constraint rows are needed by `fill_mass_matrix`.
         return status
     if model[MODEL.CONSTRAINED] > 0:
+        # Constraint rows are needed by `fill_mass_matrix`.
         evaluate_constraints(model, reals, data, y, f)
     # The mass matrix is composed again, because solving for accelerations has overwritten it.
     spatial_inertias_and_bias(model, reals, data)

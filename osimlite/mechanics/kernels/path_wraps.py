@@ -180,7 +180,10 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
 def wrap_surface(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int
 ) -> int:
-    """Bend the path around one surface.
+    """Wrap one segment of a path over one surface: the one that adds the least length.
+
+    Every segment in the range of the PathWrap is tried. The two tangent points of the best one are
+    inserted into the path. This is OpenSim's order of decisions (`GeometryPath::applyWrapObjects`).
 
     Args:
         model: integers of the model.
@@ -188,12 +191,14 @@ def wrap_surface(
         data: results with the record of the path; changed.
         y: state.
         f: rates of the coordinates.
-        item: offset of the item in the model.
-        number: number of the wrap.
+        item: offset of the path in the model.
+        number: index of the PathWrap in the path.
 
     Returns:
-        Result of the last segment that was tried, NOWHERE or BEYOND of `WRAPPING`.
+        Result of the last segment that was tried; NOWHERE if no point is in the range, BEYOND if
+        the range ends after the last point (`WRAPPING`).
     """
+    # The tangent points of an earlier iteration would split the segments.
     remove_tangents(model, data, item, number)
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, count = i[PATH.POINTS], int(result[PATH_WORK.COUNT])
@@ -223,7 +228,7 @@ def wrap_surface(
             begin, end = k if begin < 0 else begin, k
     if begin < 0:
         return WRAPPING.NOWHERE
-    code, best, least = WRAPPING.NONE, -1, inf
+    code, best_segment, least_increase = WRAPPING.NONE, -1, inf
     first_tangent, second_tangent = (
         at(work, NODE_WORK.SIZE * tangent),
         at(work, NODE_WORK.SIZE * (tangent + 1)),
@@ -254,23 +259,27 @@ def wrap_surface(
         code = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
         if code < WRAPPING.WRAPPED:
             continue
-        r1 = point_in_ground(at(e, SURFACE_WORK.POSE), vector(e, WRAP_WORK.FIRST_TANGENT))
-        r2 = point_in_ground(at(e, SURFACE_WORK.POSE), vector(e, WRAP_WORK.SECOND_TANGENT))
+        first_tangent_point = point_in_ground(
+            at(e, SURFACE_WORK.POSE), vector(e, WRAP_WORK.FIRST_TANGENT)
+        )
+        second_tangent_point = point_in_ground(
+            at(e, SURFACE_WORK.POSE), vector(e, WRAP_WORK.SECOND_TANGENT)
+        )
         # A segment that must wrap wins over all others; of those that may, the one that adds least
         # length.
-        increase = -inf
+        length_increase = -inf
         if code == WRAPPING.WRAPPED:
             p1, p2 = line_end(m, a), line_end(n, b)
-            increase = (
-                norm(minus(p1, r1))
+            length_increase = (
+                norm(minus(p1, first_tangent_point))
                 + e[WRAP_WORK.SURFACE_LENGTH]
-                + norm(minus(p2, r2))
+                + norm(minus(p2, second_tangent_point))
                 - norm(minus(p1, p2))
             )
-        if increase < least:
-            best, least = k, increase
-            store_vector(first_tangent, NODE_WORK.PLACE, r1)
-            store_vector(second_tangent, NODE_WORK.PLACE, r2)
+        if length_increase < least_increase:
+            best_segment, least_increase = k, length_increase
+            store_vector(first_tangent, NODE_WORK.PLACE, first_tangent_point)
+            store_vector(second_tangent, NODE_WORK.PLACE, second_tangent_point)
             first_tangent[NODE_WORK.SURFACE], second_tangent[NODE_WORK.SURFACE] = (
                 0.0,
                 e[WRAP_WORK.SURFACE_LENGTH],
@@ -281,10 +290,10 @@ def wrap_surface(
         if code == WRAPPING.MANDATORY:
             break
     # The tangent points are NaN where OpenSim finds none.
-    if best >= 0 and first_tangent[NODE_WORK.PLACE] == first_tangent[NODE_WORK.PLACE]:
-        for k in range(count - 1, best, -1):
+    if best_segment >= 0 and first_tangent[NODE_WORK.PLACE] == first_tangent[NODE_WORK.PLACE]:
+        for k in range(count - 1, best_segment, -1):
             order[k + 2] = order[k]
-        order[best + 1], order[best + 2] = tangent, tangent + 1
+        order[best_segment + 1], order[best_segment + 2] = tangent, tangent + 1
         result[PATH_WORK.COUNT] = count + 2
     return code
 

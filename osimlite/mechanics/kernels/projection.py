@@ -95,7 +95,11 @@ def project_values(
     tolerance: float,
     limit: float,
 ) -> int:
-    """Project the coordinates of a state whose equations are known, and update the equations.
+    """Project the coordinates of a state onto the position constraints by Gauss-Newton steps.
+
+    Each step solves J dq = g(q) with least |dq|, and subtracts dq (as `projectQ` of Simbody does).
+    The constraint equations must have been evaluated at the state; they are evaluated again at the
+    projected one.
 
     Args:
         model: integers of the model.
@@ -117,7 +121,7 @@ def project_values(
         at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
-    work, step, following = (
+    work, step, trial_state = (
         at(errors, count),
         at(errors, 2 * count),
         at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
@@ -137,9 +141,9 @@ def project_values(
         solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
             # Speeds are copied, since the evaluation of velocities needs a complete state.
-            following[k], following[size + k] = y[k] - step[k], y[size + k]
+            trial_state[k], trial_state[size + k] = y[k] - step[k], y[size + k]
         previous_norm, norm = norm, inf
-        if evaluate_equations(model, reals, data, following) == OUTCOME.OK:
+        if evaluate_equations(model, reals, data, trial_state) == OUTCOME.OK:
             norm = collect_position_errors(model, data, errors)
         # As in Simbody, the first step is accepted even if it increases the errors; a later one
         # that does ends the search.
@@ -147,11 +151,12 @@ def project_values(
             norm = previous_norm
             break
         for k in range(size):
-            y[k] = following[k]
+            y[k] = trial_state[k]
         if norm <= max(OVERSHOOT * tolerance, FINEST):
             break
     if not norm <= tolerance:
         return OUTCOME.FAR
+    # The integrator must not shrink its steps for errors that the projection has removed.
     if has_errors > 0:
         normal_component(model, count, jacobian, factor, state_errors, errors, work, step)
         for k in range(size):

@@ -49,8 +49,11 @@ class Guess(NamedTuple):
     strain: float  # of the tendon, not negative
 
 
-def cos_upright(length: float, height: float) -> float:
-    """Return the cosine of the pennation angle of fibers of a length (m) and a height (m).
+def cos_pennation_of_fibers(length: float, height: float) -> float:
+    """Return the cosine of the pennation angle of fibers with a constant height h: sqrt(l² - h²) / l.
+
+    Fibers shorter than their height stand upright; their cosine is `UPRIGHT`, not 0, since laws
+    divide by it.
 
     Args:
         length: fiber length (m).
@@ -94,7 +97,9 @@ def rigid_cos(path_length: float, m: OldMuscle) -> float:
         m: muscle.
     """
     length_along = path_length / m.optimal - m.slack
-    return cos_upright(sqrt(length_along * length_along + m.height * m.height), m.height)
+    return cos_pennation_of_fibers(
+        sqrt(length_along * length_along + m.height * m.height), m.height
+    )
 
 
 def generic_velocity_factor(rate: float, m: OldMuscle) -> float:
@@ -287,7 +292,7 @@ def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
         Guess. Where the tendon would be shorter than slack, the fibers span what remains of the
         path.
     """
-    cos = cos_upright(length, m.height)
+    cos = cos_pennation_of_fibers(length, m.height)
     tendon = path_length - length * cos
     if not tendon >= m.slack:
         length_along, tendon = path_length - m.slack, m.slack

@@ -49,7 +49,14 @@ class ConstraintReader:
             self.placements.resolve_frame(self.placements.follow_socket(owner, socket))[0]
         ]
 
-    def _find_station(self, owner: Component, socket: str, location: str) -> StationPlacement:
+    def _read_station(self, owner: Component, socket: str, location: str) -> StationPlacement:
+        """Return the point of a constraint on a body.
+
+        Args:
+            owner: the constraint.
+            socket: its socket to the body.
+            location: its property with the location, m.
+        """
         # OpenSim applies the location to the body itself, even where the socket refers to an offset
         # frame.
         return StationPlacement(
@@ -123,8 +130,8 @@ class ConstraintReader:
             path: its path.
         """
         return b.PointEquations(
-            self._find_station(item, "socket_body_1", "location_body_1"),
-            self._find_station(item, "socket_body_2", "location_body_2"),
+            self._read_station(item, "socket_body_1", "location_body_1"),
+            self._read_station(item, "socket_body_2", "location_body_2"),
             path,
         )
 
@@ -142,8 +149,8 @@ class ConstraintReader:
                 f"'{path}' has a distance of {item.constant_distance:g}; give a positive length in m"
             )
         return b.DistanceConstraint(
-            self._find_station(item, "socket_body_1", "location_body_1"),
-            self._find_station(item, "socket_body_2", "location_body_2"),
+            self._read_station(item, "socket_body_1", "location_body_1"),
+            self._read_station(item, "socket_body_2", "location_body_2"),
             item.constant_distance,
             path,
         )
@@ -158,9 +165,9 @@ class ConstraintReader:
             path: its path.
         """
         return b.PointOnLineEquations(
-            self._find_station(item, "socket_line_body", "point_on_line"),
+            self._read_station(item, "socket_line_body", "point_on_line"),
             _parse_direction(item.line_direction_vec, f"the line of '{path}'"),
-            self._find_station(item, "socket_follower_body", "point_on_follower"),
+            self._read_station(item, "socket_follower_body", "point_on_follower"),
             path,
         )
 

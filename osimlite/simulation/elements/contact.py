@@ -119,8 +119,7 @@ class PairContact:
 
         Returns:
             A record for each pair. With Simbody's early return, the forces depend on one another,
-            and one
-                more record computes all pairs in order; else there are records for derivatives.
+            and one more record computes all pairs in order; else there are records for derivatives.
         """
         result = []
         for pair in self.pairs:
@@ -255,8 +254,7 @@ class PairContact:
 
         Returns:
             For each surface the force (N) on its body and the torque (N m) about the body's origin,
-            in
-                ground. Surfaces on one body have the same load.
+            in ground. Surfaces on one body have the same load.
         """
         loads: dict[int, list[float]] = {}
         for pair, record in zip(self.pairs, records, strict=False):

@@ -61,8 +61,7 @@ class Controls:
 
         Returns:
             Integers and numbers of the record, and the name of the kernel, or a Python function if
-            one of
-                the functions of time has no table.
+            one of the functions of time has no table.
         """
         ends: list[int] = []
         tables: list[int] = []

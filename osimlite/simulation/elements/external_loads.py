@@ -189,6 +189,17 @@ _read_cached_table = cache_by_file(4)(read_sto)
 def _read_load(
     mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None
 ) -> Load:
+    """Return the load of one ExternalForce: its frames, and its numbers as functions of time.
+
+    Args:
+        mechanism: mechanism with the frames.
+        force: the force.
+        columns: columns of the data file.
+        file: file of the loads, for errors.
+
+    Raises:
+        DocumentError: the force has no identifiers, or a frame or column is missing.
+    """
     functions = {
         what: columns.find_functions(identifier, f"the {what}_identifier of '{force.name}'", file)
         for what, identifier in _list_identifiers(force).items()

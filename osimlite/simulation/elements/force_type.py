@@ -423,15 +423,25 @@ class DeclaredForce:
         )
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Return the potential energy, J."""
+        """Return the potential energy of the force, 0 for types without an energy.
+
+        The energy comes from `ForceType.compute_energy`, or else from the output "energy" of the law.
+        Types with neither store none, as in OpenSim, whose `Force.computePotentialEnergy` returns 0
+        unless a class overrides it.
+
+        Args:
+            records: output records of the force after an evaluation. The last one is that of the
+                law; records before it belong to the geometry and hold no energy.
+
+        Returns:
+            Energy, J.
+        """
         force_type = self.force_type
+        law_record = records[-1]
         if force_type.compute_energy is not None:
-            return float(force_type.compute_energy(self, records[-1]))
-        return (
-            float(records[-1][force_type.record_offsets[ENERGY]])
-            if ENERGY in force_type.record_offsets
-            else 0.0
-        )
+            return float(force_type.compute_energy(self, law_record))
+        energy_offset = force_type.record_offsets.get(ENERGY)
+        return 0.0 if energy_offset is None else float(law_record[energy_offset])
 
 
 @dataclass(frozen=True)

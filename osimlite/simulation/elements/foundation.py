@@ -318,6 +318,13 @@ class _Meshes:
 
     @staticmethod
     def _find_pose(model: Ints, data: Floats, placement: Placement) -> Pose:
+        """Return the pose in ground of a frame that is fixed to a link, after an evaluation.
+
+        Args:
+            model: integers of the model.
+            data: results of the evaluation.
+            placement: index of the link, negative for ground, and the frame in it.
+        """
         link, frame = placement
         if link < 0:
             return Pose(frame[:3, :3], frame[:3, 3])

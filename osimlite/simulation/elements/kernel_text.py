@@ -169,7 +169,7 @@ class KernelText:
             *(force_type.geometry.recorded_setup_code or force_type.geometry.setup_code),
         )
         carried = {function.__name__: function for function in (carrying, carrying_room, slope_of)}
-        return self._compile(RESPONSE, "item", lines, law=law, **carried)
+        return self._compile_kernel(RESPONSE, "item", lines, law=law, **carried)
 
     @cached_property
     def batched_kernel(self) -> Callable[..., int]:
@@ -249,7 +249,7 @@ class KernelText:
         end = [f"{', '.join(force_type.outputs)} = end({quantities})"]
         end += self._write_results(name for name in recorded if name not in inputs)
         lines += self._write_loop([*ended, *end, *force_type.geometry.apply_code])
-        return self._compile(
+        return self._compile_kernel(
             BATCHED,
             "run",
             [
@@ -323,7 +323,7 @@ class KernelText:
     def _write_function(
         self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]
     ) -> Callable[..., int]:
-        return self._compile(
+        return self._compile_kernel(
             form,
             "item",
             [*self._pointer_lines, *self.force_type.geometry.setup_code, *lines],
@@ -339,9 +339,20 @@ class KernelText:
             f"g, gp, work = at(i, {ITEM.OWN + self.int_count}), at(p, {self.size}), at(record, {recorded})",
         ]
 
-    def _compile(
+    def _compile_kernel(
         self, form: str, place: str, lines: Sequence[str], **scope_of_form: Any
     ) -> Callable[..., int]:
+        """Compile the text of one kernel in the module of the force's class.
+
+        Args:
+            form: end of the kernel's name, such as `RESPONSE`.
+            place: name of its last parameter, the offset of the item in the model.
+            lines: statements of its body, without the final return.
+            **scope_of_form: objects that the statements use, by name.
+
+        Returns:
+            The kernel, a function of `PARAMETERS` that returns an `OUTCOME`.
+        """
         force_type = self.force_type
         name = self.force_type.name + form
         source = "\n    ".join(

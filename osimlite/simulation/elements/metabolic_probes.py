@@ -254,8 +254,7 @@ def _measure_smoothed(
 
     Returns:
         The sums of the rates of all muscles (the first with the basal rate), then each muscle's
-        total
-            rate, W.
+        total rate, W.
     """
     rates = []
     for places, numbers in zip(probe.places, probe.numbers, strict=True):

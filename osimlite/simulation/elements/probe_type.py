@@ -289,8 +289,7 @@ def _locate_inputs(
 
     Returns:
         For each input the path of the element with the record and the offset there, and the
-        subject's
-            numbers.
+        subject's numbers.
 
     Raises:
         UnsupportedError: the actuator is not computed, or does not record an input.

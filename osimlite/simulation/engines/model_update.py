@@ -51,18 +51,24 @@ class NumberUpdater:
         self._forces: Forces = engine.forces
         self._components = model.tree().by_path
         self._builder = ElementBuilder(model, engine.mechanism, folder, wrapping=wrapping)
-        freedoms = {place: number for number, place in enumerate(engine.order)}
-        self._places = Places(engine.mechanism, freedoms, engine.placements)
+        dof_indices = {offset: number for number, offset in enumerate(engine.order)}
+        self._places = Places(engine.mechanism, dof_indices, engine.placements)
         self._items = {
             element.path: element.make_records(self._places) for element in engine.forces.elements
         }
-        # The numbers of the items precede those of the controls, which are last, in the same order.
+        # Elements change at fixed offsets. Their numbers precede those of the controls, which are
+        # last, in the same order as here.
         controls = engine.structure[MODEL.CONTROLS]
-        end = engine.structure[controls + ITEM.NUMBERS] if controls > 0 else len(engine.numbers)
-        self._first, place = {}, end - sum(_count_numbers(items) for items in self._items.values())
+        numbers_end = (
+            engine.structure[controls + ITEM.NUMBERS] if controls > 0 else len(engine.numbers)
+        )
+        self._first, offset = (
+            {},
+            numbers_end - sum(_count_numbers(items) for items in self._items.values()),
+        )
         for path, items in self._items.items():
-            self._first[path] = place
-            place += _count_numbers(items)
+            self._first[path] = offset
+            offset += _count_numbers(items)
 
     def update(self, owners: Sequence[Component]) -> UpdatedModel | None:
         """Return the model with the present properties of its forces and bodies.

@@ -76,21 +76,32 @@ def find_line(function: f.SmoothFunction) -> StraightLine | None:
         case f.ScaledFunction(scale, inner):
             line = find_line(inner)
             return None if line is None else StraightLine(scale, 0.0).compose(line)
-        case f.PiecewiseLinear((_, _)) | f.SimmCubicSpline() if _is_straight(function):
-            start, slopes, _ = function.evaluate(np.zeros(1))
-            return StraightLine(float(slopes[0]), start)
+        case f.PiecewiseLinear((_, _)):
+            return _evaluate_line(function)
+        case f.SimmCubicSpline() if _is_straight_spline(function):
+            return _evaluate_line(function)
     return None
 
 
-def _is_straight(function: f.SmoothFunction) -> bool:
-    if not isinstance(function, f.SimmCubicSpline):
-        return True
-    # Where points lie on each other, the curve may jump.
-    if any(right - left <= 1e-7 for left, right in pairwise(function.x)):
+def _evaluate_line(function: f.SmoothFunction) -> StraightLine:
+    """Return the line through value and slope at 0 of a function that is straight everywhere."""
+    start, slopes, _ = function.evaluate(np.zeros(1))
+    return StraightLine(float(slopes[0]), start)
+
+
+def _is_straight_spline(spline: f.SimmCubicSpline) -> bool:
+    """Return whether a spline is one straight line: equal slopes at all knots, and no curvature between.
+
+    The comparison is exact, because the line replaces the spline in other programs' files, which
+    must not change the motion silently.
+    """
+    # Intervals narrower than 1e-7 count as 1e-7 wide, as in OpenSim: the value may jump there.
+    if any(right - left <= 1e-7 for left, right in pairwise(spline.x)):
         return False
-    # The last piece is the point at the end, whose bend has no effect.
-    return len({slope for _, slope, _, _ in function.pieces}) == 1 and not any(
-        bend for piece in function.pieces[:-1] for bend in piece[2:]
+    # A piece has value, slope, and coefficients of the second and third power. The last piece is
+    # only the final knot: the spline continues there with its slope, whatever its coefficients.
+    return len({slope for _, slope, _, _ in spline.pieces}) == 1 and not any(
+        coefficient for piece in spline.pieces[:-1] for coefficient in piece[2:]
     )
 
 

@@ -115,8 +115,7 @@ class MeshFiles:
 
         Returns:
             Name relative to the robot's own file. It differs from all others even where capitals do
-            not
-                count.
+            not count.
         """
         if key not in self._made:
             # Names that differ by case only are one file on Windows and macOS.

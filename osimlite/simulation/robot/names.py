@@ -29,8 +29,7 @@ def legal(name: str) -> str:
 
     Returns:
         The name with ``_`` for every illegal character, beginning with a letter or ``_``, and not
-        too
-            long.
+        too long.
     """
     # A name begins with a letter or an underscore.
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:LONGEST] or "_"

@@ -297,7 +297,7 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
 
     Returns:
         Moments (3,), and axes (3, 3) as columns of a rotation matrix, with axes @ diag(moments) @
-            axes.T = inertia.
+        axes.T = inertia.
     """
     # Diagonal inertias keep their exact numbers and their order.
     if not np.any(inertia - np.diag(np.diag(inertia))):

@@ -40,7 +40,7 @@ from osimlite.studies.gait.starts import move_along_neutral_directions, plant_fe
 from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, StepMap
 from osimlite.studies.gait.steps import WalkerSteps, walk_many
 from osimlite.studies.sweep.plan import Plan
-from osimlite.studies.sweep.variables import Floats, Start, refuse_counts
+from osimlite.studies.sweep.variables import Floats, Start, reject_grid_ranges
 from osimlite.studies.sweep.variants import Variant, Variants
 
 ROUGH_ACCURACY = 1e-7
@@ -177,7 +177,7 @@ class CycleSearch:
         self.stable = stable
         self.perturb = perturb
         self.threads = threads
-        refuse_counts(plan.variables)
+        reject_grid_ranges(plan.variables)
         self.variants = Variants(plan)
         free_variables = [
             (index, variable)

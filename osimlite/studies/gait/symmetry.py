@@ -79,7 +79,7 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
             dof_count + second_dof,
             dof_count + first_dof,
         )
-    exchange_auxiliary(engine, source, np.asarray(states, dtype=float))
+    match_auxiliary_states(engine, source, np.asarray(states, dtype=float))
     for state in np.asarray(states, dtype=float):
         derivative, exchanged_derivative = (
             np.array(engine.compute_derivative(0.0, y.tolist())) for y in (state, state[source])
@@ -94,8 +94,11 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
     return source
 
 
-def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> None:
-    """Complete the permutation for auxiliary states, such as activations of muscles.
+def match_auxiliary_states(engine: BatchEngine, source: Ints, states: Floats) -> None:
+    """Complete the left-right permutation of a state for auxiliary states, such as muscle activations.
+
+    Two states match if each has after the exchange the effect on all rates that the other one had
+    before. Effects are compared, not names, because models name their sides in many ways.
 
     Args:
         engine: engine of the model.

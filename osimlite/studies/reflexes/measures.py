@@ -310,9 +310,10 @@ class JumpMeasure(Measure):
         self._first = self.criteria.add(CRITERION_TYPE.JUMP, 0, self, *numbers)
 
     def compute_result(self, times: Array, duration: float) -> Array:
-        """Return the peak height minus the rise during preparation (w,) (cm).
+        """Return the peak height minus the rise during preparation (w,) (cm), negative if `negates`.
 
-        Of a jumper that never leaves the preparation, it extrapolates the mean rise to one second.
+        For a jumper that never leaves the preparation, the mean rise is extrapolated to one second,
+        so that an optimizer sees which of two failures is nearer to a jump.
 
         Args:
             times: times at which the jumps ended (w,) (s).

@@ -39,7 +39,7 @@ from osimlite.studies.sweep.results import (
 from osimlite.studies.sweep.run import describe_interruption
 from osimlite.studies.sweep.runner import FAILED, Block
 from osimlite.studies.sweep.search import OutOfBudget, Search, find_method, run_lbfgs
-from osimlite.studies.sweep.variables import Floats, refuse_counts
+from osimlite.studies.sweep.variables import Floats, reject_grid_ranges
 from osimlite.studies.sweep.variants import Variants
 
 HISTORY_FILE = "history.parquet"
@@ -159,7 +159,7 @@ def optimize(
             has results of other settings.
     """
     minimize = find_method(method)
-    refuse_counts(plan.variables)
+    reject_grid_ranges(plan.variables)
     free_indices = [index for index, variable in enumerate(plan.variables) if not variable.is_fixed]
     if not free_indices:
         raise SettingError("there is nothing to search: every variable has one value only")

@@ -280,8 +280,8 @@ def resolve_variables(
     return tuple(result)
 
 
-def refuse_counts(variables: Sequence[Variable]) -> None:
-    """Refuse ranges with a number of values, which make no sense in a search.
+def reject_grid_ranges(variables: Sequence[Variable]) -> None:
+    """Reject ranges with a number of grid points, such as ``0:1:5``: a search takes any value of a range.
 
     Raises:
         SettingError: a variable has a number of values.

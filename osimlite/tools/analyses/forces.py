@@ -80,9 +80,15 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
 
 
 def _find_joints(analysis: JointReaction, model: Model, tables: AnalysisTables) -> list[Joint]:
-    """Return the requested joints.
+    """Return the joints that an analysis names, in the order of its names; all if the first word is ALL.
 
-    OpenSim searches for each joint only after the one before, and ignores the others.
+    Args:
+        analysis: the analysis.
+        model: model with the joints.
+        tables: writer of the tables, for errors.
+
+    Raises:
+        OsimliteError: the model has no joint of a name; the message has the nearest one.
     """
     all_joints = model.joint_set.objects
     names = list(map(str, analysis.joint_names)) or ["ALL"]

@@ -220,12 +220,12 @@ def _find_result(tool: TrialTool, ending: str) -> Path | None:
     return tool.find_result(f"{tool.setup.name}{ending}")
 
 
-def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[PlannedMeasurement]:
+def _plan_inputs(tool: TrialTool, planned: set[tuple[object, ...]]) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of motion and loads, once for each pair of them.
 
     Args:
         tool: tool that names them.
-        looked: inputs that are measured already, extended here.
+        planned: inputs whose measurements have been planned for another tool; extended.
     """
     try:
         motion, loads = (
@@ -243,18 +243,18 @@ def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[P
                 partial(_raise_missing, MissingInput(f"{tool} names no motion")),
             )
         return
-    if (motion, tool.cutoff, tool.span) not in looked:
-        looked.add((motion, tool.cutoff, tool.span))
+    if (motion, tool.cutoff, tool.span) not in planned:
+        planned.add((motion, tool.cutoff, tool.span))
         yield "filters", partial(measure_filter, tool)
     if loads is None:
         yield "loads", partial(_raise_missing, MissingInput(f"{tool} names no external loads"))
     else:
         # Several tools of a trial name the same files.
-        if (loads,) not in looked:
-            looked.add((loads,))
+        if (loads,) not in planned:
+            planned.add((loads,))
             yield "feet under loads", partial(measure_feet, tool)
-        if (loads, tool.setup.model_file) not in looked:
-            looked.add((loads, tool.setup.model_file))
+        if (loads, tool.setup.model_file) not in planned:
+            planned.add((loads, tool.setup.model_file))
             yield "weight on plates", partial(measure_weight, tool)
 
 

@@ -31,17 +31,25 @@ def add_ellipsoids(draft: MjcfDraft) -> None:
     ]
     for _, group in groupby(slide_indices, key=lambda index: joints[index].source):
         indices = list(group)
-        _add_mechanism(
+        _add_ellipsoid_follower(
             draft, [joints[index] for index in indices], joints[indices[-1] + 1 : indices[-1] + 4]
         )
 
 
-def _add_mechanism(
+def _add_ellipsoid_follower(
     draft: MjcfDraft, slides: list[RobotJoint], rotations: tuple[RobotJoint, ...]
 ) -> None:
-    """Add the body on slides, its connection and the couplings of one joint.
+    """Add the small body that holds the body of one EllipsoidJoint on its ellipsoid.
 
-    A joint of another structure is left alone.
+    MuJoCo has no such joint. The small body slides along the axes of the ellipsoid and is connected
+    to a point ahead of the body, at the distance L along its normal n. Its slides then have the values
+    (r + L) n, of which the body's own slides, r n, are fixed fractions.
+
+    Args:
+        draft: MJCF under construction; changed.
+        slides: translations of the joint along the axes of the ellipsoid.
+        rotations: joints after the slides. A joint of another structure is left to the general
+            treatment of functions.
     """
     radii = {}
     for joint in slides:

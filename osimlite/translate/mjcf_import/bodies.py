@@ -47,11 +47,16 @@ def add_bodies(draft: ConversionDraft) -> None:
 
 
 def _make_body(draft: ConversionDraft, body: int) -> Body:
+    """Return the OpenSim body with the mass, mass centre and inertia of a body of MuJoCo.
+
+    MuJoCo gives principal moments and axes; OpenSim needs the matrix in the axes of the body.
+    """
     model = draft.mj
     axes = quaternion_matrix(model.body_iquat[body])
     inertia: Array = axes @ np.diag(model.body_inertia[body]) @ axes.T
     mass = float(model.body_mass[body])
     xx, yy, zz, xy, xz, yz = (
+        # Adding 0.0 turns -0.0 into 0.0, which files should not show.
         float(inertia[row, column]) + 0.0
         for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     )

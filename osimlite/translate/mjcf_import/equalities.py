@@ -34,7 +34,7 @@ def add_equalities(draft: ConversionDraft) -> None:
         if equality_type == int(equality_types.mjEQ_JOINT):
             _couple_joints(draft, number)
         elif equality_type == int(equality_types.mjEQ_CONNECT):
-            _connect(draft, number)
+            _add_point_constraint(draft, number)
         elif equality_type == int(equality_types.mjEQ_WELD):
             _weld(draft, number)
         else:
@@ -105,7 +105,8 @@ def _frames_of(draft: ConversionDraft, number: int) -> tuple[int, int, bool]:
     return int(model.eq_obj1id[number]), int(model.eq_obj2id[number]), sites
 
 
-def _connect(draft: ConversionDraft, number: int) -> None:
+def _add_point_constraint(draft: ConversionDraft, number: int) -> None:
+    """Add the PointConstraint of a `connect` equality, between points of bodies or two sites."""
     model = draft.mj
     first, second, are_sites = _frames_of(draft, number)
     # Sites have their points themselves, bodies have them in the data.

@@ -267,15 +267,23 @@ class _Selection:
 
     def _find_joints(self, tendon: Tendon) -> list[int]:
         """Return the independent hinges and slides that the length of a tendon depends on."""
-        arms, joints = self._true_arms([tendon], self.poses.qpos[:ARM_POSES])
+        arms, joints = self._compute_moment_arms([tendon], self.poses.qpos[:ARM_POSES])
         return [
             joint for column, joint in enumerate(joints) if np.abs(arms[0, :, column]).max() > 1e-8
         ]
 
-    def _true_arms(self, tendons: list[Tendon], qpos: Array) -> tuple[Array, list[int]]:
-        """Return moment arms (T, P, n) about independent hinges and slides, and these joints.
+    def _compute_moment_arms(self, tendons: list[Tendon], qpos: Array) -> tuple[Array, list[int]]:
+        """Return moment arms of tendons about independent hinges and slides, by central differences.
 
-        They include what the joints do that equalities move along, as OpenSim's moment arms do.
+        Joints that equalities couple to the moved one move with it, as in OpenSim's moment arms;
+        MuJoCo's own Jacobian of tendons leaves them at rest.
+
+        Args:
+            tendons: T tendons.
+            qpos: poses (P, nq).
+
+        Returns:
+            Moment arms -dL/dq (T, P, n), m or 1, and the n joints.
         """
         model, source = self.draft.mj, self.source
         joints = [
@@ -323,7 +331,7 @@ class _Selection:
                 )
         lengths, _, _ = bench.measure(self.checks.qpos)
         qpos = self.checks.qpos[:ARM_POSES]
-        target_arms, joints = self._true_arms(self.tendons, qpos)
+        target_arms, joints = self._compute_moment_arms(self.tendons, qpos)
         _, arms, names = bench.measure(qpos, arms=True)
         columns = [names.index(draft.coordinates[joint][0]) for joint in joints]
         default_pose = find_default_pose(draft)

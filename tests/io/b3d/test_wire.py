@@ -61,13 +61,16 @@ def test_unpacked_numbers_are_numbers_too() -> None:
     [
         (b"\x08", "ends within a number"),
         (b"\x00\x00", "the number 0"),
-        (b"\x0b", "unknown type 3"),
+        (b"\x0b", "unknown wire type 3"),
         (b"\x08" + b"\xff" * 11, "more than 64 bits"),
         (b"\x1a\x05ab", "longer than its message"),
         (b"\x1a\x01\xff", "not text in UTF-8"),
-        (b"\x0a\x01a", "'count' .field 1. has another type"),
+        (b"\x0a\x01a", "'count' .field 1. has wire type 2, which holds no int"),
         (b"\x12\x03abc", "'numbers' ends within a number"),
-        (encode_varint(1 << 3 | 1) + b"\0" * 8, "'count' .field 1. has another type"),
+        (
+            encode_varint(1 << 3 | 1) + b"\0" * 8,
+            "'count' .field 1. has wire type 1, which holds no int",
+        ),
     ],
 )
 def test_damage_is_described(data: bytes, message: str) -> None:

@@ -12,7 +12,7 @@ from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.cycle import find_cycle
 from osimlite.studies.gait.stepmap import StepMap
-from osimlite.studies.gait.symmetry import exchange_auxiliary
+from osimlite.studies.gait.symmetry import match_auxiliary_states
 
 
 def test_a_walker_that_counts_energy_walks_as_before():
@@ -72,5 +72,5 @@ def test_states_that_push_are_exchanged_by_what_they_do():
     engine = SimpleNamespace(order=(0, 1), state=state, compute_derivative=derivative)
     source = np.arange(11)
     source[:4] = 1, 0, 3, 2
-    exchange_auxiliary(engine, source, np.random.default_rng(1).normal(size=(3, 11)))
+    match_auxiliary_states(engine, source, np.random.default_rng(1).normal(size=(3, 11)))
     assert source.tolist() == [1, 0, 3, 2, 4, 6, 5, 7, 8, 10, 9]

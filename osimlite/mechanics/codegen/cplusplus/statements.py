@@ -251,12 +251,21 @@ class FunctionWriter(ExpressionWriter):
     def _assign_one(
         self, node: ast.stmt, target: ast.expr, value: ast.expr, kind: Type
     ) -> list[str]:
+        """Return the lines of C++ that assign one value to one name or item.
+
+        Args:
+            node: the assignment in Python.
+            target: name or item of an array.
+            value: assigned expression.
+            kind: type of the value.
+        """
         if isinstance(target, ast.Name):
-            own = self.function.variables.get(target.id)
-            if own is None:
+            # A variable that is never read has no type; its value counts only for its effects.
+            declared_type = self.function.variables.get(target.id)
+            if declared_type is None:
                 return [f"{self.text(value)};"] if self.function.effects_of(value) & WRITES else []
             return [
-                f"{self._definition(node, target.id)}{self.local(target.id)} = {self.text_as(value, own)};"
+                f"{self._definition(node, target.id)}{self.local(target.id)} = {self.text_as(value, declared_type)};"
             ]
         # C++17 evaluates the value before the target of an assignment, as Python does.
         text = self.text(value)

@@ -119,11 +119,13 @@ def _adapt_inverse_curve(force: Any) -> dict[str, float]:
 
 
 def _set_end_slopes(concentric: float, eccentric: float) -> dict[str, float]:
+    """Return the end slopes of a force-velocity curve as arguments of its constructor."""
     return {"concentric_slope_at_vmax": concentric, "eccentric_slope_at_vmax": eccentric}
 
 
 def _check_equilibrium_muscle(builder: ElementBuilder, force: Any) -> None:
-    # The classic form divides by the activation.
+    """Raise a ModelError if a parameter of a Millard2012EquilibriumMuscle is out of its domain."""
+    # Without damping, the classic form divides by the activation; OpenSim's lower bound is 0.01.
     least = 0.01 if force.is_classic else 0.0
     slack = Number("tendon_slack_length", lambda x: x >= 0.0, "is negative")
     check_muscle(

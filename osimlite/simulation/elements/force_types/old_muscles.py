@@ -11,7 +11,7 @@ from osimlite.mechanics.laws.deprecated_muscles import (
     ROUNDS,
     TOLERANCE,
     OldMuscle,
-    cos_upright,
+    cos_pennation_of_fibers,
     generic_velocity_factor,
     make_guess,
     next_length,
@@ -69,7 +69,7 @@ def compute_fiber_forces(
         Cosine of pennation, and active, passive and tendon force over the maximum isometric force.
     """
     fiber_length = now.fiber_length
-    cos = cos_upright(fiber_length, m.height)
+    cos = cos_pennation_of_fibers(fiber_length, m.height)
     # Strain of the tendon: what the fibers leave of the path.
     strain = (now.length - fiber_length * cos) / m.slack - 1.0
     active, passive, tendon = force_law(fiber_length / m.optimal, strain, fields, curves)

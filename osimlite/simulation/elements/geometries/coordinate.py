@@ -62,8 +62,7 @@ class OnCoordinate(ForceGeometry):
 
         Returns:
             Integers: the degree of freedom, -1 if the coordinate is locked. Numbers: the value,
-            which counts
-                only then.
+            which counts only then.
         """
         return (places.freedom(location),), (places.locked_value(location),)
 

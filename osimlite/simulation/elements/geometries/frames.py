@@ -208,8 +208,7 @@ class BetweenFrames(ForceGeometry):
 
         Returns:
             Force (N) and torque (N.m) on the first and on the second frame in ground, about the
-            origins of
-                the frames or of their bodies.
+            origins of the frames or of their bodies.
         """
         # The record has the load on the second frame.
         push, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)

@@ -44,8 +44,7 @@ def compute_sphere_depth(
 
     Returns:
         Depth (m, negative if they are apart), radius (m), and outward unit normal of the half space
-        in
-            ground.
+        in ground.
     """
     o, n = station(model, data, g[0], vector(gp, 0)), direction(model, data, g[0], vector(gp, 3))
     center = station(model, data, g[1], vector(gp, 6))
@@ -172,8 +171,7 @@ class SphereOnPlane(ForceGeometry):
 
         Returns:
             Force (N) and torque (N.m) about the body's origin in ground, of the sphere's body, then
-            of the
-                half space's.
+            of the half space's.
         """
         half_space, sphere = force.location
         pushed, point = np.array(record[:3], dtype=float), np.array(record[3:6], dtype=float)

@@ -358,7 +358,7 @@ def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
 
     Returns:
         Half its length (m, infinite for closed surfaces), and its numbers in
-            :mod:`osimlite.mechanics.kernels.cable_surfaces`.
+        :mod:`osimlite.mechanics.kernels.cable_surfaces`.
     """
     if isinstance(surface, WrapCylinder):
         return (

@@ -372,8 +372,7 @@ def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None
 
     Returns:
         Kind, two sizes (m, m²) and three weights, see
-        :mod:`osimlite.mechanics.kernels.cable_surfaces`;
-            None if a cable cannot run over it.
+        :mod:`osimlite.mechanics.kernels.cable_surfaces`; None if a cable cannot run over it.
     """
     if isinstance(geometry, ContactSphere):
         return SURFACE_TYPE.SPHERE, geometry.radius, geometry.radius**2, 1.0, 1.0, 1.0
