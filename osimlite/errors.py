@@ -78,7 +78,10 @@ class NotWellFormedError(DocumentError):
 
 
 class VersionError(DocumentError):
-    """The version of the document is missing, not a number (`version` is None then), or not supported."""
+    """The version of the document is missing, not a number, or not supported.
+
+    In the first two cases the attribute `version` has no value.
+    """
 
     version: int | None = None
 
@@ -93,7 +96,7 @@ class MissingNameError(ModelError, AttributeError):
     """A component has no property or member of that name.
 
     Args:
-        describe: returns the message. It is called when somebody reads the message: to find the
+        describe: returns the message. It is called when the message is read: finding the
             nearest name takes milliseconds, and `hasattr` and `getattr` with a default drop the
             error unread.
     """

@@ -360,6 +360,7 @@ def run_remote_task(work: Callable[[Any], Any], values: Any, version: str) -> An
     """
     if version != osimlite.__version__:
         raise OsimliteError(
-            f"a worker has osimlite {osimlite.__version__}, but the sweep was started by {version}; install the same version"
+            f"a worker has osimlite {osimlite.__version__}, but the sweep was started by osimlite {version}; "
+            "install the same version on all workers"
         )
     return work(values)

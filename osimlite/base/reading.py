@@ -54,7 +54,7 @@ def make_missing_error(path: str | Path, *, may_be_folder: bool = False) -> Miss
     """
     path_text = str(path)
     if path_text.endswith(("/", os.sep)) or (may_be_folder and not os.path.splitext(path_text)[1]):
-        return MissingFolderError("there is no such folder", file=path_text)
+        return MissingFolderError("the folder does not exist; check its name", file=path_text)
     return MissingFileError("cannot read the file: no such file", file=path_text)
 
 

@@ -185,7 +185,7 @@ class Request:
         for name in option_values:
             if name not in known_names:
                 raise SettingError(
-                    f"--{name.replace('_', '-')} is no option of a conversion from '{self.source}' to '{self.target}'"
+                    f"--{name.replace('_', '-')} is not an option of a conversion from '{self.source}' to '{self.target}'"
                 )
         if motion is not None and (exporter is None or not exporter.takes_motion):
             raise SettingError(f"the format '{self.target}' has no motion; leave out --motion")

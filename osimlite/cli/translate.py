@@ -171,6 +171,6 @@ def _find_importer(file: Path) -> Importer:
     if name not in importer_by_name:
         titles = join_words([importer.title for importer in importer_by_name.values()])
         raise OsimliteError(
-            f"this is no file of {titles}, which --to {OSIM} converts", file=str(file)
+            f"this is not a file of {titles}, which --to {OSIM} converts", file=str(file)
         )
     return importer_by_name[name]

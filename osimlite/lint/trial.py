@@ -133,7 +133,7 @@ class Trial(CheckTarget):
         """Compare the measurements of a rule with limits, and record a verdict on each.
 
         A measurement is good up to the smallest limit, acceptable up to the largest, and bad beyond.
-        What is not good is reported as well.
+        Acceptable and bad ones are reported as well.
 
         Args:
             report: the collector of the rule's findings.

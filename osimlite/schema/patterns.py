@@ -280,7 +280,7 @@ class _Compiler:
         """Read a quantifier such as ``*`` or ``{2,3}``.
 
         Returns:
-            Smallest and largest count; the largest is None without a bound.
+            Smallest and largest count; or None as the largest without a bound.
 
         Raises:
             PatternError: the quantifier is incomplete, or its counts are reversed.
@@ -438,7 +438,7 @@ class _Compiler:
             end = self.text.find(":]", self.index)
             name = self.text[self.index : max(end, self.index)]
             if name not in _NAMED_CLASSES:
-                raise PatternError(f"there is no class of characters '{name}'")
+                raise PatternError(f"unknown character class '{name}'")
             self.index = end + 2
             tests.append(_NAMED_CLASSES[name].__contains__)
             return None

@@ -420,7 +420,7 @@ class StateEvaluator:
         """
         if not np.isfinite(np.array(y)).all():
             return SimulationError(
-                "the state of the motion is no longer finite; use a smaller accuracy value"
+                "the state of the motion has become infinite or NaN; use a smaller accuracy value"
             )
         if status == OUTCOME.UNSOLVED:
             item = self.structure[self.structure[MODEL.ITEM_AT] + int(self._f[0])]

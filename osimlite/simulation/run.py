@@ -371,7 +371,9 @@ class Simulation:
         table = None if runs is None else runs.table(times[-1])
         # One sum instead of a test of each entry: a NaN or an infinity survives addition.
         if not isfinite(sum(states[-1])):
-            raise SimulationError("the motion is no longer finite; use a smaller accuracy value")
+            raise SimulationError(
+                "the motion has become infinite or NaN; use a smaller accuracy value"
+            )
         wall = time.perf_counter() - started
         summary_settings = {
             "to": to,

@@ -166,7 +166,9 @@ def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
             case _:
                 raise ValueError
     except (ValueError, OverflowError, RecursionError):
-        raise _BadQuestion(HTTPStatus.BAD_REQUEST, "the question is no list of values") from None
+        raise _BadQuestion(
+            HTTPStatus.BAD_REQUEST, "expected a list of values in the request"
+        ) from None
     if len(q) != len(mechanism.coordinates):
         raise _BadQuestion(
             HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates"

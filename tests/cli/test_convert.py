@@ -74,7 +74,7 @@ def test_formats_are_listed() -> None:
         (("walker.osim", "--to", "project"), "cannot be written as 'project'"),
         (("walker.osim", "-o", "x.urdf", "--to", "mjcf"), "-o names a file of the format 'urdf'"),
         (("walker.osim", "-o", "w.xyz"), "'.xyz' is the suffix of no format"),
-        (("walker.osim", "--to", "mjcf", "--merge"), "--merge is no option of a conversion"),
+        (("walker.osim", "--to", "mjcf", "--merge"), "--merge is not an option of a conversion"),
         (("walker.osim", "--to", "urdf", "--motion", "m.mot"), "has no motion"),
     ],
 )

@@ -119,7 +119,7 @@ def test_a_folder_that_is_not_there_is_called_one(tmp_path, monkeypatch, capsys,
     assert main_code(command, path) == 2
     assert (
         capsys.readouterr().err
-        == f"osimlite: {path}: there is no such folder (see docs/errors.md#folders)\n"
+        == f"osimlite: {path}: the folder does not exist; check its name (see docs/errors.md#folders)\n"
     )
 
 

@@ -408,7 +408,9 @@ def _join_pairs(pairs: list[tuple[str, Any]], file: str) -> dict[str, Any]:
     if len(result) < len(pairs):
         counts = Counter(key for key, _ in pairs)
         repeated_key = next(key for key, count in counts.items() if count > 1)
-        raise DocumentError(f"the key {repeated_key!r} stands twice in one mapping", file=file)
+        raise DocumentError(
+            f"the key {repeated_key!r} occurs twice in one mapping; remove one of them", file=file
+        )
     return result
 
 
@@ -469,7 +471,7 @@ def _refuse_repeated_keys(yaml: Any, root: Any, file: str) -> None:
             if key.value in keys:
                 mark = key.start_mark
                 raise DocumentError(
-                    f"the key {key.value!r} stands twice in one mapping",
+                    f"the key {key.value!r} occurs twice in one mapping; remove one of them",
                     file=file,
                     line=mark.line + 1,
                     column=mark.column + 1,

@@ -358,7 +358,7 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in unknown_notes})[:8])
     message = (
         f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and no rule says what becomes of {tags}: that would "
-        "be lost; take it out, or open and save the model with OpenSim 2"
+        "be lost; remove it, or open and save the model with OpenSim 2"
     )
     raise _make_version_error(source, version, message, unknown_notes[0].number)
 

@@ -69,7 +69,7 @@ def escape_text(text: str) -> str:
     if not text.isprintable() and (match := NO_XML.search(text)):
         start = match.start()
         raise ModelError(
-            f"no file can hold the last character of '{text[max(0, start - 40) : start + 1]}'; take it out"
+            f"no file can hold the last character of '{text[max(0, start - 40) : start + 1]}'; remove it"
         )
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 

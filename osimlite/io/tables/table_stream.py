@@ -134,7 +134,7 @@ def _make_format_error(beginning: bytes) -> str:
         return (
             "this is XML, and no storage file (.sto, .mot); are the arguments in the right order?"
         )
-    return "this is no storage file (.sto, .mot): it has no line 'endheader'"
+    return "this is not a storage file (.sto, .mot): it has no line 'endheader'"
 
 
 def find_word_start(text: str, word: int) -> int:

@@ -23,7 +23,7 @@ from osimlite.schema.specs import FieldSpec, get_field_specs
 def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     """An object has a class that OpenSim does not have.
 
-    Reports elements in the place of objects whose tag is not a class of OpenSim 4.6: misspelt, in
+    Reports elements where objects are expected, whose tag is not a class of OpenSim 4.6: misspelt, in
     the wrong case, or of a plug-in. Suggests a class with a similar name if it is allowed there and
     has the properties that the element contains.
 

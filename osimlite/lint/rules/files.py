@@ -20,8 +20,8 @@ from osimlite.schema.geometry import Mesh
 def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
     """A mesh file does not exist.
 
-    Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry`
-    beside it, and in the folders that the configuration names. Suggests a file whose name differs
+    Looks for the file of each mesh where OpenSim does: beside the model, in the folder
+    `Geometry` next to the model, and in the folders that the configuration names. Suggests a file whose name differs
     in letter case only, and one that is found with / instead of a backslash.
 
     OpenSim draws nothing for such a mesh. It rejects a model with a missing contact mesh. A name in

@@ -188,7 +188,7 @@ def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None
 def report_lost_output(setup: Setup, report: FindingCollector) -> None:
     """Results would be lost or written elsewhere.
 
-    Checks the folder for results, of which OpenSim creates only the last part, missing folders of
+    Checks the folder for results (OpenSim creates only its last part), missing folders of
     output files, and output files without a name.
 
     The tool runs to its end and its results are lost, with a line in the log at most.

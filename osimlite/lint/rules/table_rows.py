@@ -234,7 +234,7 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
             far_rows[0] if len(far_rows) > 1 or far_rows[0] == 0 else bisect_left(times, MAX_TIME_S)
         )
         report(
-            f"the time {times[row]:g} s is no time of a motion: splines through the table overflow, "
+            f"the time {times[row]:g} s cannot be a time of a motion: splines through the table overflow, "
             "and osimlite does not read it",
             at=Position(table.rows.line_of(row), 1),
         )

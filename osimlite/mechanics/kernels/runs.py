@@ -98,7 +98,7 @@ def select_run(runs: Motion, number_count: int, k: int) -> Motion:
     """Return one of several runs.
 
     Args:
-        runs: vectors of all runs, each of which has a row of `reals`, `clock`, `counts`, `reports`,
+        runs: vectors of all runs; each run has a row of `reals`, `clock`, `counts`, `reports`,
             `events` and `peaks`; the others are shared.
         number_count: length of a row of `reals`, 0 if all runs share one.
         k: number of the run.

@@ -146,7 +146,7 @@ class _Builder:
         for path, (base, _) in placed.found.items():
             if base not in index:
                 raise UnsupportedError(
-                    f"the frame '{path}' is no body of the model, nor fixed to one; take it out"
+                    f"the frame '{path}' is neither a body of the model nor fixed to one; remove it"
                 )
         frames = {
             path: FramePlacement(index[base], matrix)

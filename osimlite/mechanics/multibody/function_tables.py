@@ -36,7 +36,7 @@ def _has_table(table: list[float], function: f.SmoothFunction, where: str) -> li
     if not table:
         name = type(function).__name__
         raise UnsupportedError(
-            f"{where} is a {name}, which cannot be computed; take another function"
+            f"{where} is a {name}, which osimlite cannot compute; use another function"
         )
     return table
 

@@ -46,7 +46,7 @@ def is_allowed(source: str) -> bool:
     # A single source makes results reproducible, for example in tests.
     if only and only not in SOURCES:
         raise OsimliteError(
-            f"{VARIABLE} is '{only}', which is no source of kernels{suggest_or_list(only, SOURCES)}"
+            f"{VARIABLE} is '{only}', which is not a source of kernels{suggest_or_list(only, SOURCES)}"
         )
     return only in ("", source)
 

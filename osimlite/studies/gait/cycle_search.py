@@ -200,7 +200,8 @@ class CycleSearch:
         self.footing: FootContacts = find_footing(engine, feet)
         if len(self.footing.feet) != 2:
             raise SettingError(
-                f"a cycle is looked for on two feet; '{engine.mechanism.name}' has another number of them"
+                f"the search for cycles needs two feet; "
+                f"'{engine.mechanism.name}' has {len(self.footing.feet)}; name two with --feet"
             )
         self._first: StepMap | None = None
 

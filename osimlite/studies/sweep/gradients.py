@@ -53,7 +53,7 @@ class _UnknownEvents(list[Any]):
     def _refuse(self, *_: object) -> NoReturn:
         """Raise an error for a measure that asks for events."""
         raise UnsupportedError(
-            "events of a run have no derivatives; take another measure, or another --method"
+            "events of a run have no derivatives; choose another measure, or another --method"
         )
 
     __iter__ = __len__ = __getitem__ = __contains__ = _refuse
@@ -74,22 +74,23 @@ class Gradients:
     def __init__(self, plan: Plan) -> None:
         if plan.engine != "compiled" or plan.integrator != MERSON:
             raise SettingError(
-                "--method gradient follows Merson's steps of the compiled engine; choose no others"
+                "--method gradient follows Merson's steps of the compiled engine; remove --engine and --integrator"
             )
         if plan.controller is not None:
             raise SettingError(
-                "what a controller holds between its steps has no derivatives; take another --method"
+                "controls that a controller holds between its steps have no derivatives; choose another --method"
             )
         if plan.stops:
             raise SettingError(
-                "--method gradient is for runs that last their time; leave out --below and --above"
+                "--method gradient needs runs that last until --to; remove --below and --above"
             )
         self._plan, self._variants = plan, Variants(plan)
         base_variant = self._variants.given
         self._measure = make_measure(plan.measures[0], base_variant.engine, plan.feet)
         if self._measure.watches:
             raise UnsupportedError(
-                f"'{self._measure.name}' is of events; take another measure, or another --method"
+                f"'{self._measure.name}' depends on events, which have no derivatives; "
+                "choose another measure, or another --method"
             )
         self._times = (
             [0.0, plan.to]

@@ -239,7 +239,7 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     )
     if offset is None:
         raise SettingError(
-            "no coordinate of the model slides, so that it has no distance; take another measure"
+            "the model has no translational coordinate, so that it covers no distance; choose another measure"
         )
     return RunMeasure(
         "distance", lambda batch: batch.runs.states[:, offset] - batch.starts[:, offset]

@@ -206,7 +206,7 @@ class PartialTable:
         is_there = self.partial.exists()
         if is_there and not resume:
             raise SettingError(
-                f"interrupted work is in '{self.partial}'; go on with --resume, or remove that file"
+                f"interrupted work is in '{self.partial}'; continue with --resume, or remove that file"
             )
         try:
             self._lock = _lock_file(self.partial)
@@ -240,7 +240,7 @@ class PartialTable:
                 self._write_batch(batch)
             except OSError as error:
                 raise OsimliteError(
-                    f"cannot write here: {error.strerror}; make room, then go on with --resume",
+                    f"cannot write here: {error.strerror}; free some disk space, then continue with --resume",
                     file=str(self.partial),
                 ) from None
             self.rows += batch.num_rows
@@ -254,7 +254,8 @@ class PartialTable:
         end = _read_batches(self.partial, process_batch)
         if end < self.partial.stat().st_size:
             raise OsimliteError(
-                "the file was damaged meanwhile; go on with --resume", file=str(self.partial)
+                "another program has damaged the file during the sweep; continue with --resume",
+                file=str(self.partial),
             )
 
     def _write_batch(self, batch: Any) -> None:
@@ -336,7 +337,7 @@ class PartialTable:
             old_settings = _parse_settings(result)
         except (ValueError, OSError):
             raise SettingError(
-                f"'{self.partial}' is no interrupted sweep, or is damaged at its beginning; remove it, or take another "
+                f"'{self.partial}' is not an interrupted sweep, or its beginning is damaged; remove it, or choose another "
                 "name"
             ) from None
         differences = describe_differences(
@@ -345,7 +346,7 @@ class PartialTable:
         if differences or not result.equals(self.schema):
             raise SettingError(
                 f"the interrupted work in '{self.partial}' has other settings: {join_words(differences) or 'its columns'}; "
-                "ask for the same as before, or remove that file"
+                "use the settings of the interrupted sweep, or remove that file"
             )
         end = _read_batches(self.partial, self._count_rows)
         if end < self.partial.stat().st_size:
@@ -466,7 +467,7 @@ def report_damage(path: str | Path) -> Iterator[None]:
         yield
     except (OSError, ValueError):
         raise OsimliteError(
-            "the results are damaged; remove the file, and run anew", file=str(path)
+            "the results are damaged; remove the file, and run the sweep again", file=str(path)
         ) from None
 
 

@@ -73,7 +73,7 @@ def describe_interruption(partial: PartialTable, runs_text: str) -> SweepInterru
     if partial.rows == 0:
         return SweepInterruption("interrupted before any run was saved")
     return SweepInterruption(
-        f"interrupted after {runs_text}, which are in '{partial.partial}'; go on with --resume"
+        f"interrupted after {runs_text}, which are in '{partial.partial}'; continue with --resume"
     )
 
 

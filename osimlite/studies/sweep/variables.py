@@ -289,7 +289,7 @@ def reject_grid_ranges(variables: Sequence[Variable]) -> None:
     for variable in variables:
         if variable.count is not None and not variable.is_fixed:
             raise SettingError(
-                f"the range of '{variable.name}' is to have {variable.count} values, which is for the grid of a sweep; "
+                f"the range of '{variable.name}' has {variable.count} grid points, which only a sweep uses; "
                 "a search takes any value of it: leave the number out"
             )
 
@@ -498,7 +498,7 @@ def _parse_number(name: str, number_or_text: object, unit: str) -> float:
         quantity = parse_quantity(str(number_or_text))
     if quantity is None or not math.isfinite(quantity.number):
         raise SettingError(
-            f"'{number_or_text}' is no number for '{name}'; give one such as 0.5 or 30deg"
+            f"'{number_or_text}' is not a number for '{name}'; write one such as 0.5 or 30deg"
         )
     # A plain number is in the unit of the variable.
     if quantity.unit is None:

@@ -95,7 +95,7 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
     except OsimliteError as error:
         errors = tool.find_result(f"{setup.name}_ik_marker_errors.sto")
         if errors is None:
-            raise MissingInput(f"{error.message}; and there is no file of marker errors") from error
+            raise MissingInput(f"{error.message}, and there is no file of marker errors") from error
         yield from measure_written_errors(folder, errors)
         return
     summary = motion.summary

@@ -43,7 +43,7 @@ def _add_ellipsoid_follower(
 
     MuJoCo has no such joint. The small body slides along the axes of the ellipsoid and is connected
     to a point ahead of the body, at the distance L along its normal n. Its slides then have the values
-    (r + L) n, of which the body's own slides, r n, are fixed fractions.
+    (r + L) n, and the body's own slides follow them with the fixed fractions r / (r + L).
 
     Args:
         draft: MJCF under construction; changed.

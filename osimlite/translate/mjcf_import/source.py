@@ -93,7 +93,7 @@ def load_mjcf(path: Path) -> MjcfSource:
     """
     mujoco: Any = require("mujoco", extra="mujoco", purpose="conversion from MJCF")
     if not path.is_file():
-        raise MissingFileError("there is no such file; give an MJCF file (.xml)", file=str(path))
+        raise MissingFileError("the file does not exist; name an MJCF file (.xml)", file=str(path))
     if path.stat().st_size > LARGEST_FILE:
         raise DocumentError(
             f"the file has more than {LARGEST_FILE / 1e6:g} MB, which is more than osimlite reads",

@@ -245,7 +245,7 @@ def test_a_key_that_stands_twice_in_yaml_is_refused(tmp_path: Path, text: str) -
     pytest.importorskip("yaml")
     path = tmp_path / "it.yaml"
     path.write_text(text)
-    with pytest.raises(DocumentError, match="stands twice in one mapping"):
+    with pytest.raises(DocumentError, match="occurs twice in one mapping"):
         read_data(path)
 
 
@@ -255,5 +255,5 @@ def test_a_key_that_stands_twice_in_yaml_is_refused(tmp_path: Path, text: str) -
 def test_a_key_that_stands_twice_in_json_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "it.json"
     path.write_text(text)
-    with pytest.raises(DocumentError, match="stands twice in one mapping"):
+    with pytest.raises(DocumentError, match="occurs twice in one mapping"):
         read_data(path)

@@ -250,7 +250,7 @@ def test_a_search_that_gets_nowhere_keeps_the_first_cycle():
 def test_a_search_needs_random_starts():
     with pytest.raises(SettingError, match="vary some values and speeds"):
         CycleSearch(plan(dynamic_walker(), {INERTIA: (0.05, 0.1)}))
-    with pytest.raises(SettingError, match="'RHip_rz' is to have 3 values"):
+    with pytest.raises(SettingError, match="'RHip_rz' has 3 grid points"):
         CycleSearch(plan(dynamic_walker(), {"RHip_rz": "0.05:0.1:3"}))
 
 

@@ -227,7 +227,8 @@ def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, mon
     monkeypatch.setattr("osimlite.__version__", "0.0.1")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.1)
     with pytest.raises(
-        OsimliteError, match=r"a worker has osimlite .*, but the sweep was started by 0\.0\.1"
+        OsimliteError,
+        match=r"a worker has osimlite .*, but the sweep was started by osimlite 0\.0\.1",
     ):
         sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
     assert not list(tmp_path.glob("*.parquet*"))

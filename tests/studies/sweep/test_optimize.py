@@ -138,7 +138,7 @@ def test_an_interrupted_search_goes_on(made, tmp_path, method):
     whole = optimize(made, DISTANCE, tmp_path / "whole", **choices)
     with pytest.raises(SweepInterruption, match="--resume"):
         optimize(made, DISTANCE, tmp_path / "cut", progress=stop, **choices)
-    with pytest.raises(SettingError, match="go on with --resume"):
+    with pytest.raises(SettingError, match="continue with --resume"):
         optimize(made, DISTANCE, tmp_path / "cut", **choices)
     with pytest.raises(SettingError, match="seed"):
         optimize(made, DISTANCE, tmp_path / "cut", resume=True, **{**choices, "seed": 5})
@@ -287,7 +287,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
     with pytest.raises(SettingError, match="take --method nelder-mead"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path)
     with pytest.raises(
-        SettingError, match=r"'RHip_rz' is to have 3 values, .*: leave the number out"
+        SettingError, match=r"'RHip_rz' has 3 grid points, .*: leave the number out"
     ):
         optimize(plan(walker, {"RHip_rz": "0.3:0.5:3"}), DISTANCE, tmp_path)
     assert not list(tmp_path.iterdir())

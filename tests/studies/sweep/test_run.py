@@ -117,7 +117,7 @@ def test_an_interrupted_sweep_goes_on(made, tmp_path):
         with pytest.raises(SweepInterruption, match="--resume"):
             sweep(made, chosen, path, resume=after > 10, workers=1, progress=Stopper(after))
         assert not path.exists() and path.with_name("r.parquet.partial").exists()
-    with pytest.raises(SettingError, match="go on with --resume"):
+    with pytest.raises(SettingError, match="continue with --resume"):
         sweep(made, chosen, path)
     counts = []
     outcome = sweep(made, chosen, path, resume=True, progress=lambda done, of: counts.append(done))
@@ -316,7 +316,9 @@ def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
         partial.add([[first, first + 1]])
     content = partial.partial.read_bytes()
     partial.partial.write_bytes(_flipped(content, len(content) - 1))
-    with pytest.raises(OsimliteError, match="was damaged meanwhile; go on with --resume"):
+    with pytest.raises(
+        OsimliteError, match="has damaged the file during the sweep; continue with --resume"
+    ):
         partial.finish()
     partial.close()
     assert [result.name for result in tmp_path.iterdir()] == ["r.partial"]
@@ -403,7 +405,8 @@ def test_a_full_disk_is_told(tmp_path):
     partial.stream.close()
     partial.stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
     with pytest.raises(
-        OsimliteError, match="No space left on device; make room, then go on with --resume"
+        OsimliteError,
+        match="No space left on device; free some disk space, then continue with --resume",
     ):
         partial.add([[2, 3]])
     partial.close()
