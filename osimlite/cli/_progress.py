@@ -32,7 +32,7 @@ ACTIVITIES = {
     "build": "building",
     "check-trial": "checking",
     "convert": "converting",
-    "demo": "making the tour",
+    "demo": "building and simulating the examples",
     "diff": "comparing",
     "doctor": "looking at packages",
     "find-gait": "searching",

@@ -83,12 +83,12 @@ def demo(
     pages = _simulate_motions(tour, pictures)
     say(f"Everything is in {output}{os.sep}")
     if pages:
-        say(f"Look at {pages[-1]}: choose among the four there")
+        say(f"Look at {pages[-1]}: it links to the other three motions")
         if browser and _has_display():
             import webbrowser
 
             webbrowser.open(pages[-1].resolve().as_uri())
-    say("Next, with models of yours: osimlite validate FOLDER")
+    say("Next, check your own models: osimlite validate FOLDER")
 
 
 @dataclass
