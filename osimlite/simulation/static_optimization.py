@@ -705,5 +705,7 @@ def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAc
             model.force_set.objects[force_indices[id(item)]] = item = ideal_actuator
         result.append(item)
     if not result:
-        raise ModelError(f"'{model.name}' has no actuators")
+        raise ModelError(
+            f"'{model.name}' has no actuators; add some, such as reserves of a ForceSet with --forces"
+        )
     return result

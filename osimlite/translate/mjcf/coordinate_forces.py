@@ -154,8 +154,8 @@ def add_limit(draft: MjcfDraft, force: CoordinateLimitForce, path: str) -> str:
     draft.fidelity.add(
         "limit-force",
         path,
-        "a limit whose stiffness grows smoothly, and which damps beyond it",
-        "a spring of its stiffness from the limit on, without damping",
+        "a limit force with a smooth transition and damping",
+        "a spring with the same stiffness beyond the limit, without damping",
         tendons,
         {"force": Error.measure(force_errors, unit), "damping": Error(D, D, f"{unit} s")},
     )
