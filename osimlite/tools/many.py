@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -21,7 +22,7 @@ from osimlite.errors import OsimliteError
 from osimlite.io.document.cache import get_object
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
-from osimlite.tools.named_files import find_named_files, writes_own_result
+from osimlite.tools.named_files import find_named_files, find_own_results
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.patterns import find_files
 from osimlite.tools.running import list_runnable, run
@@ -219,8 +220,9 @@ def find_substitutes(
         if folder is None:
             continue
         outputs = {os.path.realpath(name) for name in find_named_files(str(writer), "output-file")}
+        own = find_own_results(str(writer))
         for path in input_paths:
-            if path not in outputs and not writes_own_result(str(writer), path):
+            if path not in outputs and not _is_own_result(path, own):
                 continue
             present_path = folder / os.path.basename(path)
             # The other setup may have failed to write this result.
@@ -465,6 +467,12 @@ class _Schedule:
                     )
 
 
+def _is_own_result(path: str, own: tuple[str, re.Pattern[str]] | None) -> bool:
+    """Return whether a real path is among the results of :func:`find_own_results`."""
+    folder, name = os.path.split(path)
+    return own is not None and folder == own[0] and own[1].fullmatch(name) is not None
+
+
 def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     """Return, for each setup, the other setups that write its inputs.
 
@@ -478,6 +486,11 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
         writers.update(
             (os.path.realpath(name), setup) for name in find_named_files(str(setup), "output-file")
         )
+    # By folder, because each input is compared with all of them.
+    own_results: dict[str, list[tuple[Path, tuple[str, re.Pattern[str]]]]] = {}
+    for setup in runnable:
+        if (own := find_own_results(str(setup))) is not None:
+            own_results.setdefault(own[0], []).append((setup, own))
     needs_by_setup: dict[Path, list[Path]] = {}
     for setup in setups:
         needs: dict[Path, None] = {}
@@ -486,7 +499,12 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
         ):
             # Results without a property of their own are called by the name of the tool.
             writer = writers.get(name) or next(
-                (other for other in runnable if writes_own_result(str(other), name)), None
+                (
+                    other
+                    for other, own in own_results.get(os.path.dirname(name), ())
+                    if _is_own_result(name, own)
+                ),
+                None,
             )
             if writer is not None and writer != setup:
                 needs[writer] = None

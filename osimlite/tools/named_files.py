@@ -77,36 +77,30 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
                 waiting.append(naming.path)
 
 
-_OWN_RESULT = re.compile(
+_OWN_RESULT = (
     r"(?:states|states_degrees|controls|pErr|avgResiduals|(?:Kinematics|Actuation)_\w+)\.\w+"
 )
 """Ends of the names of results that tools call by their own names."""
 
 
-def writes_own_result(setup: str, path: str) -> bool:
-    """Return whether a setup writes a file whose name follows from its own, such as `so_Kinematics_q.sto`.
+def find_own_results(setup: str) -> tuple[str, re.Pattern[str]] | None:
+    """Return where a tool writes results whose names follow from its own, such as `so_Kinematics_q.sto`.
 
     Args:
         setup: path of the setup.
-        path: real path of the file.
+
+    Returns:
+        Real path of the folder and the pattern of the names; None if the document is no tool.
     """
     subject = read_subject(setup)
     top: Any = subject.top if isinstance(subject, Setup) else None
+    if not is_a(top, "AbstractTool"):
+        return None
     results = str(getattr(top, "results_directory", "")).strip()
     folder = os.path.realpath(os.path.join(os.path.dirname(setup), results))
-    prefix = f"{getattr(top, 'name', '')}_"
-    name = os.path.basename(path)
-    if (
-        not is_a(top, "AbstractTool")
-        or os.path.dirname(path) != folder
-        or not name.startswith(prefix)
-    ):
-        return False
-    rest = name.removeprefix(prefix)
     analyses = getattr(getattr(top, "analysis_set", None), "objects", ())
-    return _OWN_RESULT.fullmatch(rest) is not None or any(
-        rest.startswith(f"{analysis.name}_") for analysis in analyses
-    )
+    ends = [_OWN_RESULT, *(f"{re.escape(analysis.name)}_.*" for analysis in analyses)]
+    return folder, re.compile(f"{re.escape(top.name)}_(?:{'|'.join(ends)})")
 
 
 def limit_documents(documents: set[str], setup: str) -> None:
