@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.lint import Config
+from osimlite.lint import Config, validate
 from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.many import check_files
 from osimlite.lint.scan import RowScanner
@@ -185,3 +185,13 @@ def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatc
     assert odd == [27] and result.count == 50 and list(result.times[:2]) == [0.0, 0.1]
     assert [(fault.kind, fault.line) for fault in result.faults.values()] == [("cell", 27)]
     assert result.samples[1] == [0.1, 1.0, -2e-3, 1.0, 0.5, 0.25, -1.0]
+
+
+def test_a_last_time_far_before_the_first_is_no_traceback(tmp_path: Path) -> None:
+    rows = "".join(f"{time}\t0\n" for time in ("0", "0.1", "-1e308"))
+    file = tmp_path / "far.sto"
+    file.write_text(
+        f"far\nversion=1\nnRows=3\nnColumns=2\ninDegrees=no\nendheader\ntime\tq\n{rows}"
+    )
+    messages = [finding.message for finding in validate(str(file)).findings]
+    assert any("-1e+308 s cannot be a time of a motion" in message for message in messages)

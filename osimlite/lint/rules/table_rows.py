@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
 from itertools import pairwise
 
 from osimlite.base.text import format_count
@@ -230,9 +229,8 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
     # Times grow: what is too large is at the ends. A time that goes back is reported above.
     far_rows = [row for row in (0, len(times) - 1) if times and abs(times[row]) >= MAX_TIME_S]
     if far_rows:
-        row = (
-            far_rows[0] if len(far_rows) > 1 or far_rows[0] == 0 else bisect_left(times, MAX_TIME_S)
-        )
+        # Damaged times may also be large and negative at the end.
+        row = next(row for row, time in enumerate(times) if abs(time) >= MAX_TIME_S)
         report(
             f"the time {times[row]:g} s cannot be a time of a motion: splines through the table overflow, "
             "and osimlite does not read it",
