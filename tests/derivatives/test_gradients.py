@@ -110,7 +110,7 @@ def test_a_search_arrives(tmp_path):
     [
         ({"integrator": "rosenbrock"}, "Merson's steps"),
         ({"below": {"Pelvis_ty": 0.1}}, "leave out --below"),
-        ({"measures": ("steps",)}, "is of events"),
+        ({"measures": ("steps",)}, "depends on events"),
     ],
 )
 def test_what_has_no_derivatives_is_refused(choices, message):

@@ -364,5 +364,5 @@ def test_a_start_that_cannot_be_computed_is_told(ours) -> None:
     candidates = Candidates(ours, Parameters(ours.best(), 2), 1.0)
     walkers = candidates.walkers
     walkers.copies.states[1, walkers.offsets["/forceset/vasti_l/fiber_length"]] = np.nan
-    with pytest.raises(OsimliteError, match="state of the motion is no longer finite"):
+    with pytest.raises(OsimliteError, match="state of the motion has become infinite"):
         walkers.advance(ORDER.FEEL)

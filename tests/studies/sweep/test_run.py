@@ -167,7 +167,7 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
     ):
         sweep(replace(made, wrapping="geodesic"), chosen, path, resume=True)
     (tmp_path / "x.parquet.partial").write_text("something else")
-    with pytest.raises(SettingError, match="no interrupted sweep"):
+    with pytest.raises(SettingError, match="is not an interrupted sweep"):
         sweep(made, chosen, tmp_path / "x.parquet", resume=True)
     sweep(made, chosen, path, resume=True)
     with pytest.raises(SettingError, match=r"samples \(40 before, 41 now\); name another place"):
@@ -303,7 +303,8 @@ def test_work_damaged_at_its_beginning_is_refused(interrupted_three_times, tmp_p
     damaged = _flipped(good, place % _ends(good)[1])
     (tmp_path / "r.parquet.partial").write_bytes(damaged)
     with pytest.raises(
-        SettingError, match=r"r\.parquet\.partial' is no interrupted sweep, or is damaged"
+        SettingError,
+        match=r"r\.parquet\.partial' is not an interrupted sweep, or its beginning is damaged",
     ):
         sweep(made, chosen, tmp_path / "r.parquet", resume=True)
     assert [result.name for result in tmp_path.iterdir()] == ["r.parquet.partial"]
