@@ -109,7 +109,7 @@ def test_a_search_arrives(tmp_path):
     ("choices", "message"),
     [
         ({"integrator": "rosenbrock"}, "Merson's steps"),
-        ({"below": {"Pelvis_ty": 0.1}}, "leave out --below"),
+        ({"below": {"Pelvis_ty": 0.1}}, "remove --below"),
         ({"measures": ("steps",)}, "depends on events"),
     ],
 )
