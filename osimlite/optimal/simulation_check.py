@@ -10,7 +10,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.prescribed_motion import PrescribedMotion
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.trajectory import MocoTrajectory
-from osimlite.simulation.run import simulate
+from osimlite.simulation.cached_simulation import simulate
 
 INTEGRATION_ACCURACY = 1e-7
 """Relative accuracy of the integration, well below `MATCH_TOLERANCE`."""

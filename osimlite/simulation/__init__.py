@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from osimlite.io.tables.storage import read_sto as read_sto
     from osimlite.io.tables.storage import write_sto as write_sto
     from osimlite.io.tables.table_stream import stream_table as stream_table
+    from osimlite.simulation.cached_simulation import simulate as simulate
     from osimlite.simulation.options import Options as Options
     from osimlite.simulation.run import Simulation as Simulation
-    from osimlite.simulation.run import simulate as simulate
     from osimlite.simulation.trajectory import Interrupted as Interrupted
     from osimlite.simulation.trajectory import Trajectory as Trajectory
 
@@ -26,7 +26,7 @@ __getattr__ = make_lazy_getattr(
         "StoTable": "osimlite.io.tables.storage",
         "Trajectory": "osimlite.simulation.trajectory",
         "read_sto": "osimlite.io.tables.storage",
-        "simulate": "osimlite.simulation.run",
+        "simulate": "osimlite.simulation.cached_simulation",
         "stream_table": "osimlite.io.tables.table_stream",
         "write_sto": "osimlite.io.tables.storage",
     },

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import osimlite
-from osimlite.simulation import run
+from osimlite.simulation import cached_simulation, run
 from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.engines.machine_code import has_machine_code
 from tests.suite import choose
@@ -108,10 +108,14 @@ def test_what_is_ready_is_used_again_and_goes_with_the_model(repo, monkeypatch):
 
 
 def test_few_models_stay_ready(repo):
-    models = [osimlite.read(repo / WALKER) for _ in range(run.CACHED_SIMULATIONS + 2)]
+    models = [osimlite.read(repo / WALKER) for _ in range(cached_simulation.CACHED_SIMULATIONS + 2)]
     for model in models:
         osimlite.simulate(model, to=0.01, engine="compiled")
-    assert [len(model.tree().cached) for model in models] == [0, 0, *[1] * run.CACHED_SIMULATIONS]
+    assert [len(model.tree().cached) for model in models] == [
+        0,
+        0,
+        *[1] * cached_simulation.CACHED_SIMULATIONS,
+    ]
 
 
 def test_a_trajectory_has_the_model_as_it_was(repo):

@@ -10,7 +10,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.simulation import Simulation
-from osimlite.simulation.run import simulate
+from osimlite.simulation.cached_simulation import simulate
 from osimlite.studies.gait import steps
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.steps import WalkerSteps, measure_along_slope, walk_many
