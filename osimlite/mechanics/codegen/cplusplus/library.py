@@ -13,8 +13,8 @@ from inspect import Parameter, signature
 from types import FunctionType
 from typing import Any
 
-from osimlite.mechanics.codegen.cplusplus.expressions import escape_name, write_number
 from osimlite.mechanics.codegen.cplusplus.inference import Specialisation
+from osimlite.mechanics.codegen.cplusplus.operators import escape_name, write_number
 from osimlite.mechanics.codegen.cplusplus.statements import FunctionWriter
 from osimlite.mechanics.codegen.cplusplus.types import (
     BOOLEAN,

@@ -6,13 +6,9 @@ import ast
 from collections.abc import Iterable, Sequence
 from functools import cache
 
-from osimlite.mechanics.codegen.cplusplus.expressions import (
-    OPERATORS,
-    ExpressionWriter,
-    Names,
-    write_number,
-)
+from osimlite.mechanics.codegen.cplusplus.expressions import ExpressionWriter
 from osimlite.mechanics.codegen.cplusplus.inference import WRITES, Specialisation, to_load
+from osimlite.mechanics.codegen.cplusplus.operators import OPERATORS, Names, write_number
 from osimlite.mechanics.codegen.cplusplus.types import (
     VOID,
     Callee,
