@@ -1,4 +1,4 @@
-"""Checks and atomic writing of all files that osimlite writes.
+"""Atomic writing of all files that osimlite writes, and the checks before it.
 
 What is allowed depends on who chose the path (SECURITY.md has the rule for users):
 
@@ -7,8 +7,9 @@ What is allowed depends on who chose the path (SECURITY.md has the rule for user
   text.
 - :func:`write_into`: the program chose the name. Never through a link, and never into anything but
   a regular file.
-- :class:`ResultWriter`: a document names the file. As :func:`write_into`, and only in the trees of the
-  project and the current folder, under no hidden name, and only over a result of the same type.
+- :class:`~osimlite.base.result_writing.ResultWriter`: a document names the file. As
+  :func:`write_into`, and only in the trees of the project and the current folder, under no hidden
+  name, and only over a result of the same type.
 - :func:`write_cached`: nobody named the file. A cache is in the user's cache folder, which no
   project can fill with links.
 """
@@ -26,15 +27,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from osimlite.base.pruning import MARKER, is_due, prune_cache
-from osimlite.base.reading import describe_content, read_at_most
-from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
-
-RESULT_ENDINGS = (".sto", ".mot", ".trc", ".osim", ".xml", ".omoco", ".csv", ".txt")
-"""Suffixes that a document may give to a new file; no program executes such files."""
-
-BEGINNING_BYTES = 65_536
-"""Number of bytes of an existing file that are read to recognize its type."""
 
 _PROJECT_MARKS = (".git", "osimlite.toml", "pyproject.toml")
 """Names whose presence marks the top folder of a project."""
@@ -87,10 +80,10 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
     with open_atomically(path) as stream:
-        stream.write(_encode_text(content, path) if isinstance(content, str) else content)
+        stream.write(encode_text(content, path) if isinstance(content, str) else content)
 
 
-def _encode_text(content: str, path: str | Path) -> bytes:
+def encode_text(content: str, path: str | Path) -> bytes:
     """Return a text in UTF-8; raise OsimliteError if it has lone surrogates."""
     try:
         return content.encode()
@@ -140,7 +133,7 @@ def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
             regular file has the name; nothing has changed then.
     """
     target = Path(os.path.realpath(folder)) / name
-    _expect_regular_or_none(target)
+    expect_regular_or_none(target)
     target_stat = target.lstat() if os.path.isfile(target) and not target.is_symlink() else None
     with _open_temporary(target, target_stat, in_place=False) as stream:
         yield stream
@@ -162,7 +155,7 @@ def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
     """
     path = Path(folder) / name
     with open_into(folder, name) as stream:
-        stream.write(_encode_text(content, path) if isinstance(content, str) else content)
+        stream.write(encode_text(content, path) if isinstance(content, str) else content)
     return path
 
 
@@ -223,7 +216,7 @@ def open_to_append(path: Path) -> BinaryIO:
         OSError: it cannot be opened.
         OsimliteError: something else than a regular file has the name.
     """
-    _expect_regular_or_none(path, links=False)
+    expect_regular_or_none(path, links=False)
     flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
     flags |= sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
     return open(os.open(path, flags, 0o666), "ab")
@@ -235,173 +228,12 @@ def expect_folder_inside(folder: Path) -> None:
     Raises:
         OsimliteError: it is such a link.
     """
-    if os.path.islink(folder) and not _is_inside(os.path.realpath(folder), [os.getcwd()]):
+    if os.path.islink(folder) and not is_inside(os.path.realpath(folder), [os.getcwd()]):
         raise OsimliteError(
             f"the results would go through this link to '{os.path.realpath(folder)}', out of the "
             "current folder; name a folder with -o",
             file=str(folder),
         )
-
-
-@dataclass(frozen=True)
-class ResultWriter:
-    """Writer of files that a document names as its results.
-
-    Attributes:
-        trees: real paths of the folders in whose trees files may be written.
-        overwrite: whether any regular file or link may be replaced.
-        outside: whether files may be written outside of the trees.
-    """
-
-    trees: tuple[str, ...]
-    overwrite: bool = False
-    outside: bool = False
-
-    @classmethod
-    def for_document(
-        cls,
-        document: str | Path,
-        output: str | Path | None = None,
-        *,
-        overwrite: bool = False,
-        outside: bool = False,
-    ) -> ResultWriter:
-        """Return the writer for the results of a document.
-
-        Args:
-            document: the file that names the results.
-            output: the folder that the user named for all of them; None if the document decides.
-            overwrite: whether any regular file or link may be replaced.
-            outside: whether files may be written outside of the trees of the project and the
-                current folder.
-        """
-        folders = [project_folder(document), os.getcwd()] if output is None else [output]
-        trees = tuple(dict.fromkeys(map(os.path.realpath, folders)))
-        return cls(trees, overwrite, outside)
-
-    def resolve(self, path: str | Path) -> Path:
-        """Return the real path of a result, after checking all that depends on its name alone.
-
-        Raises:
-            WriteRefusedError: the path leads out of the trees, is hidden, is a link, or its ending
-                is not that of a result.
-        """
-        path = Path(path)
-        real_path = Path(os.path.realpath(path.parent)) / path.name
-        if "\0" in str(path) or path.name in ("", ".", ".."):
-            raise WriteRefusedError("a result needs the name of a file", file=str(path))
-        tree = next((tree for tree in self.trees if _is_inside(real_path, [tree])), None)
-        if tree is None and not self.outside:
-            folders = " and ".join(f"'{tree}'" for tree in self.trees)
-            raise WriteRefusedError(
-                f"the document names a result outside of {folders}; to write there, use "
-                "--write-outside, or name another folder with -o",
-                file=str(real_path),
-            )
-        relative_path = real_path.relative_to(tree) if tree is not None else Path(real_path.name)
-        if any(part.startswith(".") for part in relative_path.parts):
-            raise WriteRefusedError(
-                "the document names a hidden file as a result, which is never written; use another name",
-                file=str(real_path),
-            )
-        if self.overwrite:
-            return real_path
-        # os.path.islink is false, without an error, where a name is too long; writing then says so.
-        if os.path.islink(real_path):
-            raise WriteRefusedError(
-                "the document names a link as a result, and results are not written through links; "
-                "remove it, or replace it with --overwrite",
-                file=str(path),
-            )
-        # OpenSim gives tables of a tool that is called `v1.2` no ending: `v1.2_states`.
-        is_numbered = real_path.suffix[1:2].isdigit()
-        if not is_numbered and not real_path.name.lower().endswith(RESULT_ENDINGS):
-            raise WriteRefusedError(
-                f"the name of a result ends in {', '.join(RESULT_ENDINGS[:-1])} or "
-                f"{RESULT_ENDINGS[-1]}; use such a name, or --overwrite",
-                file=str(real_path),
-            )
-        return real_path
-
-    def expect_replaceable(self, path: Path, beginning: bytes) -> None:
-        """Check that an existing file is a result of the same type, so that it can be replaced.
-
-        Args:
-            path: real path of the result.
-            beginning: first bytes of the new content.
-
-        Raises:
-            WriteRefusedError: another file exists.
-        """
-        _expect_regular_or_none(path)
-        if self.overwrite or not os.path.lexists(path):
-            return
-        existing, kind = read_at_most(path, BEGINNING_BYTES), describe_content(beginning)
-        if existing and not _are_alike(describe_content(existing), kind):
-            raise WriteRefusedError(
-                f"a result would replace this file, which is not {kind or 'such a text'}; move it, "
-                "let the document name another file, or replace it with --overwrite",
-                file=str(path),
-            )
-
-    @contextmanager
-    def written(self, path: str | Path, lines: Iterable[str]) -> Iterator[BinaryIO]:
-        """Write a result under a temporary name, and rename it when the context ends without an error.
-
-        Args:
-            path: path in the document.
-            lines: the text in parts.
-
-        Yields:
-            Stream of the complete temporary file, which is closed already.
-
-        Raises:
-            WriteRefusedError: the file may not be written.
-            OsimliteError: it cannot be written.
-        """
-        real_path = self.resolve(path)
-        chunks = iter(lines)
-        beginning = b""
-        # The chunks of a table may be single lines, and its header says what it is.
-        for chunk in chunks:
-            beginning += _encode_text(chunk, real_path)
-            if len(beginning) >= BEGINNING_BYTES:
-                break
-        self.expect_replaceable(real_path, beginning)
-        make_folder(real_path.parent)
-        with open_into(real_path.parent, real_path.name) as stream:
-            stream.write(beginning)
-            stream.writelines(_encode_text(chunk, real_path) for chunk in chunks)
-            stream.close()
-            yield stream
-
-
-def project_folder(document: str | Path) -> str:
-    """Return the top folder of the project that a document belongs to.
-
-    It is the nearest folder above that has `.git`, `osimlite.toml` or `pyproject.toml`. Without one
-    it is the folder around the document's, because laboratories keep setups and results side by
-    side (`../results`). It is never the home folder, the temporary folder or what is above one of
-    them.
-    """
-    folder = Path(os.path.realpath(document)).parent
-    shared = find_shared_folders()
-    if (marked := _find_marked_folder(folder, shared)) is not None:
-        return marked
-    around = folder.parent
-    return str(folder if str(around) in shared else around)
-
-
-UNNAMED_TABLE = "a table 'UNKNOWN' of OpenSim"
-"""Type of a table without a name, as RRA and CMC write their states."""
-
-
-def _are_alike(present: str | None, new: str | None) -> bool:
-    """Return whether a new text of one type may replace a result of another type."""
-    if present is None or new is None:
-        return False
-    is_table = present == UNNAMED_TABLE and new.startswith("a table '")
-    return present == new or is_table
 
 
 def _list_ancestors(folder: str | Path) -> tuple[Path, ...]:
@@ -422,7 +254,7 @@ def find_shared_folders() -> set[str]:
     }
 
 
-def _find_marked_folder(folder: Path, shared_folders: set[str]) -> str | None:
+def find_marked_folder(folder: Path, shared_folders: set[str]) -> str | None:
     """Return the nearest of a folder and those above it that is marked as the top of a project.
 
     Args:
@@ -441,7 +273,7 @@ def _find_marked_folder(folder: Path, shared_folders: set[str]) -> str | None:
     return None
 
 
-def _is_inside(path: str | Path, folders: Iterable[str | Path]) -> bool:
+def is_inside(path: str | Path, folders: Iterable[str | Path]) -> bool:
     """Return whether a real path is in the tree of one of some folders."""
     return any(Path(path).is_relative_to(os.path.realpath(folder)) for folder in folders)
 
@@ -451,14 +283,14 @@ def _expect_link_inside(path: str | Path, target: Path) -> None:
     if not os.path.islink(path) or os.path.abspath(path).startswith(("/dev/", "/proc/")):
         return
     folder = Path(os.path.realpath(os.path.dirname(os.path.abspath(path))))
-    if not _is_inside(target, [_find_marked_folder(folder, find_shared_folders()) or folder]):
+    if not is_inside(target, [find_marked_folder(folder, find_shared_folders()) or folder]):
         raise WriteRefusedError(
             f"this is a link to '{target}', out of its project, and is not followed; name that file itself",
             file=str(path),
         )
 
 
-def _expect_regular_or_none(path: Path, *, links: bool = True) -> None:
+def expect_regular_or_none(path: Path, *, links: bool = True) -> None:
     """Refuse a path under which there is a folder, a pipe, a device or, unless allowed, a link."""
     try:
         mode = path.lstat().st_mode

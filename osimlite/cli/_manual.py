@@ -113,6 +113,7 @@ PAGES = {
     "osimlite.translate.mjcf_import": "docs/from-mjcf.md",
     "osimlite.translate.nimble": "docs/addbiomechanics.md#models-made-for-nimblephysics",
     "osimlite.view": "docs/viewer.md",
+    "osimlite.base.result_writing": "docs/errors.md#files",
     "osimlite.base.writing": "docs/errors.md#files",
 }
 """Pages and headings by the class of an error, otherwise by the module or package that raised it.

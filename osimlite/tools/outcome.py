@@ -12,8 +12,8 @@ import numpy as np
 
 from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
+from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import format_count, join_words
-from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.old_storage import PRECISION, format_old_table
 from osimlite.io.tables.storage import StoTable, format_adapter_table

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from osimlite.base.files import get_relative_path
 from osimlite.base.progress import report_stage
+from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import format_count, join_words
-from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
 from osimlite.io.document.reader import pause_collector, read_any
 from osimlite.lint.config import Config

@@ -378,7 +378,7 @@ def test_no_table_has_nan_as_a_result(tmp_path: Path, value: float) -> None:
 
 
 def test_tables_of_tools_say_where_they_have_nan(tmp_path: Path) -> None:
-    from osimlite.base.writing import ResultWriter
+    from osimlite.base.result_writing import ResultWriter
     from osimlite.tools.outcome import Outcome
 
     outcome = Outcome()

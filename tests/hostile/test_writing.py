@@ -12,13 +12,8 @@ import pytest
 
 from osimlite import __version__
 from osimlite.base.reading import describe_content
-from osimlite.base.writing import (
-    ResultWriter,
-    WriteRefusedError,
-    project_folder,
-    write_atomically,
-    write_into,
-)
+from osimlite.base.result_writing import ResultWriter, project_folder
+from osimlite.base.writing import WriteRefusedError, write_atomically, write_into
 from osimlite.errors import OsimliteError
 from tests.cli.command import Done, run
 
