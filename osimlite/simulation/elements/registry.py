@@ -91,8 +91,8 @@ FORCE_TYPES = Registry(
         ".force_types.coordinate_forces": "CoordinateLimitForce CoordinateLinearStopForce"
         " ExponentialCoordinateLimitForce ExpressionBasedCoordinateForce SpringGeneralizedForce",
         ".force_types.millard_muscles": "Millard2012AccelerationMuscle Millard2012EquilibriumMuscle",
-        ".force_types.old_muscles": "Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated"
-        " Thelen2003Muscle_Deprecated",
+        ".force_types.old_muscles": "Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated",
+        ".force_types.old_thelen_muscle": "Thelen2003Muscle_Deprecated",
         ".force_types.path_forces": "Blankevoort1991Ligament ClutchedPathSpring ExpressionBasedPathForce Ligament"
         " PathSpring",
         ".force_types.point_forces": "ExpressionBasedPointToPointForce PointToPointSpring PrescribedForce",
