@@ -15,7 +15,8 @@ from lxml import etree
 from osimlite.base.files import get_relative_path, write_atomically
 from osimlite.errors import NotWellFormedError
 from osimlite.io.document.lexical import make_formatter, split_words
-from osimlite.io.document.reader import parse_source, read_tree, read_version
+from osimlite.io.document.parsing import parse_source, read_version
+from osimlite.io.document.reader import read_tree
 from osimlite.io.document.source import Source
 from osimlite.io.document.xml_text import escape_text, format_xml, list_lines, quote_attribute
 from osimlite.schema.base import Component, Object, Unknown

@@ -1,11 +1,12 @@
-"""Reading of documents: lxml parses the text, :mod:`osimlite.io.document.objects` makes the objects."""
+"""Reading of documents, with the files that they include.
+
+:mod:`osimlite.io.document.parsing` makes the element tree, :mod:`osimlite.io.document.objects` the objects.
+"""
 
 from __future__ import annotations
 
 import gc
 import os
-import re
-from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 from lxml import etree
 
-from osimlite.base.files import TABLE_SUFFIXES, expect_size
+from osimlite.base.files import expect_size
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import find_nearest
 from osimlite.errors import (
@@ -21,9 +22,8 @@ from osimlite.errors import (
     MissingFileError,
     NotWellFormedError,
     SpecialFileError,
-    VersionError,
 )
-from osimlite.io.document.names import decode_name, replace_colons
+from osimlite.io.document.names import decode_name
 from osimlite.io.document.notes import Note
 from osimlite.io.document.objects import (
     Included,
@@ -33,28 +33,29 @@ from osimlite.io.document.objects import (
     get_layout,
 )
 from osimlite.io.document.source import Source
-from osimlite.io.document.syntax import check_doctype, locate_error, rephrase_message
-from osimlite.io.document.xml_text import has_only_generated_comments, is_element
+from osimlite.io.document.xml_text import is_element
 from osimlite.schema.base import Object, put_index
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
-from osimlite.schema.registry import find_class, list_tags
+from osimlite.schema.registry import list_tags
 from osimlite.schema.specs import list_holding_properties
 
 if TYPE_CHECKING:
     from osimlite.io.document.plugins import Paths
     from osimlite.io.document.upgrade import Change, Refusal, UpgradeResult
 
-ROOT = "OpenSimDocument"
-"""Tag of the root element."""
-
-OLDEST_VERSION = 10500
-"""Version that is assumed for old documents that do not state one."""
+from osimlite.io.document.parsing import (
+    ROOT,
+    add_suggestion,
+    find_first_element,
+    find_tagged_class,
+    make_version_error,
+    parse_source,
+    read_version,
+)
 
 FIRST_COMPLETE_VERSION = 10901
 """First version of which every property is known; older documents must not contain unknown ones."""
-
-_COUNT = etree.XPath("count(descendant-or-self::*)")
 
 _MIXED = etree.XPath("/descendant::*[*][text()]")
 """Elements that contain both elements and text; the parser removes blank text."""
@@ -240,7 +241,7 @@ def read_tree(
             None
             # A first attempt without renaming: nearly all files have no old class names, and the
             # search for them takes time.
-            if _find_class(_find_first_element(root)) is None
+            if find_tagged_class(find_first_element(root)) is None
             else _build_document(source, root, version, expected_class, None)
         )
         if document is None or any(note.kind in _UNKNOWN_KINDS for note in document.notes):
@@ -292,7 +293,7 @@ def require_stated_version(source: Source) -> None:
         f"<{newer.parent}>, which came with version {newer.since}: one of them is wrong; write "
         f'Version="{CURRENT_VERSION}" if the model is in the current format'
     )
-    raise _make_version_error(source, version, message, number)
+    raise make_version_error(source, version, message, number)
 
 
 def _build_document(
@@ -327,7 +328,7 @@ def _upgrade_tree(source: Source, root: etree._Element, version: int) -> Upgrade
     try:
         return upgrade(root, version)
     except UpgradeError as error:
-        raise _make_version_error(source, version, error.message, error.number) from None
+        raise make_version_error(source, version, error.message, error.number) from None
 
 
 def _map_to_old_text(
@@ -360,179 +361,15 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
         f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and no rule says what becomes of {tags}: that would "
         "be lost; remove it, or open and save the model with OpenSim 2"
     )
-    raise _make_version_error(source, version, message, unknown_notes[0].number)
-
-
-def _make_version_error(
-    source: Source, version: int, message: str, number: int = 0
-) -> VersionError:
-    """Return the error that a document of a version cannot be read, at one of its elements."""
-    fault = source.fault(VersionError, message, source.locate_tag(number))
-    fault.version = version
-    return fault
-
-
-def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
-    """Parse a text to an element tree without namespaces (see :mod:`osimlite.io.document.names`).
-
-    Args:
-        source: the text.
-        recover: continue after syntax errors; the tree is then a guess.
-
-    Raises:
-        NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
-    """
-    # lxml gets UTF-8 whatever the text declares, because the encoding was detected before.
-    data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
-    # OpenSim knows no namespaces: its parser takes a colon for a part of the name.
-    data = replace_colons(data)
-    # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark
-    # before them. lxml rejects them, so they are removed, and their number is added to positions.
-    unmarked = data.removeprefix(BOM_UTF8)
-    body = unmarked.lstrip()
-    if body.startswith(BOM_UTF8):
-        body = data
-    blank = data[: len(data) - len(body)].count(b"\n")
-    plain = has_only_generated_comments(data)
-    parser = etree.XMLParser(
-        encoding="utf-8",
-        # No entities, network or DTD: a model file must not read other files, nor expand to
-        # gigabytes.
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        recover=recover,
-        remove_comments=plain,
-        remove_blank_text=True,
-    )
-    try:
-        root = etree.fromstring(body, parser)
-    except etree.XMLSyntaxError as error:
-        if not body:
-            raise NotWellFormedError(
-                "the file is empty", file=source.file, line=1, column=1
-            ) from None
-        message = str(error.msg or "the text is not XML")
-        raise _make_syntax_error(
-            source, error.position[0] + blank, error.position[1], message
-        ) from None
-    if root is None:
-        raise NotWellFormedError(
-            "not well-formed XML: no element", file=source.file, line=1, column=1
-        )
-    if root.getroottree().docinfo.internalDTD is not None:
-        check_doctype(source)
-        # These warnings come with a DOCTYPE only.
-        for remark in parser.error_log.filter_types(etree.ErrorTypes.WAR_UNDECLARED_ENTITY):
-            # With a DOCTYPE, lxml assumes that an unknown entity is declared elsewhere, and drops
-            # it without an error.
-            raise _make_syntax_error(source, remark.line + blank, remark.column, remark.message)
-    if not recover:
-        source.elements = int(cast("float", _COUNT(root)))
-        source.remarks = not plain
-    return root
-
-
-def _make_syntax_error(source: Source, line: int, column: int, message: str) -> NotWellFormedError:
-    """Return the error for a message of the parser, at the right position and in plain words."""
-    line, column, _ = locate_error(source, line, column, message)
-    words = rephrase_message(message) if "<" in source.text else "there is no element in it"
-    if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
-        words += "; of tables, 'validate', 'info' and 'diff' know more"
-    return NotWellFormedError(
-        f"not well-formed XML: {words}", file=source.file, line=line, column=column
-    )
-
-
-def read_version(source: Source, root: etree._Element) -> int:
-    """Return the version of a document.
-
-    Args:
-        source: the text, for positions in errors.
-        root: root element.
-
-    Raises:
-        DocumentError: the text is not an OpenSim document.
-        VersionError: the version is missing, not a whole number, or too old.
-    """
-    text = root.get("Version")
-    # OpenSim reads a 32-bit integer, which only blanks may follow.
-    # `Version="30000 "` is valid for OpenSim, and `Version="3.0"` is not.
-    digits = None if text is None else re.fullmatch(r"[ \t\r\n]*\+?0*([0-9]{1,10})[ \t\r\n]*", text)
-    number = int(digits[1]) if digits is not None and int(digits[1]) < 2**31 else None
-    if root.tag == ROOT and number is not None and number >= OLDEST_VERSION:
-        return number
-    if text is None and root.tag != ROOT:
-        from osimlite.io.document.upgrade.class_names import RENAMED
-
-        if _find_class(root) is not None or root.tag in RENAMED:
-            return OLDEST_VERSION
-    # Errors follow; the order is from the worst mismatch to the mildest.
-    # Computing a position takes a pass over the text, so it is done for errors only.
-    position = source.locate_tag(0)
-    if root.tag != ROOT:
-        tag = decode_name(root.tag)
-        message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
-        if tag == "mujoco":
-            message += "; this is MJCF (MuJoCo): convert it with 'osimlite convert'"
-        raise _add_suggestion(
-            source.fault(DocumentError, message, position), _guess_root(tag, root)
-        )
-    if number is None:
-        result = (
-            "has no Version"
-            if text is None
-            else f'has Version="{text[:40]}", which is not a whole number'
-        )
-        raise source.fault(
-            VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', position
-        )
-    message = (
-        f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST_VERSION}); "
-        f'write Version="{CURRENT_VERSION}" if the model is in the current format'
-    )
-    raise _make_version_error(source, number, message)
-
-
-def _add_suggestion(fault: DocumentError, suggestion: str | None) -> DocumentError:
-    """Add the tag that was probably meant to an error, if known."""
-    if suggestion is not None:
-        fault.meant = suggestion
-        fault.message += f"; did you mean '{suggestion}'?"
-    return fault
-
-
-def _guess_root(tag: str, root: etree._Element) -> str | None:
-    """Return the likely name of a root: that of a document, or the class of an old setup."""
-    name = tag.rpartition(":")[2]
-    first_element = _find_first_element(root)
-    has_known_object = (
-        first_element is not None
-        and find_nearest(decode_name(first_element.tag), list_tags(), cutoff=85) is not None
-    )
-    # A likely object inside, or a similar name, speaks for the root of a document.
-    return (
-        ROOT
-        if has_known_object or find_nearest(name, [ROOT], cutoff=85) is not None
-        else find_nearest(name, list_tags(), cutoff=85)
-    )
-
-
-def _find_first_element(root: etree._Element) -> etree._Element | None:
-    """Return the element of the document's object."""
-    return next((child for child in root if is_element(child)), None)
-
-
-def _find_class(element: etree._Element | None) -> type[Object] | None:
-    return None if element is None else find_class(decode_name(element.tag))
+    raise make_version_error(source, version, message, unknown_notes[0].number)
 
 
 def _read_top(
     source: Source, root: etree._Element, reader: ObjectReader, expected_class: type[Object]
 ) -> Object:
     """Read the object of a document, with the comments around it."""
-    first_element = _find_first_element(root)
-    cls = _find_class(first_element)
+    first_element = find_first_element(root)
+    cls = find_tagged_class(first_element)
     if first_element is None or cls is None or not issubclass(cls, expected_class):
         tag = ""
         if first_element is None:
@@ -551,7 +388,7 @@ def _read_top(
                 tag, list_tags() if expected_class is Object else [expected_class.tag]
             )
         )
-        raise _add_suggestion(
+        raise add_suggestion(
             source.fault(DocumentError, f"the document holds {description}", position), suggestion
         )
     # Element 0 is the root, 1 the object.

@@ -9,14 +9,8 @@ from lxml import etree
 from osimlite.base.records import dataclass, field
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
 from osimlite.io.document.names import decode_name
-from osimlite.io.document.reader import (
-    ROOT,
-    Document,
-    parse_source,
-    read_document,
-    read_tree,
-    read_version,
-)
+from osimlite.io.document.parsing import ROOT, parse_source, read_version
+from osimlite.io.document.reader import Document, read_document, read_tree
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION, Model

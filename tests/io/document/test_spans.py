@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.io.document.reader import parse_source
+from osimlite.io.document.parsing import parse_source
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import PlainSpans, Span, find_markup, find_spans
 
