@@ -36,7 +36,8 @@ from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import GeometryPath, PathPoint
-from osimlite.simulation.static_optimization import StaticOptimization, make_ideal_actuator
+from osimlite.simulation.ideal_actuators import make_ideal_actuator
+from osimlite.simulation.static_optimization import StaticOptimization
 
 if TYPE_CHECKING:
     from pathlib import Path

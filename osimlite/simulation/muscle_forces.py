@@ -24,7 +24,8 @@ from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.simulation.inverse_dynamics import add_forces, prepare_motion, resolve_loads
 from osimlite.simulation.recorded_motion import MotionSource, RecordedMotion
-from osimlite.simulation.static_optimization import TITLE, SharedForces, StaticOptimization
+from osimlite.simulation.shared_forces import TITLE, SharedForces
+from osimlite.simulation.static_optimization import StaticOptimization
 
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.base.progress import divide_rows
-from osimlite.base.records import dataclass
-from osimlite.base.text import format_count, join_words, suggest_or_list
+from osimlite.base.text import join_words, suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.effort import effort_size
@@ -26,20 +25,13 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import (
-    ActivationCoordinateActuator,
-    Actuator,
-    CoordinateActuator,
-    PointActuator,
-    PointToPointActuator,
-    ScalarActuator,
-    TorqueActuator,
-)
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Muscle, PathActuator
+from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.linking import select_code
+from osimlite.simulation.ideal_actuators import replace_by_ideal_actuators
+from osimlite.simulation.shared_forces import SharedForces
 from osimlite.simulation.system import System
 from osimlite.simulation.trajectory import label_as_opensim
 
@@ -50,100 +42,9 @@ RATE_TOLERANCE = 1e-9
 """Rates of coordinates that differ by no more are equal."""
 MUSCLES = ("active", "isometric")
 """Models of muscle force: fully active fibers along a rigid tendon, or max_isometric_force."""
-TITLE = "Static Optimization"
-"""OpenSim's name of the table of activations."""
 
 FORCES_TITLE = "ModelForces"
 """OpenSim's name of the table of forces."""
-
-
-def make_ideal_actuator(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | None:
-    """Return an actuator whose force is its control times a constant, in place of another one.
-
-    Args:
-        actuator: the actuator to replace.
-        optimal_force: the constant, N or N m.
-
-    Returns:
-        The replacement; None for an unsupported class.
-    """
-    if isinstance(actuator, PathActuator):
-        path = actuator.geometry_path.copy_deep()
-        result: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
-    elif isinstance(actuator, ActivationCoordinateActuator):
-        result = CoordinateActuator(name=actuator.name, coordinate=actuator.coordinate)
-    elif isinstance(
-        actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator
-    ):
-        result = actuator.copy_deep()
-    else:
-        return None
-    result.appliesForce, result.optimal_force = actuator.appliesForce, optimal_force
-    return result
-
-
-@dataclass(frozen=True, eq=False)
-class SharedForces:
-    """Distribution of the generalized forces of a motion over the actuators.
-
-    Attributes:
-        times: times (t,), s.
-        names: names of the actuators (a,).
-        activations: activations (t, a); NaN at times without a solution.
-        strengths: force of each actuator at an activation of 1 (t, a), N or N m.
-        coordinates: names of the coordinates to accelerate (m,).
-        lacking: generalized forces (t, m) that the actuators cannot supply, N or N m; the smallest
-            possible ones at times without a solution.
-        solved: whether each time has a solution (t,).
-    """
-
-    times: Array
-    names: tuple[str, ...]
-    activations: Array
-    strengths: Array
-    coordinates: tuple[str, ...]
-    lacking: Array
-    solved: NDArray[np.bool_]
-
-    @property
-    def forces(self) -> Array:
-        """Forces of all actuators (t, a), N or N m."""
-        return self.activations * self.strengths
-
-    def to_table(self) -> StoTable:
-        """Return the activations as a table."""
-        return StoTable(TITLE, self.times, self.names, self.activations)
-
-    def describe_lack(self, row: int) -> str:
-        """Describe which coordinates lack force at a time without a solution.
-
-        Args:
-            row: index of the time.
-
-        Returns:
-            Generalized forces by coordinate, the largest first; those below a tenth of it are left
-            out.
-        """
-        sizes = np.abs(self.lacking[row])
-        worst = [index for index in np.argsort(-sizes) if sizes[index] > 0.1 * sizes.max()]
-        return join_words(
-            [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], max_count=3
-        )
-
-    def describe_unsolved(self) -> str:
-        """Describe the times without a solution and the coordinates that lack force.
-
-        Returns:
-            A phrase for a message; empty if every time has a solution.
-        """
-        failed = np.flatnonzero(~self.solved)
-        if not len(failed):
-            return ""
-        worst = failed[np.argmax(np.abs(self.lacking[failed]).max(axis=1))]
-        return (
-            f"no solution at {len(failed)} of {format_count(len(self.times), 'time')}, from {self.times[failed[0]]:g} s "
-            f"on, where nothing is written; at {self.times[worst]:g} s the actuators lack {self.describe_lack(worst)}"
-        )
 
 
 class StaticOptimization:
@@ -196,7 +97,7 @@ class StaticOptimization:
         # Probes are not reported here, and those of muscles would refer to muscles that are
         # replaced below.
         model.probe_set.objects.clear()
-        self._actuators = _replace_by_ideal_actuators(model, muscles != "isometric")
+        self._actuators = replace_by_ideal_actuators(model, muscles != "isometric")
         tree = model.tree()
         self._paths = [tree.path_of(item) or "" for item in self._actuators]
         self._forces = force_elements(
@@ -661,51 +562,3 @@ def minimize_effort(
         sizes[0] = rows.stop - rows.start
         entry(sizes, numbers, inputs[rows], result[rows], work)
     return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
-
-
-def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarActuator]:
-    """Replace all actuators but muscles with fibers by ideal ones.
-
-    Args:
-        model: the model, which is changed.
-        physiology: whether muscles keep their fibers; else they become ideal actuators, too.
-
-    Returns:
-        The actuators that act, in the order of the model.
-
-    Raises:
-        UnsupportedError: the force of an actuator is not proportional to its control.
-        ModelError: there are no actuators.
-    """
-    # By identity, as forces may share a name.
-    force_indices = {id(force): number for number, force in enumerate(model.force_set.objects)}
-    result: list[ScalarActuator] = []
-    for item in list(model.components(Actuator)):
-        if not item.appliesForce:
-            continue
-        if not isinstance(item, ScalarActuator):
-            raise UnsupportedError(
-                f"'{item.name}' is a {type(item).__name__}, which has no single control"
-            )
-        if not (isinstance(item, Muscle) and physiology):
-            force = (
-                item.max_isometric_force
-                if isinstance(item, Muscle)
-                else getattr(item, "optimal_force", 0.0)
-            )
-            ideal_actuator = make_ideal_actuator(item, force)
-            if ideal_actuator is None or id(item) not in force_indices:
-                message = f"'{item.name}' ({type(item).__name__}) has a force that is not proportional to its control"
-                raise UnsupportedError(f"{message}; set its appliesForce to false")
-            # The control keeps its bounds, so that a muscle still only pulls.
-            ideal_actuator.min_control, ideal_actuator.max_control = (
-                item.min_control,
-                item.max_control,
-            )
-            model.force_set.objects[force_indices[id(item)]] = item = ideal_actuator
-        result.append(item)
-    if not result:
-        raise ModelError(
-            f"'{model.name}' has no actuators; add some, such as reserves of a ForceSet with --forces"
-        )
-    return result

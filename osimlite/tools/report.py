@@ -21,7 +21,7 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.static_optimization import TITLE as ACTIVATION_TITLE
+from osimlite.simulation.shared_forces import TITLE as ACTIVATION_TITLE
 from osimlite.tools.evidence import (
     Evidence,
     Steps,

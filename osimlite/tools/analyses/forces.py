@@ -17,8 +17,8 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.tools.analyses import Actuation, JointReaction
 from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.ideal_actuators import make_ideal_actuator
 from osimlite.simulation.run_controls import add_controls
-from osimlite.simulation.static_optimization import make_ideal_actuator
 from osimlite.tools.dynamics_setup import build_simulation
 from osimlite.tools.motion import AnalysisTables, Motion
 from osimlite.tools.reaction_forces import JointWrenches

@@ -11,7 +11,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis, StaticOptimization
 from osimlite.simulation.elements.muscle import SPRING
 from osimlite.simulation.paths import Paths
-from osimlite.simulation.static_optimization import SharedForces
+from osimlite.simulation.shared_forces import SharedForces
 from osimlite.tools.analyses.reporters import FORCES_DESCRIPTION
 from osimlite.tools.dynamics_setup import build_static_optimization
 from osimlite.tools.motion import AnalysisTables, Motion
