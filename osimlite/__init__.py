@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from osimlite.fitting.modifying.words import modify as modify
     from osimlite.fitting.person import fit as fit
     from osimlite.fitting.scale_tool import scale as scale
-    from osimlite.io.b3d.subject import read_b3d as read_b3d
+    from osimlite.io.b3d.reader import read_b3d as read_b3d
     from osimlite.io.document.plugins import classes_in as classes_in
     from osimlite.io.document.printer import to_text as to_text
     from osimlite.io.document.printer import write as write
@@ -92,7 +92,7 @@ FUNCTIONS = {
     "casadi": "osimlite.derivatives.functions",
     "classes_in": "osimlite.io.document.plugins",
     "read": "osimlite.io.document.reader",
-    "read_b3d": "osimlite.io.b3d.subject",
+    "read_b3d": "osimlite.io.b3d.reader",
     "read_document": "osimlite.io.document.reader:read_any",
     "read_text": "osimlite.io.document.reader",
     "write": "osimlite.io.document.printer",

@@ -12,7 +12,8 @@ import numpy as np
 from osimlite.base.files import make_folder, write_atomically
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.io.b3d.messages import MISSING_FORCE_REASONS, PASS_FIELDS, PASS_TYPES
-from osimlite.io.b3d.subject import B3dTrial, read_b3d
+from osimlite.io.b3d.reader import read_b3d
+from osimlite.io.b3d.subject import B3dTrial
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.io.tables.writers import write_trc

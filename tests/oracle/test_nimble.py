@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.io.b3d.subject import B3dTrial, read_b3d
+from osimlite.io.b3d.reader import read_b3d
+from osimlite.io.b3d.subject import B3dTrial
 from osimlite.io.nimble import list_coordinates
 from osimlite.mechanics.multibody.dynamics import Wrench
 from osimlite.mechanics.multibody.mechanism import Mechanism

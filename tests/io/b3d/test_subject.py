@@ -14,7 +14,8 @@ pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
 import osimlite
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
 from osimlite.io.b3d.messages import HEADER, PASS_FIELDS
-from osimlite.io.b3d.subject import find_pressure_centers, read_b3d
+from osimlite.io.b3d.reader import read_b3d
+from osimlite.io.b3d.subject import find_pressure_centers
 from tests.io import b3d_files as files
 
 
