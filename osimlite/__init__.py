@@ -152,4 +152,4 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     from osimlite.schema.registry import MODULES
 
-    return sorted({*globals(), *FUNCTIONS, *MODULES})
+    return sorted({*globals(), *FUNCTIONS, *MODULES} - {"FUNCTIONS"})
