@@ -7,7 +7,7 @@ import html
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,49 +17,38 @@ from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M
 from osimlite.io.document.cache import get_object
-from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.shared_forces import TITLE as ACTIVATION_TITLE
-from osimlite.tools.evidence import (
-    Evidence,
-    Steps,
-    find_root_coordinates,
-    split_side,
-    try_find_steps,
+from osimlite.tools.evidence import Evidence
+from osimlite.tools.outcome import Outcome
+from osimlite.tools.trial_curves import (
+    TrialCurve,
+    TrialOutcomes,
+    collect_actuators,
+    collect_angles,
+    collect_contacts,
+    collect_controls,
+    collect_moments,
+    collect_trials,
+    create_recording,
+    find_root_names,
+    read_muscle_states,
+    select_dynamics_tables,
 )
-from osimlite.tools.outcome import DYNAMICS_TITLE, Outcome
 from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.motion import contact_forces
 from osimlite.view.page import page_data, page_text
-from osimlite.view.panels import (
-    COLORS,
-    STYLES,
-    Column,
-    Panel,
-    draw_pages,
-    group_columns,
-    has_cycles,
-    make_figure,
-    merge_panels,
-)
-from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
+from osimlite.view.panels import COLORS, Panel, draw_pages, has_cycles, make_figure
+from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.shown import Shown
-from osimlite.view.table_plots import SECTIONS, ColumnNames, describe_columns
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
 """Color and name of the curves of each side."""
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Points of the gait cycle at which curves are drawn, %."""
-MIN_ANGLE_CHANGE_RAD = 1e-4
-"""Smallest range of an angle that is drawn, rad."""
 MAX_NAMED_MARKERS = 12
 """Number of markers whose errors are shown by name."""
-STATIC_FRAMES = "HalfSpace", "ground"
-"""Frames of contact forces on the immobile side of a contact."""
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; max-width: 1120px; margin: 0 auto;
   padding: 0 20px 60px }
@@ -81,45 +70,6 @@ img { max-width: 100%; height: auto; display: block }
 
 NO_SIDEBAR_STYLE = "body{grid-template-columns:1fr!important}aside{display:none!important}"
 """Style that hides the lists at the sides of the viewer."""
-
-
-class TrialOutcomes(NamedTuple):
-    """Outcomes of the setups of one trial."""
-
-    name: str  # name of the trial
-    outcomes: Sequence[Outcome]  # outcomes of its setups
-    setups: Sequence[Path] = ()  # the setups, in the same order
-
-    @property
-    def evidence(self) -> Evidence | None:
-        """Motion of the trial, preferably one with measured markers; None without any."""
-        result = [outcome.evidence for outcome in self.outcomes if outcome.evidence is not None]
-        return min(result, key=lambda evidence: evidence.measured is None, default=None)
-
-    @property
-    def steps(self) -> dict[str, Steps]:
-        """Steps of the feet, from the measured loads of any setup.
-
-        Returns:
-            Steps by side ("r" or "l"); empty without measured loads.
-        """
-        result = (
-            try_find_steps(outcome.evidence)
-            for outcome in self.outcomes
-            if outcome.evidence is not None
-        )
-        return next((steps for steps in result if steps), {})
-
-
-class _Curve(NamedTuple):
-    """Curve of a quantity over time."""
-
-    times: Array
-    column: Array
-    side: str
-    style: str
-    label: str
-    steps: Mapping[str, Steps]
 
 
 def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
@@ -153,20 +103,6 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     )
     write_atomically(path, page)
     return Path(path)
-
-
-def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[TrialOutcomes]:
-    """Group outcomes by the folders of their setups."""
-    by_folder: dict[Path, dict[Path, Outcome]] = {}
-    for setup, outcome in outcomes.items():
-        by_folder.setdefault(Path(setup).resolve().parent, {})[Path(setup)] = outcome
-    titles = [outcome.title for outcome in outcomes.values()]
-    # The name of a single study says more than that of its folder.
-    study_name = titles[0] if len(titles) == 1 else ""
-    return [
-        TrialOutcomes(study_name or folder.name, [*group.values()], [*group])
-        for folder, group in by_folder.items()
-    ]
 
 
 def _render_trials(trials: Sequence[TrialOutcomes]) -> Iterator[str]:
@@ -236,106 +172,6 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     )
 
 
-def read_muscle_states(trial: TrialOutcomes) -> dict[str, Array]:
-    """Return the activations of muscles that a tool has computed, at the times of the trial's motion.
-
-    Args:
-        trial: a trial with a motion.
-
-    Returns:
-        Activations by state labels; none if the motion has states itself.
-    """
-    evidence = trial.evidence
-    assert evidence is not None
-    if evidence.states:
-        return {}
-    result = {}
-    for outcome in trial.outcomes:
-        for table in outcome.tables.values():
-            if not len(table.times):
-                continue
-            for label, column in zip(table.columns, table.rows.T, strict=True):
-                if table.name == ACTIVATION_TITLE:
-                    label = f"{label}.activation"
-                elif not label.endswith("/activation"):
-                    continue
-                result[label] = np.interp(evidence.times, table.times, np.nan_to_num(column))
-    return result
-
-
-def collect_actuators(
-    trials: Sequence[TrialOutcomes],
-) -> list[tuple[str, str, list[Panel]]]:
-    """Return the panels of activations, muscle forces, reserves and residuals.
-
-    Args:
-        trials: trials that have a motion.
-
-    Returns:
-        Title, note and panels of each section that has any.
-    """
-    sections: dict[str, list[Panel]] = {"activation": [], "muscle": [], "other": []}
-    for number, trial in enumerate(trials):
-        evidence = trial.evidence
-        assert evidence is not None
-        names = ColumnNames.from_model(evidence.model, build_mechanism(evidence.model))
-        for outcome in trial.outcomes:
-            for table in outcome.tables.values():
-                for section, columns in _divide_actuators(table, names).items():
-                    panels, _ = group_columns(
-                        columns,
-                        table.times,
-                        steps=trial.steps,
-                        style=STYLES[number % 3],
-                        label=trial.name,
-                    )
-                    sections[section] += panels
-    titles = {
-        "activation": (
-            "Muscle activations",
-            "0 is at rest, 1 is fully active. Dashed red: the limits of the model.",
-        ),
-        "muscle": ("Muscle forces", "Dashed red: max_isometric_force."),
-        "other": (
-            "Reserves and residuals",
-            "Forces and moments that no muscle makes; ideally small. Dashed red: the limits of the "
-            "model; the last table has published ones.",
-        ),
-    }
-    return [
-        (*titles[section], merge_panels(panels)) for section, panels in sections.items() if panels
-    ]
-
-
-def _divide_actuators(table: StoTable, names: ColumnNames) -> dict[str, list[Column]]:
-    """Return the columns of activations, of muscle forces and of other actuators of a table."""
-    result: dict[str, list[Column]] = {}
-    if table.name == ACTIVATION_TITLE:
-        columns = [
-            column for column in describe_columns(table, names) if column.name in names.regions
-        ]
-        result["activation"] = [_limit(column, names.control_limits) for column in columns]
-    elif table.name in ("ActuatorForces", "ModelForces"):
-        for column in describe_columns(table, names):
-            if column.name in names.regions:
-                result.setdefault("muscle", []).append(_limit(column, names.force_limits))
-            elif column.name in names.units:
-                result.setdefault("other", []).append(_limit(column, names.force_limits))
-    else:
-        columns = [
-            _limit(column._replace(section=""), names.control_limits)
-            for column in describe_columns(table, names)
-            if column.section == SECTIONS["activation"]
-        ]
-        result["activation"] = columns
-    return result
-
-
-def _limit(column: Column, limits: Mapping[str, tuple[float, ...]]) -> Column:
-    """Return a column with the limits of its actuator."""
-    return column._replace(limits=limits.get(column.name, ()))
-
-
 def _render_panels(title: str, note: str, panels: Sequence[Panel]) -> Iterator[str]:
     """Yield the HTML of pages of panels."""
     axis_note = "Over the gait cycle." if has_cycles(panels) else "Over time."
@@ -365,7 +201,7 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
             for name in names
         ]
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known_indices])
-    motion = _create_recording(
+    motion = create_recording(
         replace(evidence, states={**evidence.states, **states}), mechanism, measured
     )
     viewer = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
@@ -376,163 +212,7 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
     return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
 
 
-def _create_recording(
-    evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None
-) -> Recording:
-    """Return the motion for the viewer, with contact forces if the speeds are known."""
-    speeds = evidence.speeds
-    forces = dict[str, Array]()
-    if speeds is None:
-        speeds = np.zeros_like(evidence.values)
-    else:
-        folder = evidence.file.parent
-        forces = compute_forces(
-            evidence.model, mechanism, evidence.times, evidence.values, speeds, folder
-        )
-    return Recording(
-        evidence.times,
-        evidence.coordinates,
-        evidence.values,
-        speeds,
-        forces,
-        evidence.states,
-        measured=measured,
-    )
-
-
-def collect_angles(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
-    """Return the curves of joint angles in degrees by coordinate, without its side.
-
-    Args:
-        trials: trials that have a motion.
-
-    Returns:
-        Curves by the title of their panel.
-    """
-    panels: dict[str, list[_Curve]] = {}
-    for number, trial in enumerate(trials):
-        evidence = trial.evidence
-        assert evidence is not None
-        for index, name in enumerate(evidence.coordinates):
-            column = evidence.values[:, index]
-            # Locked and unused coordinates would only take up space.
-            if not evidence.turning[index] or np.ptp(column) < MIN_ANGLE_CHANGE_RAD:
-                continue
-            stem, side = split_side(name)
-            panels.setdefault(f"{stem} (deg)", []).append(
-                _Curve(
-                    evidence.times,
-                    np.degrees(column),
-                    side,
-                    STYLES[number % 3],
-                    trial.name,
-                    trial.steps,
-                )
-            )
-    return panels
-
-
-def collect_moments(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
-    """Return the curves of generalized forces, without those at the root.
-
-    Args:
-        trials: trials that have a motion.
-
-    Returns:
-        Curves by the title of their panel.
-    """
-    panels: dict[str, list[_Curve]] = {}
-    for number, trial in enumerate(trials):
-        for outcome in trial.outcomes:
-            root = _find_root_names(outcome.evidence)
-            for table in _select_dynamics_tables(outcome):
-                for label in table.columns:
-                    name, _, quantity = label.rpartition("_")
-                    # Generalized forces at the root are residuals, which have a section of their
-                    # own.
-                    if name in root or quantity not in ("moment", "force"):
-                        continue
-                    stem, side = split_side(name)
-                    unit = "N m" if quantity == "moment" else "N"
-                    line = _Curve(
-                        table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps
-                    )
-                    panels.setdefault(f"{stem} ({unit})", []).append(line)
-    return panels
-
-
-def collect_controls(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
-    """Return the curves of controls by name, without the side.
-
-    Args:
-        trials: trials that have a motion.
-
-    Returns:
-        Curves by the title of their panel.
-    """
-    panels: dict[str, list[_Curve]] = {}
-    for number, trial in enumerate(trials):
-        evidence = trial.evidence
-        if evidence is None or evidence.controls is None:
-            continue
-        for label in evidence.controls.columns:
-            stem, side = split_side(label.rpartition("/")[2])
-            column = evidence.controls[label]
-            times = evidence.controls.times
-            is_known = np.isfinite(column)
-            line = _Curve(
-                times[is_known], column[is_known], side, STYLES[number % 3], trial.name, {}
-            )
-            panels.setdefault(stem, []).append(line)
-    return panels
-
-
-def collect_contacts(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
-    """Return the curves of contact forces on each side by axis.
-
-    Args:
-        trials: trials that have a motion.
-
-    Returns:
-        Curves by the title of their panel.
-    """
-    panels: dict[str, list[_Curve]] = {}
-    for number, trial in enumerate(trials):
-        evidence = trial.evidence
-        if evidence is None or evidence.speeds is None:
-            continue
-        sums: dict[str, Array] = {}
-        for force in contact_forces(_create_recording(evidence, build_mechanism(evidence.model))):
-            # Both sides of a contact have a force; they are opposite, so that their sum would
-            # vanish.
-            if force.frame not in STATIC_FRAMES:
-                side = split_side(force.element)[1]
-                sums[side] = sums.get(side, 0.0) + force.vectors
-        for axis, name in enumerate("xyz"):
-            for side, vectors in sums.items():
-                # Planar models have no forces along z.
-                if np.ptp(vectors[:, axis]) > 0.0:
-                    line = _Curve(
-                        evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {}
-                    )
-                    panels.setdefault(f"along {name} (N)", []).append(line)
-    return panels
-
-
-def _select_dynamics_tables(outcome: Outcome) -> list[Any]:
-    """Return the tables of inverse dynamics."""
-    return [table for table in outcome.tables.values() if table.name == DYNAMICS_TITLE]
-
-
-def _find_root_names(evidence: Evidence | None) -> set[str]:
-    """Return the names of the coordinates of the joint between the model and ground."""
-    if evidence is None:
-        return set()
-    mechanism = build_mechanism(evidence.model)
-    return {mechanism.coordinates[index].name for index in find_root_coordinates(mechanism)}
-
-
-def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[str]:
+def _render_section(title: str, panels: Mapping[str, list[TrialCurve]]) -> Iterator[str]:
     """Yield the HTML of a figure with one panel for each quantity."""
     if not panels:
         return
@@ -570,7 +250,7 @@ def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[
     yield f'<h2>{title}</h2><p class="note">{note}</p>{_render_image(figure)}'
 
 
-def _draw_curve(panel: Any, line: _Curve, *, cyclic: bool) -> None:
+def _draw_curve(panel: Any, line: TrialCurve, *, cyclic: bool) -> None:
     """Draw a curve over time, or each gait cycle and their mean."""
     color, _ = SIDES[line.side]
     if not cyclic:
@@ -597,8 +277,8 @@ def _draw_curve(panel: Any, line: _Curve, *, cyclic: bool) -> None:
 def _render_residuals(trial: TrialOutcomes, name: str) -> Iterator[str]:
     """Yield the HTML of figures of residual forces and moments."""
     for outcome in trial.outcomes:
-        root = _find_root_names(outcome.evidence)
-        for table in _select_dynamics_tables(outcome):
+        root = find_root_names(outcome.evidence)
+        for table in select_dynamics_tables(outcome):
             labels_by_unit = {
                 unit: [
                     label
@@ -697,7 +377,7 @@ def _draw_errors(
     return figure
 
 
-def _add_legend(figure: Any, lines: Sequence[_Curve]) -> None:
+def _add_legend(figure: Any, lines: Sequence[TrialCurve]) -> None:
     """Add a legend of sides and trials to a figure."""
     # matplotlib is optional, so that this module can be imported without it.
     from matplotlib.lines import Line2D

@@ -15,7 +15,7 @@ from osimlite.optimal.simulation_check import check_by_simulation
 from osimlite.tools.job import Job
 from osimlite.tools.moco_tools import report_solution
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.report import collect_contacts, collect_controls, collect_trials
+from osimlite.tools.trial_curves import collect_contacts, collect_controls, collect_trials
 from osimlite.view.motion import contact_forces
 from osimlite.view.recording import read_recording
 

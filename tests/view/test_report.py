@@ -19,7 +19,8 @@ from osimlite.io.tables.storage import write_sto
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.tools.evidence import find_root_coordinates, find_steps, split_side
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.report import TrialOutcomes, collect_angles, collect_moments, report
+from osimlite.tools.report import report
+from osimlite.tools.trial_curves import TrialOutcomes, collect_angles, collect_moments
 from tests.cli.command import run
 from tests.fitting.support import free_body
 from tests.tools.support import make_trial
@@ -186,7 +187,7 @@ def test_a_report_of_muscle_forces_has_them_and_names_its_tools(tmp_path: Path) 
 
 
 def test_activations_of_a_tool_color_the_muscles(tmp_path: Path) -> None:
-    from osimlite.tools.report import collect_trials, read_muscle_states
+    from osimlite.tools.trial_curves import collect_trials, read_muscle_states
     from tests.labs import copy_lab
 
     copy_lab("unbalanced", tmp_path)
