@@ -14,6 +14,7 @@ PARTS = (
     "mechanics/multibody/constraint_records.py",
     "mechanics/multibody/dynamics.py",
     "mechanics/multibody/formula.py",
+    "mechanics/multibody/formula_steps.py",
     "mechanics/multibody/function_tables.py",
     "mechanics/multibody/functions.py",
     "mechanics/multibody/joints.py",
