@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import Bounds, compute_midpoint, compute_scaling, read_range
+from osimlite.schema.model import Model
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -232,3 +234,26 @@ def _resample_column(times: Array, column: Array, new_times: Array) -> Array:
     return SampledCurves(times[is_known], column[is_known][:, None]).derivatives(new_times, (0,))[
         0
     ][:, 0]
+
+
+def number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
+    """Number the equations of a model's constraints.
+
+    Args:
+        model: model.
+        count: number of equations.
+
+    Returns:
+        Number of its constraint, and row within the constraint, of each equation.
+    """
+    # Other classes have one equation.
+    sizes = {"WeldConstraint": 6, "PointConstraint": 3}
+    rows: list[tuple[int, int]] = []
+    constraints: Mapping[str, Any] = {
+        constraint.path: constraint for constraint in model.constraint_set.objects
+    }
+    enforced = [constraint for constraint in constraints.values() if constraint.isEnforced]
+    for number, constraint in enumerate(enforced):
+        rows += [(number, row) for row in range(sizes.get(type(constraint).tag, 1))]
+    # A constraint with another number of equations: their names count them one by one then.
+    return rows if len(rows) == count else [(row, 0) for row in range(count)]

@@ -278,3 +278,22 @@ def make_projection(
         return on_line if owner.projection == "vector" else vector - on_line
 
     return project
+
+
+def compute_projection_distance(point: PointSymbols) -> Formula:
+    """Return the squared distance by which states are projected at a point; zero at points without one."""
+    return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
+
+
+def sum_scaled_squares(
+    selection: str | slice, scaling: tuple[float, float], point: PointSymbols
+) -> Formula:
+    """Return the sum of squares of scaled multipliers or derivatives that are variables.
+
+    Args:
+        selection: "multipliers", or the slice of the derivatives.
+        scaling: factor and offset of the scaling.
+        point: point of the grid.
+    """
+    column = point.multipliers if isinstance(selection, str) else point.derivatives[selection]
+    return casadi.sumsqr((column - scaling[1]) / scaling[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.derivatives.functions import CasadiModel
-from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SettingError
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
@@ -26,15 +25,15 @@ from osimlite.optimal.bounds import (
 )
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.goals import GOAL_BUILDERS
-from osimlite.optimal.layout import PROJECTION_SUFFIX
+from osimlite.optimal.layout import PROJECTION_SUFFIX, number_equations
 from osimlite.optimal.path_constraints import PATH_CONSTRAINT_BUILDERS
 from osimlite.optimal.point import (
     ConstraintRows,
-    Formula,
     GoalTerms,
-    PointSymbols,
     TimeFunction,
+    compute_projection_distance,
     make_integral_terms,
+    sum_scaled_squares,
 )
 from osimlite.optimal.prescribed_motion import (
     Motion,
@@ -399,13 +398,13 @@ class Problem(StudyContext):
                 )
                 yield (
                     MocoControlGoal(name=name, weight=weight),
-                    make_integral_terms(partial(_sum_scaled_squares, selection, scaling)),
+                    make_integral_terms(partial(sum_scaled_squares, selection, scaling)),
                 )
         if solver.minimize_state_projection_distance and self.uses_projection:
             goal = MocoControlGoal(
                 name="state_projection", weight=solver.state_projection_distance_weight
             )
-            yield goal, replace(make_integral_terms(_compute_projection_distance), is_sum=True)
+            yield goal, replace(make_integral_terms(compute_projection_distance), is_sum=True)
 
     def _is_acting(self, control: str) -> bool:
         """Return whether the actuator of a control applies its force.
@@ -456,7 +455,7 @@ class Problem(StudyContext):
         )
         return [
             f"cid{first_number + number}_p{row}"
-            for number, row in _number_equations(self.model, count)
+            for number, row in number_equations(self.model, count)
         ]
 
     def _check_constraint_method(self, count: int) -> None:
@@ -582,45 +581,3 @@ class Problem(StudyContext):
             return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
         is_corrected = self.has_constraints and self.solver.enforce_constraint_derivatives
         return [f"gamma_{name}" for name in self.constraint_names] if is_corrected else []
-
-
-def _compute_projection_distance(point: PointSymbols) -> Formula:
-    """Return the squared distance by which states are projected at a point; zero at points without one."""
-    return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
-
-
-def _sum_scaled_squares(
-    selection: str | slice, scaling: tuple[float, float], point: PointSymbols
-) -> Formula:
-    """Return the sum of squares of scaled multipliers or derivatives that are variables.
-
-    Args:
-        selection: "multipliers", or the slice of the derivatives.
-        scaling: factor and offset of the scaling.
-        point: point of the grid.
-    """
-    column = point.multipliers if isinstance(selection, str) else point.derivatives[selection]
-    return casadi.sumsqr((column - scaling[1]) / scaling[0])
-
-
-def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
-    """Number the equations of a model's constraints.
-
-    Args:
-        model: model.
-        count: number of equations.
-
-    Returns:
-        Number of its constraint, and row within the constraint, of each equation.
-    """
-    # Other classes have one equation.
-    sizes = {"WeldConstraint": 6, "PointConstraint": 3}
-    rows: list[tuple[int, int]] = []
-    constraints: Mapping[str, Any] = {
-        constraint.path: constraint for constraint in model.constraint_set.objects
-    }
-    enforced = [constraint for constraint in constraints.values() if constraint.isEnforced]
-    for number, constraint in enumerate(enforced):
-        rows += [(number, row) for row in range(sizes.get(type(constraint).tag, 1))]
-    # A constraint with another number of equations: their names count them one by one then.
-    return rows if len(rows) == count else [(row, 0) for row in range(count)]
