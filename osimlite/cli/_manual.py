@@ -64,6 +64,7 @@ PAGES = {
     "osimlite.mechanics.multibody": "docs/constraints.md",
     "osimlite.mechanics.multibody.assembly": "docs/constraints.md#assemble-the-initial-state",
     "osimlite.mechanics.multibody.mechanism": "docs/from-opensim.md#kinematics-and-dynamics",
+    "osimlite.mechanics.multibody.structure": "docs/from-opensim.md#kinematics-and-dynamics",
     "osimlite.base.reading": "docs/errors.md#files",
     "osimlite.studies.reflexes": "docs/reflexes.md",
     "osimlite.optimal": "docs/optimal-control.md",

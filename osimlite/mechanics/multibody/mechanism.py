@@ -9,20 +9,18 @@ in its parent frame.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import format_count, suggest_name
-from osimlite.errors import ModelError
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import format_count
 from osimlite.mechanics.multibody import dynamics
 from osimlite.mechanics.multibody.assembly import assemble_pose, project_speeds
-from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock, PrescribedCoordinate
+from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.mechanics.multibody.dynamics import MassCentres, Wrench
 from osimlite.mechanics.multibody.extremes import methods_of_any_numbers
 from osimlite.mechanics.multibody.joints import Mobilizer
@@ -38,6 +36,7 @@ from osimlite.mechanics.multibody.parts import (
 )
 from osimlite.mechanics.multibody.program import PackedMechanism
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.mechanics.multibody.structure import MechanismStructure, Values, make_vector
 
 __all__ = [
     "GROUND",
@@ -50,61 +49,17 @@ __all__ = [
     "Values",
 ]
 
-Values = ArrayLike | Mapping[str, float]
-"""One number per coordinate: an array in coordinate order, or numbers by coordinate name."""
-
 
 @methods_of_any_numbers
 @dataclass(frozen=True, eq=False)
-class Mechanism:
+class Mechanism(MechanismStructure):
     """Tree of bodies under gravity.
 
     Wherever a method takes q or u, it accepts an array (n,) in the order of `coordinates` or a
     mapping by coordinate name; omitted names have their default. A body or frame is named by its
     absolute path, a body also by its name. Every method raises ModelError for an unknown name and
     for a wrong number of values. A `time` (s) matters only where coordinates are prescribed.
-
-    Attributes:
-        name: name of the model.
-        bodies: bodies, each after the one that carries it.
-        coordinates: coordinates, in the order of all arrays.
-        gravity: acceleration of gravity in ground (3,), m/s².
-        frames: frames that are fixed to a body or to ground, by absolute path.
-        constraints: constraints besides the joints; those of locked and prescribed coordinates are
-            inserted before them.
-        stations: markers and other stations, by absolute path.
-        assembly_accuracy: ten times the accepted position error of constraints in an assembled pose
-            (m or rad).
     """
-
-    name: str
-    bodies: tuple[MobileBody, ...]
-    coordinates: tuple[CoordinateInfo, ...]
-    gravity: Array = field(default_factory=lambda: np.array((0.0, -9.80665, 0.0)))
-    frames: Mapping[str, FramePlacement] = field(default_factory=dict)
-    constraints: tuple[ConstraintEquations, ...] = ()
-    stations: Mapping[str, StationPlacement] = field(default_factory=dict)
-    assembly_accuracy: float = 1e-9
-
-    def __post_init__(self) -> None:
-        for index, body in enumerate(self.bodies):
-            if not GROUND <= body.parent < index:
-                raise ModelError(
-                    f"body '{body.name}' stands before the body that carries it; sort the bodies from ground outwards"
-                )
-        indices = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
-        if indices != list(range(len(self.coordinates))):
-            raise ModelError(
-                f"the joints of '{self.name}' do not share out its coordinates one by one"
-            )
-        # Locked and prescribed coordinates are constraints like any others.
-        holds: list[ConstraintEquations] = []
-        for index, info in enumerate(self.coordinates):
-            if info.locked:
-                holds.append(Lock(index, info.path))
-            elif info.prescribed is not None:
-                holds.append(PrescribedCoordinate(index, info.prescribed, info.path))
-        object.__setattr__(self, "constraints", (*holds, *self.constraints))
 
     # ------------------------------------------------------------------------------------ names and states
     def __repr__(self) -> str:
@@ -114,53 +69,6 @@ class Mechanism:
             format_count(len(self.constraints), "constraint"),
         ]
         return f"Mechanism of '{self.name}': {', '.join(counts)}, {self.total_mass:.4g} kg"
-
-    @cached_property
-    def coordinate_names(self) -> tuple[str, ...]:
-        """Names in the order of all arrays; coordinates that share a name have their paths.
-
-        Returns:
-            Names or paths, one per coordinate.
-        """
-        counts = Counter(info.name for info in self.coordinates)
-        return tuple(
-            info.name if counts[info.name] == 1 else info.path for info in self.coordinates
-        )
-
-    def coordinate_index(self, name: str) -> int:
-        """Return the index of a coordinate.
-
-        Args:
-            name: absolute path, or a name that no other coordinate has.
-
-        Raises:
-            ModelError: the name is unknown or ambiguous.
-        """
-        try:
-            return self._coordinate_places[name]
-        except KeyError:
-            alike = [info.path for info in self.coordinates if info.name == name]
-            if alike:
-                raise ModelError(
-                    f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(alike)}"
-                ) from None
-            suggestion = suggest_name(name, self.coordinate_names)
-            raise ModelError(f"'{self.name}' has no coordinate '{name}'{suggestion}") from None
-
-    def placement(self, name: str) -> FramePlacement:
-        """Return the body index and transform of a frame, a body or ground.
-
-        Args:
-            name: absolute path; for a body or ground also the name.
-
-        Raises:
-            ModelError: the name is unknown.
-        """
-        try:
-            return self._placements[name]
-        except KeyError:
-            suggestion = suggest_name(name, self._placements)
-            raise ModelError(f"'{self.name}' has no body or frame '{name}'{suggestion}") from None
 
     def default_state(self, time: float = 0.0) -> tuple[Array, Array]:
         """Return the default state, changed as little as the constraints demand.
@@ -223,14 +131,6 @@ class Mechanism:
             SimulationError: the constraints do not allow the speeds of `kept`.
         """
         return project_speeds(self.at(q, self.speeds(u), time), kept)
-
-    def values(self, q: Values) -> Array:
-        """Return coordinate values as an array (n,)."""
-        return self._convert_to_array(q, "value", self._default_values)
-
-    def speeds(self, u: Values) -> Array:
-        """Return generalized speeds as an array (n,)."""
-        return self._convert_to_array(u, "speed", self._default_speeds)
 
     def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> MechanismKinematics:
         """Return the kinematics at a state, from which everything else follows.
@@ -564,39 +464,6 @@ class Mechanism:
         return {name: value for name, value in vars(self).items() if name != "program"}
 
     @cached_property
-    def _coordinate_places(self) -> dict[str, int]:
-        indices = {info.path: index for index, info in enumerate(self.coordinates)}
-        indices.update((name, index) for index, name in enumerate(self.coordinate_names))
-        return indices
-
-    @cached_property
-    def _placements(self) -> dict[str, FramePlacement]:
-        identity = np.eye(4)
-        placements = {name: FramePlacement(GROUND, identity) for name in ("ground", "/ground")}
-        for index, body in enumerate(self.bodies):
-            placements[body.name] = placements[body.path] = FramePlacement(index, identity)
-        return placements | dict(self.frames)
-
-    @cached_property
-    def _default_values(self) -> tuple[float, ...]:
-        return tuple(info.default_value for info in self.coordinates)
-
-    @cached_property
-    def _default_speeds(self) -> tuple[float, ...]:
-        return tuple(info.default_speed for info in self.coordinates)
-
-    @cached_property
-    def _still(self) -> Array:
-        return np.zeros(len(self.coordinates))
-
-    @cached_property
-    def _unit(self) -> Array:
-        """Unit matrix, for speeds that are rates; it cannot be written to."""
-        unit = np.eye(len(self.coordinates))
-        unit.flags.writeable = False
-        return unit
-
-    @cached_property
     def turning(self) -> tuple[Mobilizer, ...]:
         """Mobilizers whose speeds are not the rates of their coordinates.
 
@@ -613,17 +480,6 @@ class Mechanism:
         # A division by 1 instead of 0 leaves the sum, which is 0.
         return self.inertial[0] @ vectors / (self.total_mass or 1.0)
 
-    def _resolve_station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
-        """Return the body of a frame, and a point of the frame in the body (3,), m.
-
-        Args:
-            frame: name of a frame or body.
-            station: point in the frame (3,), m.
-        """
-        body, placed = self.placement(frame)
-        point: Array = placed[:3, :3] @ _make_vector(station, "station") + placed[:3, 3]
-        return body, point
-
     def _sum_applied_forces(
         self, state: MechanismKinematics, forces: Values, wrenches: Mapping[str, Wrench]
     ) -> Array:
@@ -638,47 +494,6 @@ class Mechanism:
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)
             # Spatial vectors have the angular part first.
-            load = np.concatenate((_make_vector(torque, "torque"), _make_vector(force, "force")))
+            load = np.concatenate((make_vector(torque, "torque"), make_vector(force, "force")))
             total = total + load @ state.point_jacobian(body, placed[:3, 3])
         return total
-
-    def _convert_to_array(
-        self, values: Values, quantity: str, defaults: Sequence[float] = ()
-    ) -> Array:
-        """Return values of coordinates as an array (n,).
-
-        Args:
-            values: array, or numbers by coordinate name.
-            quantity: description of one number, for messages.
-            defaults: values of omitted names; zeros if empty.
-
-        Raises:
-            ModelError: a name is unknown, or the number of values is wrong.
-        """
-        count = len(self.coordinates)
-        # The usual case, in which simulations call, is not converted.
-        if type(values) is np.ndarray and values.shape == (count,) and values.dtype == float:
-            return values
-        if isinstance(values, Mapping):
-            result = np.array(defaults, dtype=float) if defaults else np.zeros(count)
-            for name, value in values.items():
-                result[self.coordinate_index(name)] = value
-            return result
-        result = np.asarray(values, dtype=float)
-        if result.shape != (count,):
-            raise ModelError(
-                f"'{self.name}' takes one {quantity} for each of its {count} coordinates, in their order; "
-                f"got {_describe_shape(result)}"
-            )
-        return result
-
-
-def _make_vector(values: ArrayLike, quantity: str) -> Array:
-    result = np.asarray(values, dtype=float)
-    if result.shape != (3,):
-        raise ModelError(f"a {quantity} has 3 numbers; got {_describe_shape(result)}")
-    return result
-
-
-def _describe_shape(values: Array) -> str:
-    return " × ".join(str(size) for size in values.shape) or "a single one"
