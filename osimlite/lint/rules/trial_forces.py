@@ -173,7 +173,7 @@ def report_full_activation(trial: Trial, report: FindingCollector) -> None:
 
     Other muscles and reserve actuators must replace a saturated muscle; in daily life no muscle is
     fully active for long. OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recomfix to compare
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recommend to compare
     activations with measurements, and give no limit: this limit is osimlite's.
 
     ```trial
@@ -201,7 +201,7 @@ def report_passive_force(trial: Trial, report: FindingCollector) -> None:
     Computes the passive forces of the muscles along the states of CMC, or along the motion of a
     StaticOptimization with fibers in equilibrium, and compares them with `max_isometric_force`.
     OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recomfix to check
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recommend to check
     them and give no limit: this limit is osimlite's.
 
     Passive forces are not controlled. Antagonists must pull against them, which real muscles do

@@ -216,7 +216,7 @@ def report_measured_weight(trial: Trial, report: FindingCollector) -> None:
     Compares the mass of the model with the mean vertical force of all loads, divided by gravity and
     the mean vertical acceleration of the mass centre, while at least one foot stands on a plate. A
     difference of more than 5 % of the weight exceeds the largest residual force that Hicks and
-    others recomfix (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304).
+    others recommend (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304).
 
     A residual force compensates for it all the time, and the leg moments belong to another person.
     A missing plate, or a wrong calibration, has the same effect.
