@@ -210,7 +210,11 @@ class SymbolicEvaluator:
             y: RecordedVector,
             f: RecordedVector,
         ) -> dict[tuple[int, int], list[Any]]:
-            """Return the wrenches (6,) of unit multipliers by equation and link."""
+            """Return the wrenches (6,) of unit multipliers by equation and link.
+
+            Returns:
+                Torque (3,) and force (3,) by the index of the equation and that of the link.
+            """
             wrenches: dict[tuple[int, int], list[Any]] = {}
             kernel = make_symbolic(add_wrench_row)
 

@@ -149,7 +149,11 @@ class Subject(CheckTarget):
 
     @property
     def by_class(self) -> dict[type[Object], list[Object]]:
-        """Objects of the model by their exact class, in tree order."""
+        """Objects of the model by their exact class, in tree order.
+
+        Returns:
+            Lists of objects by class; empty if no model could be read.
+        """
         return {} if self.model is None else self.tree.by_class
 
     @cached_property

@@ -318,7 +318,11 @@ class Tree:
 
     @cached_property
     def by_name(self) -> dict[str, list[Component]]:
-        """Components by the name at the end of their path, the first one of each class."""
+        """Components by the name at the end of their path, the first one of each class.
+
+        Returns:
+            Lists of components, each of another class, by name.
+        """
         result: dict[str, dict[type[Component], Component]] = {}
         for component in self.components:
             result.setdefault(get_last_name(self._paths[id(component)]), {}).setdefault(

@@ -114,7 +114,7 @@ def inverse_dynamics(
 
     Returns:
         A column (N or N·m) for each coordinate; those of ball and free joints are moments about
-            axes of the parent frame.
+        axes of the parent frame.
 
     Raises:
         OsimliteError: the source is not a motion of the model, or loads cannot be read.

@@ -135,7 +135,11 @@ class _Writer:
         self.tree = model.tree()
 
     def convert_object(self, item: Object, accepts: type[Object] | None) -> dict[str, Any]:
-        """Return an object as a mapping: class, name, and the properties that are set, inherited or have content."""
+        """Return an object as a mapping: class, name, and the properties that are set, inherited or have content.
+
+        Returns:
+            Values by the name of the property, after `class` and `name`.
+        """
         data: dict[str, Any] = {}
         # The class is written only where the property does not say it.
         if type(item) is not accepts:

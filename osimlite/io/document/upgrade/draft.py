@@ -135,6 +135,9 @@ class Draft:
         """Index of every element in the old document.
 
         An element that a step creates has the index of the element it was created from.
+
+        Returns:
+            Index in the order of the text, by element.
         """
         return {element: number for number, element in enumerate(self.root.iter(etree.Element))}
 
