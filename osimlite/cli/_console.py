@@ -36,6 +36,7 @@ class EscapingStream:
         self.stream = stream
         self._starts_line = True
         if hasattr(stream, "reconfigure"):
+            # An old terminal encoding must not end a command because of a letter in a name.
             stream.reconfigure(errors="backslashreplace")
 
     def write(self, text: str) -> int:
@@ -44,6 +45,8 @@ class EscapingStream:
             _before_output()
         self.stream.write(escape_control_sequences(text, starts_line=self._starts_line))
         last = text[text.rfind("\n") + 1 :]
+        # Commands of CI systems such as `::error::` count at the start of a line only, after blanks
+        # too.
         self._starts_line = not last.strip() and (self._starts_line or "\n" in text)
         return len(text)
 
@@ -172,6 +175,8 @@ def print_for_programs(text: str) -> None:
     """Write text for other programs to standard output, unescaped and in UTF-8."""
     if _before_output is not None:
         _before_output()
+    # Text before this line is still in the buffer of the text stream, above the bytes written
+    # below.
     sys.stdout.flush()
     # Tests replace standard output by streams without bytes.
     if hasattr(sys.stdout, "buffer"):
@@ -194,6 +199,7 @@ def wants_colour() -> bool:
         return True
     if not sys.stdout.isatty() or os.environ.get("TERM") == "dumb":
         return False
+    # All terminals of other systems obey these codes.
     if os.name != "nt":
         return True
     from rich.console import detect_legacy_windows
@@ -205,6 +211,7 @@ def wants_colour() -> bool:
 def count_columns() -> int:
     """Return the width of the terminal in characters."""
     columns = os.environ.get("COLUMNS", "")
+    # The variable precedes the terminal, so that pipes and tests can choose a width.
     if columns.isdigit():
         return int(columns)
     for stream in range(3):
@@ -310,6 +317,7 @@ def _choose_widths(rows: Sequence[Sequence[str]], width: int) -> list[int] | Non
         return None
     # Each column gets an equal part of the remaining width, and leaves what it does not need to the next.
     widths = [*narrowest]
+    # The least demanding column first: what it leaves is divided among those after it.
     order = sorted(range(len(cells)), key=lambda index: widest[index] - narrowest[index])
     for number, index in enumerate(order):
         extra = min(widest[index] - narrowest[index], remaining // (len(order) - number))

@@ -46,6 +46,7 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
             name_text = _name_argument(parameter) if is_argument else _name_option(parameter)
             lines += _format_entry(name_text, _explain(parameter), width, start, end)
         lines.append("")
+    # The last line is the blank one after the last group, which ends with this option.
     lines[-1:] = [*_format_entry("-h, --help", "Show this text.", width, start, end), ""]
     return "\n".join(lines)
 
@@ -60,6 +61,7 @@ def _name_argument(parameter: Any) -> str:
 
 def _name_option(parameter: Any) -> str:
     """Return the spellings of an option, short ones first, and the placeholder of its value."""
+    # The sort is stable: short spellings come first, others keep their order.
     spellings = sorted(parameter.spellings, key=lambda spelling: (spelling[:2] == "--", 0))
     value_type, _ = parameter.scalar()
     if value_type is bool:

@@ -128,9 +128,11 @@ def find_page(error: BaseException) -> str:
     class_names = (f"{cls.__module__}.{cls.__qualname__}" for cls in type(error).__mro__)
     modules = (
         frame.f_globals.get("__name__", "")
+        # From the innermost frame outwards: the module that found the problem knows it best.
         for frame, _ in reversed([*walk_tb(error.__traceback__)])
     )
     for name in chain(class_names, modules):
+        # A module without an entry belongs to the page of its package.
         while name:
             if name in PAGES:
                 return PAGES[name]

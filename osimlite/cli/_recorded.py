@@ -43,6 +43,7 @@ def write_results(
         from osimlite.io.tables.writers import write_trc
 
         markers = tables["markers.sto"]
+        # Each marker has three columns, the first of which ends with _X.
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]
         write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
         names.append("markers.trc")
@@ -77,6 +78,7 @@ def require_plots(*, plot: bool, band: Path | None = None) -> None:
         SettingError: there are bands, but no pictures.
         DocumentError: the file has no bands.
     """
+    # The file is read here for its errors only, before the computation begins.
     if band is not None:
         from osimlite.errors import SettingError
         from osimlite.view.bands import read_bands
@@ -144,6 +146,8 @@ def _find_steps(loads: Any, mechanism: Mechanism | None) -> dict[str, Any]:
     from osimlite.tools.evidence import find_steps
 
     try:
+        # The vertical axis is that of gravity, since models of other programs have z up.
         return dict(find_steps(Path(loads), int(abs(mechanism.gravity).argmax())))
+    # Steps only decorate the pictures, and the computation has read the same loads.
     except OsimliteError:
         return {}

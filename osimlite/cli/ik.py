@@ -91,6 +91,7 @@ def ik(
         motion.times.tolist(),
         names,
         errors.tolist(),
+        # Markers that are not seen in a frame have no error there.
         has_missing=True,
     )
     for line in describe_fit(motion):

@@ -43,6 +43,8 @@ def inverse_dynamics(
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import inverse_dynamics as forces_of
 
+    # Before the computation, which can take minutes: a missing package or file ends the command
+    # here.
     require_plots(plot=plot, band=band)
     model = read(file)
     with progress_bar("computing moments", None):

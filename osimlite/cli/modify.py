@@ -77,6 +77,7 @@ def modify(
             raise SettingError(
                 f"--replace takes NAME=WORD, such as muscles=degroote; got '{assignment}'"
             )
+        # All words are checked before the model is read, which can take seconds.
         operators.append(find_change(name, value))
     top = read_any(file)
     if isinstance(top, Model):

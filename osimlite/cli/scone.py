@@ -99,12 +99,14 @@ def scone(
         raise SettingError(
             "--generations, --population, --seed and --resume are options of a search; add --optimize"
         )
+    # A copy, so that users can edit it.
     if str(scenario) == SCENARIO:
         scenario = write_scenario(output)
     loaded = Scenario(scenario)
     values = (
         loaded.best()
         if par is None
+        # The first number is the best value, the others are the spread of the search.
         else {name: parameter_values[0] for name, parameter_values in read_par(par).items()}
     )
     files = []

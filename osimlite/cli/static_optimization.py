@@ -64,6 +64,8 @@ def static_optimization(
     from osimlite.io.document.reader import read
     from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 
+    # Before the computation, which can take minutes: a missing package or file ends the command
+    # here.
     require_plots(plot=plot, band=band)
     model = read(file)
     with progress_bar("computing muscle forces", None):
@@ -86,6 +88,7 @@ def static_optimization(
     files = result.write(folder)
     print_motion_summary(result.motion, files)
     if plot:
+        # The units of the columns follow from the model, which needs the added forces for that.
         from osimlite.simulation.inverse_dynamics import add_forces
 
         add_forces(model, forces or (), replace=replace)
@@ -100,4 +103,6 @@ def static_optimization(
         )
     if message := result.describe_unsolved():
         complain(message)
+        # The files are complete, but have no numbers where there is no solution; scripts must
+        # notice that.
         raise SystemExit(1)

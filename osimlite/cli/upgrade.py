@@ -55,6 +55,7 @@ def upgrade(
         say(f"{file}: already version {document.version}, nothing to do")
         return
     target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}{file.suffix or '.osim'}")
+    # Only a file that the user names is overwritten: the default name may be that of other work.
     if output is None and target.exists():
         raise OsimliteError(
             f"'{target}' exists already; name the file to write with -o", file=str(file)
@@ -103,6 +104,7 @@ def _print_changes(document: Document) -> None:
             losses.setdefault(change.lost, []).append(change)
     for description, changes in losses.items():
         first = document.source.locate_tag(changes[0].number).line
+        # One line for each loss with its first place; a model may have hundreds of the same kind.
         other_places = (
             f" and {format_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
         )

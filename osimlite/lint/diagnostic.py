@@ -207,6 +207,7 @@ class Report:
         notes = []
         for text in self.unmeasured:
             before, _, reason = text.partition(NOT_MEASURED)
+            # From the right, since the name of a file can contain anything.
             file, _, families = before.rpartition(": rules ")
             if reason.startswith("needs osimlite["):
                 notes.append(

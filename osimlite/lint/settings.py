@@ -45,6 +45,8 @@ class Settings:
             overriding: configuration of the command line.
         """
         return Config(
+            # A selection replaces that of the project, whereas codes to ignore add up: the command
+            # line cannot run a rule that the project has switched off by accident.
             overriding.select or self.select,
             (*self.ignore, *self._find_ignored_codes(Path(path)), *overriding.ignore),
             {**self.severity, **overriding.severity},
@@ -108,6 +110,7 @@ def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
             Config(target_version=str(table.get("target-version", ""))).target_version,
         )
     except OsimliteError as error:
+        # The parsers of single values do not know the file, which the user must edit.
         raise OsimliteError(error.message, file=str(file)) from None
 
 

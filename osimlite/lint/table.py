@@ -160,6 +160,7 @@ class Table(CheckTarget):
         """
         start = self.line_start(position.line)
         line = self.data[start : self.line_start(2, start)].rstrip(b"\r\n")
+        # The byte order mark counts for no column.
         if start == 0 and line.startswith(MARK):
             start, line = len(MARK), line.removeprefix(MARK)
         try:
@@ -170,6 +171,7 @@ class Table(CheckTarget):
             letters[: position.column - 1],
             letters[position.column - 1 :][: position.length],
         )
+        # Columns count letters, edits count bytes.
         start += len(before.encode())
         safe = certain or text.lower() == old.lower()
         return Fix((Edit(start, start + len(old.encode()), text),), safe)

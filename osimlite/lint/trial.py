@@ -149,12 +149,15 @@ class Trial(CheckTarget):
                 continue
             limit_values = [
                 self.config.value_of(limit)
+                # A limit in percent of a number that is not itself in percent is a part of the
+                # scale of the measurement.
                 * (number.scale / 100.0 if limit.unit == "%" != number.unit else 1.0)
                 if isinstance(limit, Threshold)
                 else limit
                 for limit in limits
             ]
             finite_limits = [limit for limit in limit_values if isfinite(limit)]
+            # The scale is NaN where the load or length that a limit refers to was not measured.
             if not finite_limits:
                 continue
             good_limit, bad_limit = min(finite_limits), max(finite_limits)

@@ -16,6 +16,7 @@ from osimlite.schema.references import (
 from osimlite.schema.sets import Set
 
 
+# OpenSim writes C++ names as tags. Parsers with XML namespaces reject their colons.
 class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::ContactParameters"):
     """The layer of springs on some contact meshes.
 
@@ -104,6 +105,8 @@ class ExponentialContactForce(Force):
     Friction is a spring that slips.
     """
 
+    # The negative zeros are OpenSim's: it computes the angles from the rotation matrix of its
+    # default.
     contact_plane_transform: Annotated[Vec6, Value("double", "Transform")] = (
         -0.0,
         0.0,

@@ -108,6 +108,7 @@ class Value(FieldType):
             return None
         if self.shape == "optional":
             return _check_scalar(self.scalar, value)
+        # A text is iterable too: each of its letters would count as a value.
         if isinstance(value, str) or not isinstance(value, Iterable):
             raise ValueError(f"expected {self.words()}, got {value!r}")
         checked = tuple(_check_scalar(self.scalar, item) for item in value)
@@ -195,6 +196,7 @@ class Reference(FieldType):
     def _check_target(self, value: Any) -> Any:
         if isinstance(value, str):
             return value
+        # Compare names, since the classes of components import this module.
         names = {base.__name__ for base in type(value).__mro__}
         if "Component" in names and (self.target in names or "Unknown" in names):
             return value
@@ -318,6 +320,7 @@ class ObjectList(list[T]):
 
 
 def _wrap_mutator(name: str) -> Callable[..., Any]:
+    # The methods of `list` do not call each other's overridden versions, so each one is wrapped.
     plain = getattr(list, name)
 
     def method(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -347,6 +350,7 @@ for _name in ("__iadd__", "__imul__"):
 
 def find_class(annotation: Any) -> type[Object] | None:
     """Return the component class in an annotation such as ``list[Body]`` or ``Function | None``."""
+    # No `issubclass`: the class Object is defined in a module that imports this one.
     if isinstance(annotation, type) and hasattr(annotation, "field_specs"):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
@@ -377,6 +381,8 @@ def _check_scalar(scalar: Scalar, value: Any) -> Any:
     elif scalar == "bool":
         if isinstance(value, bool):
             return value
+    # Numbers of NumPy are no `int`, and not all are `float`, so they are recognised by their
+    # conversions. True would pass as 1 by the same conversions, and is excluded.
     elif not isinstance(value, (bool, str, bytes)):
         if scalar == "double" and hasattr(value, "__float__"):
             return float(value)

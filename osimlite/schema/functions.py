@@ -74,6 +74,8 @@ class PiecewiseLinearFunction(Function):
     """Values at the points; the outer lines go on beyond them."""
 
 
+# OpenSim prints these lists of the first property system with six digits: a model that it has
+# written again has slightly different splines.
 class SimmSpline(Function):
     """A cubic spline through the points (`x`, `y`) by the formulas of SIMM, continued as straight lines."""
 

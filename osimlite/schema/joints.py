@@ -165,6 +165,8 @@ class BallJoint(Joint):
     """Body-fixed rotations about X, Y, Z; the generalized speeds are the angular velocity of M in F, along F."""
 
     moves = "rx ry rz"
+    # An angular velocity stays finite at a second angle of 90 degrees, where the rates of
+    # body-fixed angles do not.
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _make_coordinates_field(3)
@@ -183,6 +185,7 @@ class EllipsoidJoint(Joint):
     """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
 
     facts = Facts(
+        # OpenSim has no default for the radii and does not ask for them.
         missing={NAN: "radii_x_y_z"},
         doubts={"radii_x_y_z": FLAT},
         scales={"radii_x_y_z": "socket_parent_frame"},

@@ -43,6 +43,8 @@ class FiberForceLengthCurve(Function):
     """Strain up to which the fiber is slack."""
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.7
     """Strain at which the passive fiber bears `max_isometric_force`."""
+    # Left out, OpenSim takes 0.2 here, 2 / (strain at one - strain at zero) at a force of 1, and a
+    # curviness of 0.75.
     stiffness_at_low_force: Annotated[float | None, maybe(domain="> 0")] = None
     """Slope where the toe ends; to be given with the two below, or none of them."""
     stiffness_at_one_norm_force: Annotated[float | None, maybe(domain="> 0")] = None
@@ -56,6 +58,7 @@ class ForceVelocityCurve(Function):
 
     facts = Facts(
         domains={
+            # OpenSim compares with the square root of the machine precision (SimTK::SqrtEps).
             "concentric_slope_near_vmax": "> 1.49e-8",
             "eccentric_slope_near_vmax": "> 1.49e-8",
         },
@@ -82,6 +85,8 @@ class ForceVelocityCurve(Function):
     """How round the bend of the lengthening side is."""
 
 
+# Muscles of OpenSim set both end slopes of their inverse curve to half of the slopes near them,
+# so that it need not be the inverse of their ForceVelocityCurve.
 class ForceVelocityInverseCurve(Function):
     """Fiber velocity over force multiplier: the inverse of a ForceVelocityCurve with the same numbers."""
 
@@ -112,6 +117,7 @@ class TendonForceLengthCurve(Function):
 
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
     """Strain at which the tendon bears `max_isometric_force`."""
+    # Left out, OpenSim takes 1.375 / strain at one, a toe that ends at 2/3, and a curviness of 0.5.
     stiffness_at_one_norm_force: Annotated[float | None, maybe(domain="> 0")] = None
     """Slope at a force of 1; to be given with the two below, or none of them."""
     norm_force_at_toe_end: Annotated[float | None, maybe(domain="> 0")] = None

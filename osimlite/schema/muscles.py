@@ -55,6 +55,8 @@ class MuscleFirstOrderActivationDynamicModel(ModelComponent):
     """Time constant of rising activation; a muscle that owns the part puts in its own."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
     """Time constant of falling activation; a muscle that owns the part puts in its own."""
+    # OpenSim clamps only the use of the activation, not the state: with an excitation below this
+    # minimum the state falls linearly for ever.
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
     """Activation below which the muscle does not go, whatever its control."""
 
@@ -74,6 +76,8 @@ class MuscleFixedWidthPennationModel(ModelComponent):
     """Fiber length at which `pennation_angle_at_optimal` is measured."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
     """Angle between fibers and tendon at optimal fiber length; 0 is parallel."""
+    # Fibers across the tendon would need an infinite force, since equilibrium divides by the
+    # cosine.
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
     """Angle that the fibers do not go beyond; it bounds their length from below."""
 
@@ -143,6 +147,8 @@ class Muscle(PathActuator, abstract=True):
             "rise": "activation_time_constant",
             "fall": "deactivation_time_constant",
         },
+        # With the ratio of path lengths, a scaled muscle works in the same range of its curves as
+        # before.
         scales={"optimal_fiber_length": PATH, "tendon_slack_length": PATH},
     )
 
@@ -192,6 +198,8 @@ class ActivationFiberLengthMuscle(Muscle, abstract=True):
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
     """Activation at the start of a simulation."""
+    # OpenSim has this length in metres for every muscle, whatever its optimal_fiber_length: without
+    # equilibrium at the start, short fibers begin far outside of their range.
     default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
     """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
 
@@ -220,6 +228,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
         ("actMdl", MuscleFirstOrderActivationDynamicModel),
     )
 
+    # OpenSim rejects a model whose min_control is below the minimum_activation of this class.
     min_control: Number = 0.01
     FmaxTendonStrain: Annotated[float, real(domain="> 0")] = 0.04
     """Strain at which the tendon bears `max_isometric_force`."""
@@ -314,6 +323,7 @@ class Millard2012EquilibriumMuscle(Muscle):
     @property
     def is_classic(self) -> bool:
         """True if the tendon is elastic and fibers have no damping, so that the equations are singular without active force."""
+        # OpenSim counts a damping below 0.001 as none (measured with 4.6).
         return not self.ignore_tendon_compliance and self.fiber_damping < 0.001
 
     @property
@@ -324,13 +334,18 @@ class Millard2012EquilibriumMuscle(Muscle):
             Values that OpenSim uses instead, by the name of the property.
         """
         if self.is_classic:
+            # The fiber velocity is then the inverse force-velocity curve of force / (activation x
+            # active force), so that the active force must not reach 0.
             return {"minimum_value": max(self.active_force_length_curve.minimum_value, 0.1)}
+        # With damping or a rigid tendon nothing is divided by the active force, and OpenSim sets
+        # these numbers to 0 even if the file has others.
         return dict.fromkeys(
             ("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0
         )
 
     def find_contradictions(self) -> Iterator[Contradiction]:
         """Yield combinations that OpenSim rejects: too little activation without damping, a curve without inverse."""
+        # The same quotient is infinite at an activation of 0.
         if self.is_classic and self.minimum_activation < 0.01:
             yield (
                 "minimum_activation",
@@ -367,6 +382,7 @@ class Millard2012AccelerationMuscle(Muscle):
     """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
     default_fiber_velocity: Number = 0.0
     """Fiber velocity at the start of a simulation; lengthening is positive."""
+    # No least activation: the equation of motion of a mass never divides by the activation.
     muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = (
         make_default(
             MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
@@ -425,6 +441,7 @@ class DeGrooteFregly2016Muscle(Muscle):
         domains={
             "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
             "default_activation": "> 0",
+            # OpenSim searches the equilibrium of this muscle by bisection in this range only.
             "default_normalized_tendon_force": "0 to 5",
         },
         refused="pennation_angle_at_optimal activation_time_constant deactivation_time_constant default_activation "
@@ -435,6 +452,8 @@ class DeGrooteFregly2016Muscle(Muscle):
         },
     )
 
+    # OpenSim 4.6 keeps these time constants and the smoothing in C++ statics: the first muscle of
+    # this class in a process decides for all others, of all models.
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
     """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.06
@@ -445,6 +464,8 @@ class DeGrooteFregly2016Muscle(Muscle):
     """Tendon force over `max_isometric_force` at the start, at most 5; it is the state."""
     active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
     """Factor of the width of the active force over fiber length."""
+    # With an elastic tendon in explicit mode, damping changes the reported forces of this class,
+    # but not the motion.
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
     """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     passive_fiber_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.6

@@ -62,6 +62,8 @@ class ConditionalPathPoint(PathPoint):
 
     socket_coordinate: CoordinateSocket = ""
     """The coordinate that decides whether the path runs through the point."""
+    # OpenSim adds a tolerance of 1e-5 at both ends. Where the point appears, the length of the path
+    # usually jumps, by up to 2 cm in public models.
     range: Annotated[tuple[float, float], reals("rad (rotational)", least=2, most=2)] = (0.0, 0.0)
     """Lowest and highest value of the coordinate with which the point counts, both included."""
 
@@ -80,6 +82,8 @@ class MovingPathPoint(AbstractPathPoint):
     """The argument of `y_location`."""
     socket_z_coordinate: CoordinateSocket = ""
     """The argument of `z_location`."""
+    # OpenSim clamps the coordinate to its range in the location but not in the velocity: outside of
+    # the range the length stands still, while speed and force continue.
     x_location: Optional[Function] = make_default(Constant)
     """x of the point in its parent frame, as a function of the coordinate."""
     y_location: Optional[Function] = make_default(Constant)
@@ -102,6 +106,8 @@ class PathWrapPoint(AbstractPathPoint, abstract=True):
 class PathWrap(ModelComponent):
     """Says that a path wraps around a surface, and where."""
 
+    # The two tangent points are components in OpenSim, so that their names are taken and their
+    # paths exist, although no file holds them.
     internal = (("pwpt1", PathWrapPoint), ("pwpt2", PathWrapPoint))
 
     wrap_object: WrapObjectName = ""

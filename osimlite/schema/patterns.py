@@ -246,6 +246,8 @@ class _Compiler:
         copies = min_count if max_count is None else max_count
         pieces = [(start, end)]
         for _ in range(max(copies, 1) - 1):
+            # Each repetition needs states of its own: with shared ones, a name could go back to an
+            # earlier repetition, and the counts would have no effect.
             pieces.append(self._recompile_part(begin, part_end))
         self.index = next_index
         skips: list[int] = []
@@ -304,6 +306,7 @@ class _Compiler:
         digits = ""
         while self._peek_character() in _DIGITS:
             digits += self._take_character()
+        # More digits mean more repetitions than `MAX_STATES`.
         if not digits or len(digits) > 4:
             raise PatternError(
                 f"a number of repetitions is missing or too large at character {self.index + 1}"
@@ -329,6 +332,7 @@ class _Compiler:
         elif character == "[":
             state = self._add_state(self._compile_bracket())
         elif character == ".":
+            # The line terminators of ECMAScript, which `.` does not match.
             state = self._add_state(lambda letter: letter not in "\n\r\u2028\u2029")
         elif character == "\\" and self._peek_character() in ("b", "B"):
             return self._compile_assertion(self._take_character())
@@ -396,6 +400,7 @@ class _Compiler:
             if not frozenset(string.hexdigits).issuperset(digits):
                 raise PatternError(f"'\\{letter}{digits}' is no character")
             return frozenset(chr(int(digits, 16))), False
+        # Digits are back references, which this algorithm cannot match.
         if letter.isalnum():
             raise UnsupportedPatternError(f"'\\{letter}' is not supported")
         return frozenset(letter), False
@@ -411,11 +416,14 @@ class _Compiler:
         """
         is_negated = self._skip_text("^")
         tests: list[CharacterTest] = []
+        # As in ECMAScript, `[]` is an empty set that matches nothing, not a set that begins with
+        # `]`.
         while not self._skip_text("]"):
             low = self._read_bracket_item(tests)
             if (
                 low is None
                 or self._peek_character() != "-"
+                # A hyphen before the closing bracket stands for itself.
                 or self.text[self.index + 1 : self.index + 2] in ("]", "")
             ):
                 if low is not None:
@@ -445,6 +453,7 @@ class _Compiler:
         character = self._take_character()
         if character != "\\":
             return character
+        # Within brackets `\b` is a backspace, outside of them a word boundary.
         if self._skip_text("b"):
             return "\b"
         characters, is_negated = self._read_escaped_set()

@@ -39,6 +39,7 @@ class SpringGeneralizedForce(ForceProducer):
 
     coordinate: MaybeCoordinateName = None
     """The coordinate that the spring acts on."""
+    # No unit: it follows from the coordinate, which is an angle or a length.
     stiffness: Annotated[float, real(domain=">= 0")] = 0.0
     """Generalized force per value of the coordinate."""
     rest_length: Number = 0.0
@@ -162,6 +163,7 @@ class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
 class CoordinateLinearStopForce(Force):
     """A stop that a coordinate runs into: a linear spring with damping that grows with its compression."""
 
+    # OpenSim 4.6 rejects a ForceSet with a class that it does not know.
     since: ClassVar[str] = "4.6.1"
 
     socket_coordinate: CoordinateSocket = ""

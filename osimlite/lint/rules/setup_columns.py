@@ -39,6 +39,8 @@ def report_missing_column(setup: Setup, report: FindingCollector) -> None:
         names = setup.list_names("Coordinate")
         if not names:
             continue
+        # OpenSim's inverse dynamics compares whole labels with names, while its analyses also split
+        # paths that end with `/value`.
         plain = is_a(item, "InverseDynamicsTool")
         columns = {
             column
@@ -46,6 +48,8 @@ def report_missing_column(setup: Setup, report: FindingCollector) -> None:
             else (parts[-2] if (parts := column.split("/"))[-1] == "value" else "")
             for column in table.columns
         }
+        # Locked and coupled coordinates follow from the model, so that a table without them is
+        # complete.
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
         if not names & columns and names & _find_names_in_paths(table):
             consequence = (
@@ -135,12 +139,14 @@ def _is_state(setup: Setup, column: str) -> bool:
             setup.tree.walk(path, "", "Component").target is not None
             or path.rpartition("/")[2] in setup.tree.by_name
         )
+    # Version 3 named states `<coordinate>`, `<coordinate>_u` and `<muscle>.<state>`.
     return column.partition(".")[0].removesuffix("_u") in setup.tree.by_name
 
 
 def _find_missing_states(setup: Setup, table: Table) -> list[str]:
     """Return the states of the model that no label of a table names, in any format."""
     columns = set(table.columns)
+    # Paths of states begin differently in files of different versions 4, but they end alike.
     ends = {"/".join(column.split("/")[-2:]) for column in columns}
     lacking = []
     for path in find_variables(setup.tree, "state variable") if setup.tree is not None else ():

@@ -69,6 +69,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
                 severity=ERROR,
             )
         if setup.tree is not None and not model:
+            # In a setup of the scale tool the markers are usually in a file of their own.
             maker = next(setup.find_by_class("GenericModelMaker"), None)
             tag = "model_file" if maker is None else "marker_set_file"
             report(
@@ -85,6 +86,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
         task_count = sum(
             task.apply for task in select_members(user.ik_task_set, "IKCoordinateTask")
         )
+        # A marker determines at most three coordinates, a task of a coordinate one.
         if 3 * len(usable_tasks) + task_count < free_count:
             report(
                 f"{format_count(len(usable_tasks), 'marker')} and {format_count(task_count, 'coordinate task')} do not "
@@ -149,6 +151,7 @@ def iterate_rows_between(table: Table, span: tuple[float, ...]) -> Iterator[list
             row = [parse_number(cell.strip()) for cell in cells]
             if row[1] > span[1]:
                 return
+            # In a row that lacks its last cells, OpenSim takes these markers as not seen.
             yield row + [math.nan] * (2 + 3 * len(table.columns) - len(row))
 
 

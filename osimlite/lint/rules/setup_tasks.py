@@ -68,6 +68,7 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
             if (
                 is_a(task, "IKCoordinateTask")
                 and task.value_type == "manual_value"
+                # More than a full turn in radians: the value is probably in degrees.
                 and abs(task.value) > 6.3
             ):
                 report(

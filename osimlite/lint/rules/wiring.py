@@ -127,6 +127,7 @@ def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
             continue
         text = use.text
         list_targets = targets_by_list.setdefault((id(use.holder), use.spec.tag), [])
+        # By identity: two different texts can name the same component.
         if any(listed is target for listed, _ in list_targets):
             report(
                 f"{describe_object(use.holder)} lists {describe_object(target)} again: OpenSim "
@@ -163,6 +164,7 @@ def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault 
     component_path = normalize_path(path if path.startswith("/") else f"{base}/{path}")
     component = tree.by_path.get(component_path) if component_path is not None else None
     if component is None:
+        # An object of a class that osimlite does not know may contain the component.
         if subject.has_unknown:
             return None
         nearest = find_nearest(

@@ -33,10 +33,12 @@ class Analysis(Object, abstract=True):
 
     on: LegacyFlag = True
     """Whether the analysis is done."""
+    # OpenSim's tools ignore both times: analyses run over the range of the tool.
     start_time: Annotated[float, real("s", legacy=True)] = float("-inf")
     """Where it begins."""
     end_time: Annotated[float, real("s", legacy=True)] = float("inf")
     """Where it ends."""
+    # OpenSim takes 0 and negative numbers as 1.
     step_interval: LegacyInteger = 1
     """Every how many steps of the integrator, or rows of the motion, something is written."""
     in_degrees: LegacyFlag = True
@@ -57,6 +59,7 @@ class Actuation(Analysis):
 class BodyKinematics(Analysis):
     """Places, velocities and accelerations of bodies."""
 
+    # OpenSim compares with `all` in lower case here; `ALL` is an error.
     bodies: Annotated[
         Names, make_name_list("body-name-or-com", "Body", "all", "center_of_mass")
     ] = ("all",)
@@ -113,6 +116,7 @@ class InducedAccelerations(Analysis):
 class JointReaction(Analysis):
     """Forces and torques that joints carry."""
 
+    # OpenSim reads as many columns as the model has actuators, and ignores those after them.
     forces_file: LegacyInputTable = ""
     """Forces of the actuators; without it they follow from the states."""
     joint_names: LegacyJointNames = ("ALL",)
@@ -166,6 +170,8 @@ class OutputReporter(Analysis):
 class PointKinematics(Analysis):
     """Place, velocity and acceleration of a point."""
 
+    # An unknown body makes OpenSim crash, while an unknown `relative_to_body_name` silently means
+    # ground.
     body_name: Annotated[
         Named, Reference("frame-path-or-body-name", "PhysicalFrame", legacy=True)
     ] = "ground"
@@ -199,6 +205,7 @@ class StatesReporter(Analysis):
 class StaticOptimization(Analysis):
     """Divides the generalized forces of a motion among the actuators, at every moment for itself."""
 
+    # OpenSim 4.6 crashes if this is false (segmentation fault).
     use_model_force_set: LegacyFlag = True
     """Whether the actuators are those of the model."""
     activation_exponent: LegacyNumber = 2.0
@@ -207,5 +214,6 @@ class StaticOptimization(Analysis):
     """Whether forces of muscles depend on their lengths and speeds."""
     optimizer_convergence_criterion: LegacyNumber = 1e-4
     """How far the optimizer goes."""
+    # Where the optimizer fails, OpenSim warns and writes the point at which it stopped.
     optimizer_max_iterations: LegacyInteger = 100
     """How many iterations the optimizer may take."""

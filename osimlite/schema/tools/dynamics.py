@@ -41,6 +41,8 @@ class DynamicsTool(Tool, abstract=True):
         float("inf"),
     )
     """First and last time."""
+    # OpenSim looks for names of forces only if the ForceSet has no group. ALL keeps the external
+    # loads, although OpenSim's own description says that it removes them.
     forces_to_exclude: Annotated[
         Names,
         make_name_list(
@@ -65,6 +67,7 @@ class InverseDynamicsTool(DynamicsTool):
     """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
     lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the coordinates; negative for no filter."""
+    # OpenSim drops a folder in this name with a warning. An empty name makes a file named `.sto`.
     output_gen_force_file: Annotated[str, make_output_file("table", legacy=True, required=True)] = (
         "inverse_dynamics.sto"
     )
@@ -82,10 +85,13 @@ class AbstractTool(Object, abstract=True):
     """The model, found from the folder of the setup file, as are all files."""
     replace_force_set: LegacyFlag = False
     """Whether the forces of `force_set_files` replace those of the model; otherwise they are added."""
+    # OpenSim splits the list at blanks and knows no quotes, so that no name can contain a blank.
     force_set_files: Annotated[
         tuple[str, ...], Reference("file", "ForceSet file", "list", required=False, legacy=True)
     ] = ()
     """Documents of forces, separated by blanks."""
+    # OpenSim makes one level of folders only. If more are missing, all results are lost, and the
+    # tool still reports success.
     results_directory: LegacyOutputFolder = "./"
     """Folder for the results, made if only its last part is missing."""
     output_precision: LegacyInteger = 8
@@ -96,12 +102,14 @@ class AbstractTool(Object, abstract=True):
     """Where the run ends."""
     solve_for_equilibrium_for_auxiliary_states: LegacyFlag = False
     """Whether muscles are brought into equilibrium before the run."""
+    # OpenSim 4.6's forward tool does not stop there (measured with 1).
     maximum_number_of_integrator_steps: LegacyInteger = 20000
     """How many steps the integrator may take."""
     maximum_integrator_step_size: Annotated[float, real(domain="> 0", legacy=True)] = 1.0
     """Longest step of the integrator, in seconds."""
     minimum_integrator_step_size: LegacyNumber = 1e-8
     """Shortest step of the integrator, in seconds."""
+    # OpenSim does not return with a tolerance of 0.
     integrator_error_tolerance: LegacyNumber = 1e-5
     """Error of a step above which the integrator takes a shorter one."""
     analysis_set: LegacyUnnamed[AnalysisSet] = make_default(AnalysisSet, name="Analyses")
@@ -128,5 +136,7 @@ class AnalyzeTool(AbstractTool):
 class ForwardTool(AbstractTool):
     """Integrates the equations of motion."""
 
+    # OpenSim does not interpolate: it takes the last row up to `initial_time` and gives it that
+    # time.
     states_file: LegacyInputTable = ""
     """Where the motion starts: the row at `initial_time`; without it the model's default state."""

@@ -43,6 +43,8 @@ class GenericModelMaker(Object):
 class MarkerPair(Object):
     """Two markers whose distance is measured."""
 
+    # OpenSim crashes if a pair has one marker. It skips the measurement, with factor 1, if one of
+    # the two is unknown or missing in a single frame.
     markers: Annotated[
         Names, Reference("marker-name", "Marker", "list", legacy=True, consequence="left out")
     ] = ()
@@ -61,6 +63,7 @@ class BodyScale(Object):
 
     name_reference = Reference("body-name", "Body", consequence="left out")
 
+    # XY without a blank is one unknown word, and the body keeps its size.
     axes: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
     """Axes of the body along which it is scaled: X, Y, Z; other words do nothing."""
 
@@ -125,6 +128,8 @@ class ModelScaler(Object):
     """Measured markers of a standing subject (.trc)."""
     time_range: LegacyTimeRange = (-1.0, -1.0)
     """First and last time over which distances are averaged."""
+    # In both cases OpenSim then multiplies all masses and inertias so that the sum is the mass of
+    # the subject, if that is positive.
     preserve_mass_distribution: LegacyFlag = False
     """Whether the bodies keep their shares of the mass; otherwise their masses grow with their sizes."""
     output_model_file: LegacyOutputModel = "Unassigned"
@@ -144,6 +149,7 @@ class MarkerPlacer(Object):
     """Measured markers of a standing subject (.trc)."""
     coordinate_file: LegacyInputTable = ""
     """Values of coordinates for tasks that take them from a file."""
+    # OpenSim rejects its own default here: the placer needs two times in ascending order.
     time_range: LegacyTimeRange = (-1.0, -1.0)
     """First and last time over which the markers are averaged."""
     output_motion_file: LegacyOutputTable = "Unassigned"

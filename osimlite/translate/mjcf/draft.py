@@ -446,6 +446,7 @@ def format_pose(matrix: Array) -> dict[str, Value]:
     Returns:
         "pos" and "quat"; None for no translation or rotation.
     """
+    # Without attributes for the identity, the file shows only what differs from it.
     position = clear_rounding(matrix[:3, 3])
     quaternion = clear_rounding(quaternion_of(matrix[:3, :3]))
     return {

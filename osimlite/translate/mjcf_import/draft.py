@@ -172,6 +172,7 @@ def angles_of(rotation: Array) -> tuple[float, float, float]:
     Returns:
         The three angles, rad.
     """
+    # The arcsine of one entry would lose half of the digits near 90 degrees.
     y_angle = np.arctan2(rotation[0, 2], np.hypot(rotation[0, 0], rotation[0, 1]))
     z_angle = np.arctan2(-rotation[0, 1], rotation[0, 0])
     x_rotation = rotation @ rotation_xyz(np.array((0.0, y_angle, z_angle))).T

@@ -143,6 +143,7 @@ def find_hint(
         )
         point = first_point + fraction * (second_point - first_point)
     distance = float(np.linalg.norm(axis_mask * point))
+    # On the axis or in the centre no direction leads to the surface.
     if distance < 1e-9:
         return None
     # A cylinder keeps the height of the point.
@@ -210,6 +211,7 @@ def find_hints(
         owners = [int(model.site_bodyid[site]) for site in (segment.first, segment.second)]
         owners += [int(model.geom_bodyid[segment.geom])] if segment.geom >= 0 else []
         frames = [draft.frames[body] for body in owners]
+        # OpenSim 4.6 ignores the pose of offset frames in these paths.
         if not all(isinstance(frame, Body) or frame is ground for frame in frames):
             return None
         if segment.geom < 0:

@@ -289,6 +289,7 @@ class _Selection:
         joints = [
             joint
             for joint in range(model.njnt)
+            # A derivative needs a joint whose position is a single number.
             if int(model.jnt_type[joint]) not in (FREE, BALL)
             and joint not in _dependent(self.draft)
         ]
