@@ -1,14 +1,17 @@
-"""Gait cycles: fixed points of the step map, and their Floquet multipliers."""
+"""Gait cycles: fixed points of the step map, their Floquet multipliers, and states during a step."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
-from osimlite.simulation.batches import Floats
-from osimlite.studies.gait.stepmap import StepMap
+from osimlite.simulation.batches import Floats, run_many
+from osimlite.studies.gait.starts import move_along_neutral_directions
+from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, StepMap
 from osimlite.studies.gait.steps import measure_along_slope
 
 CYCLE_TOLERANCE = 1e-9
@@ -178,3 +181,25 @@ def _compute_residual(step_map: StepMap, reduced: Floats) -> tuple[Floats, float
     residual = step_map.reduce(step_map(step_map.expand(reduced)[None]).states[0]) - reduced
     size = float(np.linalg.norm(residual))
     return residual, size if np.isfinite(size) else np.inf
+
+
+def sample_states_of_step(step_map: StepMap, cycle: Cycle, fractions: Sequence[float]) -> Floats:
+    """Return states (k, y) of a cycle at parts of a step.
+
+    The walker is at the origin with its trunk as built, as far as neither changes the motion.
+
+    Args:
+        step_map: step map of the walker.
+        cycle: gait cycle.
+        fractions: parts of a step after touch-down (k,), increasing.
+    """
+    times = [fraction * cycle.period for fraction in fractions]
+    runs = run_many(
+        step_map.engine,
+        cycle.state[None],
+        cycle.period,
+        report_times=times,
+        accuracy=TIGHT_ACCURACY,
+        threads=step_map.threads,
+    )
+    return move_along_neutral_directions(runs.reports[0], step_map.neutral)

@@ -1,15 +1,12 @@
 """Search for gait cycles: which initial state, with which numbers of the model, repeats itself.
 
 1. Random initial states of random models, each with one foot at rest on the ground. Walkers that
-make
-   two steps are candidates, ordered by how much the states at the end of the two steps differ.
+   make two steps are candidates, ordered by how much the states at the end of the two steps differ.
 2. The initial state and the numbers of the best candidates are changed together until the state at
-the
-   end of a step equals that at its start (least squares in a trust region, then Newton's method),
-   which is a cycle.
+   the end of a step equals that at its start (least squares in a trust region, then Newton's
+   method), which is a cycle.
 3. The numbers of the best cycle are changed from cycle to cycle until its largest multiplier is
-small,
-   and then until most of the walkers that start near it walk
+   small, and then until most of the walkers that start near it walk
    (:mod:`osimlite.studies.gait.stability`).
 """
 
@@ -26,7 +23,7 @@ from osimlite.base.require import require
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
-from osimlite.simulation.batches import BatchEngine, run_many
+from osimlite.simulation.batches import BatchEngine
 from osimlite.studies.gait.basin import sample_perturbed_starts, simulate_walks
 from osimlite.studies.gait.cycle import (
     CYCLE_TOLERANCE,
@@ -34,9 +31,10 @@ from osimlite.studies.gait.cycle import (
     Cycle,
     differentiate_step_map,
     find_cycle,
+    sample_states_of_step,
 )
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.starts import move_along_neutral_directions, plant_feet
+from osimlite.studies.gait.starts import plant_feet
 from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, StepMap
 from osimlite.studies.gait.steps import WalkerSteps, walk_many
 from osimlite.studies.sweep.plan import Plan
@@ -484,28 +482,6 @@ class CycleSearch:
         if self._first is None:
             self._first = StepMap(engine, state, footing=self.footing, threads=self.threads)
         return self._first.rebuild_for_model(engine, state, accuracy)
-
-
-def sample_states_of_step(step_map: StepMap, cycle: Cycle, fractions: Sequence[float]) -> Floats:
-    """Return states (k, y) of a cycle at parts of a step.
-
-    The walker is at the origin with its trunk as built, as far as neither changes the motion.
-
-    Args:
-        step_map: step map of the walker.
-        cycle: gait cycle.
-        fractions: parts of a step after touch-down (k,), increasing.
-    """
-    times = [fraction * cycle.period for fraction in fractions]
-    runs = run_many(
-        step_map.engine,
-        cycle.state[None],
-        cycle.period,
-        report_times=times,
-        accuracy=TIGHT_ACCURACY,
-        threads=step_map.threads,
-    )
-    return move_along_neutral_directions(runs.reports[0], step_map.neutral)
 
 
 class _ClosingProblem:

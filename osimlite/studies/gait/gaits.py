@@ -14,13 +14,8 @@ from osimlite.base.files import prepare_folder, read_file, write_atomically
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.document.printer import write
-from osimlite.studies.gait.cycle_search import (
-    Candidate,
-    CycleSearch,
-    ModelCycle,
-    Progress,
-    sample_states_of_step,
-)
+from osimlite.studies.gait.cycle import sample_states_of_step
+from osimlite.studies.gait.cycle_search import Candidate, CycleSearch, ModelCycle, Progress
 from osimlite.studies.gait.stability import StabilityOptimization, get_cost
 from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, refuse_constraints
 from osimlite.studies.gait.steps import WalkerSteps, walk_many
