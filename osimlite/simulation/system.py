@@ -1,4 +1,4 @@
-"""A mechanism with its forces: evaluation of states, and reports of forces, energies, probes and links.
+"""A mechanism with its forces: inverse dynamics, and reports of forces, energies, probes and links.
 
 Engines derive from :class:`System`. The stages of an evaluation are Simbody's: positions of the
 links, their velocities, the forces on them, their accelerations. An evaluation leaves its results in
@@ -12,16 +12,20 @@ from functools import cached_property
 
 import numpy as np
 
+from osimlite.base.progress import divide_rows
 from osimlite.mechanics.kernels import layout
 from osimlite.mechanics.kernels.layout import (
     ITEM,
     LINK_WORK,
     MODEL,
+    OUTCOME,
     STAGE,
+    WORK,
 )
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.simulation.elements.force_records import ForceElement
+from osimlite.simulation.elements.muscle import STRENGTH
 from osimlite.simulation.evaluation import StateEvaluator
 from osimlite.simulation.link_motion import Moments, locate_points
 
@@ -30,7 +34,7 @@ MOMENTS_PER_CALL = 4096
 
 
 class System(StateEvaluator):
-    """A mechanism and its forces, packed for the kernels, with reports of evaluated states.
+    """A mechanism and its forces, packed for the kernels, with inverse dynamics and reports of states.
 
     Arguments, attributes and errors are those of :class:`StateEvaluator`.
     """
@@ -256,6 +260,95 @@ class System(StateEvaluator):
             (mass_properties.mass, frame[:3, :3] @ mass_properties.center + frame[:3, 3])
             for frame, mass_properties in fixed
         ]
+
+    def compute_required_forces(self, moments: Floats, udot: Floats) -> Floats:
+        """Compute inverse dynamics for many states.
+
+        Constraints are ignored. Errors are those of :meth:`evaluate_moments`.
+
+        Args:
+            moments: times (s) and states (k, 1 + y).
+            udot: accelerations (k, n) in the order of the state.
+
+        Returns:
+            Generalized forces (k, n) that the accelerations need beyond gravity and the forces of
+            the model.
+        """
+        # The kernel of inverse dynamics writes its result in place of the derivatives of the
+        # speeds.
+        first = self.work_size + len(self.order)
+        return self.evaluate_moments(moments, range(first, first + len(self.order)), udot=udot)
+
+    def compute_accelerated_links(self, moments: Floats, udot: Floats) -> Floats:
+        """Return the link records (k, l, n) of the kernels for given accelerations.
+
+        The wrench of a link is the sum of the applied forces (with gravity) on it and on all that
+        it carries, less the inertial forces: joints and constraints balance it. Errors are those of
+        :meth:`evaluate_moments`.
+
+        Args:
+            moments: times (s) and states (k, 1 + y).
+            udot: accelerations (k, n) in the order of the state.
+        """
+        first = int(self.structure[MODEL.WORK_LINK])
+        result = self.evaluate_moments(moments, range(first, first + self._links.size), udot=udot)
+        return result.reshape(-1, *self._links.shape)
+
+    def compute_unit_forces(
+        self, moments: Floats, udot: Floats, names: Sequence[str]
+    ) -> tuple[Floats, Floats, Floats]:
+        """Compute required generalized forces, and the contribution of each actuator at a control of 1.
+
+        The force of each actuator must be proportional to its control, and all controls must be 0.
+        Constraints are ignored. Errors are those of :meth:`evaluate_moments`.
+
+        Args:
+            moments: times (s) and states (k, 1 + y).
+            udot: accelerations (k, n) in the order of the state.
+            names: paths of the a actuators.
+
+        Returns:
+            Generalized forces that are missing without actuators (k, n), generalized forces of each
+            actuator (k, a, n), and the forces (N) of muscles (k, a), which are 1 for other
+            actuators.
+        """
+        code, size = self.program.code, len(self.order)
+        code.make_ready(("push_each", "inverse"))
+        item_offsets = {
+            self.forces.elements[owner].path: offset for offset, owner in self._owners.items()
+        }
+        controls = dict(zip(self._controls.names, self.control_offsets, strict=True))
+        order = [0, len(names)]
+        for name in names:
+            item, path, strength = item_offsets[name], -1, -1
+            # A muscle pulls along its path with its strength; the other actuators apply their
+            # optimal force.
+            if self.has_quantity(name, STRENGTH):
+                path = item - int(
+                    self.structure[item + ITEM.OWN + self.get_force_type(name).text.int_count]
+                )
+                (strength,) = self.find_offsets(name, (STRENGTH,))
+            order += item, controls[name], path, strength
+        inputs = np.hstack([moments, udot])
+        result = np.empty((len(moments), size + len(names) * (size + 1)))
+        arguments = (
+            self.program.ints,
+            self.numbers,
+            self._w,
+            self._y,
+            self._f,
+            code.get_address("inverse"),
+        )
+        entry, plan = code.get_entry("push_each"), np.array(order, dtype=np.int64)
+        for rows in divide_rows("computing the force of each muscle", len(moments)):
+            plan[0] = rows.stop - rows.start
+            status = self._run_kernel(entry, *arguments, inputs[rows], plan, result[rows])
+            if status != OUTCOME.OK:
+                raise self.make_evaluation_error(
+                    status, float(self._w[WORK.TIME]), self._y.tolist()
+                )
+        unit_results = result[:, size:].reshape(len(moments), len(names), size + 1)
+        return result[:, :size], unit_results[:, :, :size], unit_results[:, :, size]
 
     def evaluate_all_links(self, moments: Moments) -> Floats:
         """Return the link records of the kernels at many states.
