@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.dynamics import (
-    SMALLEST_PIVOT,
     add_generalized_forces,
     clear_wrenches,
     composite_rigid_body,
@@ -42,6 +41,12 @@ from osimlite.mechanics.kernels.layout import (
     STAGE,
     WORK,
     Record,
+)
+from osimlite.mechanics.kernels.linear_algebra import (
+    dot_range,
+    factorise_matrix,
+    invert_matrix,
+    solve_factorised,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import (
@@ -496,73 +501,6 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
     return factorise_matrix(size, system, work)
 
 
-def factorise_matrix(size: int, a: Floats, masses: Floats) -> bool:
-    """Factorise a matrix (size, size) in place by Gaussian elimination without pivoting.
-
-    Args:
-        size: size of the matrix.
-        a: matrix (size, size); replaced by its factors.
-        masses: mass matrix (size, size).
-
-    Returns:
-        Whether each pivot is more than `SMALLEST_PIVOT` times the mass there.
-    """
-    # The matrix is nearly symmetric and positive definite for small steps, so that pivoting is
-    # unnecessary.
-    for k in range(size):
-        row = at(a, size * k)
-        if not row[k] > SMALLEST_PIVOT * masses[size * k + k]:
-            return False
-        # Store inverse pivots, because divisions are slow and each is used in every solution.
-        row[k] = 1.0 / row[k]
-        for i in range(k + 1, size):
-            lower_row = at(a, size * i)
-            if lower_row[k] != 0.0:
-                factor = lower_row[k] * row[k]
-                lower_row[k] = factor
-                for j in range(k + 1, size):
-                    lower_row[j] -= factor * row[j]
-    return True
-
-
-def solve_factorised(size: int, a: Floats, x: Floats) -> None:
-    """Solve a linear system in place with the factors of `factorise_matrix`.
-
-    Args:
-        size: size of the matrix.
-        a: factors.
-        x: right side (size,), replaced by the solution.
-    """
-    for i in range(size):
-        x[i] -= dot_range(0, i, at(a, size * i), x)
-    for i in range(size - 1, -1, -1):
-        row = at(a, size * i)
-        x[i] = (x[i] - dot_range(i + 1, size, row, x)) * row[i]
-
-
-def invert_matrix(size: int, a: Floats) -> None:
-    """Invert a small matrix (size, size) in place.
-
-    It is Gauss-Jordan elimination without pivoting, since 1 - c J of the states of a force is near
-    the identity for small c.
-
-    Args:
-        size: size of the matrix.
-        a: matrix; replaced by its inverse.
-    """
-    for i in range(size):
-        pivot = 1.0 / a[size * i + i]
-        a[size * i + i] = 1.0
-        for k in range(size):
-            a[size * i + k] *= pivot
-        for j in range(size):
-            if j != i:
-                factor = a[size * j + i]
-                a[size * j + i] = 0.0
-                for k in range(size):
-                    a[size * j + k] -= factor * a[size * i + k]
-
-
 def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
     """Solve (1 - c J) d = r in place, after `condense_system` with the same c.
 
@@ -628,18 +566,3 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
     for k in range(size):
         du[k] = right[k]
         d[k] += c * right[k]
-
-
-def dot_range(first: int, end: int, a: Floats, b: Floats) -> float:
-    """Return the scalar product of the entries `first` to `end` of two vectors.
-
-    Args:
-        first: first index.
-        end: end of the indices.
-        a: first vector.
-        b: second vector.
-    """
-    total = 0.0
-    for k in range(first, end):
-        total += a[k] * b[k]
-    return total

@@ -18,7 +18,6 @@ from math import inf, sqrt
 
 from osimlite.mechanics.kernels.condensation import (
     condense_system,
-    dot_range,
     linearise_state,
     solve_condensed,
 )
@@ -29,6 +28,7 @@ from osimlite.mechanics.kernels.error_control import (
     project_and_measure,
 )
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK, Record
+from osimlite.mechanics.kernels.linear_algebra import dot_range
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, is_finite
 
 
