@@ -8,6 +8,7 @@ import numpy as np
 
 from osimlite.base.progress import divide_rows
 from osimlite.mechanics.kernels import assembly
+from osimlite.mechanics.kernels.assembly_equations import HOLD
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.mechanics.multibody.assembly import tolerance_of
@@ -99,7 +100,7 @@ def _pack_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
     # Without constraints on bodies the positions of the links need not be computed, which is much
     # faster.
     result = [int(program.on_bodies or turning), len(couplers)]
-    result += [assembly.HOLD.HELD_BY_USER if info.locked else assembly.HOLD.FREED for info in infos]
+    result += [HOLD.HELD_BY_USER if info.locked else HOLD.FREED for info in infos]
     result += [int(not info.yielding) for info in infos]
     result += [int(info.clamped) for info in infos]
     result += [0] * len(infos)
