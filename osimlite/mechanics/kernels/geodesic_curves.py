@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.cable_paths import (
+from osimlite.mechanics.kernels.cable_records import (
     CABLE,
     ELEMENT,
     OBSTACLE,
@@ -10,7 +10,8 @@ from osimlite.mechanics.kernels.cable_paths import (
     OBSTACLE_WORK,
 )
 from osimlite.mechanics.kernels.cable_surfaces import END_NUMBERS, GEODESIC, shoot_geodesic
-from osimlite.mechanics.kernels.geodesic_paths import GEODESIC_PATH, GEODESIC_WRAP, SURFACE_POSE
+from osimlite.mechanics.kernels.geodesic_chain import SURFACE_POSE
+from osimlite.mechanics.kernels.geodesic_paths import GEODESIC_PATH, GEODESIC_WRAP
 from osimlite.mechanics.kernels.geodesic_starts import WRAP_NUMBERS
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.path_wraps import point_in_ground, point_in_surface

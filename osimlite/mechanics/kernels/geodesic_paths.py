@@ -16,30 +16,32 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.cable_paths import OBSTACLE_WORK
+from osimlite.mechanics.kernels.cable_records import OBSTACLE_WORK
 from osimlite.mechanics.kernels.cable_surfaces import (
     END_NUMBERS,
     GEODESIC,
     SURFACE,
     SURFACE_TYPE,
-    shoot_geodesic,
     surface_value,
+)
+from osimlite.mechanics.kernels.geodesic_chain import (
+    SEARCH_STAGE,
+    SURFACE_POSE,
+    TOUCH,
+    chain_length,
+    find_slot,
+    insert_slot,
+    lay_chain,
+    remove_slot,
 )
 from osimlite.mechanics.kernels.geodesic_search import (
     SLOT,
-    ends_to_ground,
     line_end,
     line_start,
     search_size,
     smooth_chain,
 )
-from osimlite.mechanics.kernels.geodesic_starts import (
-    BENDING,
-    WRAP_NUMBERS,
-    count_ways,
-    squared_depth,
-    start_on_surface,
-)
+from osimlite.mechanics.kernels.geodesic_starts import BENDING, WRAP_NUMBERS, start_on_surface
 from osimlite.mechanics.kernels.layout import ITEM, OUTCOME, Record
 from osimlite.mechanics.kernels.path_wraps import point_in_surface
 from osimlite.mechanics.kernels.paths import (
@@ -53,6 +55,7 @@ from osimlite.mechanics.kernels.paths import (
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import place_frame
+from osimlite.mechanics.kernels.segment_depths import count_ways, squared_depth
 from osimlite.mechanics.laws.vectors import (
     Vector,
     cross,
@@ -93,19 +96,6 @@ class GEODESIC_PATH(metaclass=Record):
     """Offset of the poses of the surfaces."""
 
 
-class SURFACE_POSE(metaclass=Record):
-    """Pose of a surface: rotation by rows and position in ground come first."""
-
-    HOW = 12
-    """How the surface may bend the segment, see `BENDING`."""
-    ABOUT = 13
-    """Axis about which it turns the segment."""
-    SIZE = 16
-    """Length of a pose: rotation by rows, position in ground, `HOW` and `ABOUT`."""
-
-
-TOUCH = 1e-10
-"""Smallest angle by which a segment turns around a surface that is inserted (rad)."""
 WHOLE = 10.0
 """Added to the angle of surfaces with an active side, so that they come first (rad)."""
 INSIDE = 1e-14
@@ -114,17 +104,6 @@ WAYS = 16
 """Largest number of combinations of directions past open surfaces."""
 NEARLY = 0.97
 """A path is dropped if this part of its length exceeds that of the shortest one."""
-
-
-class SEARCH_STAGE(metaclass=Record):
-    """Stages of a search."""
-
-    MEANT = 0
-    """Each surface is passed on its active side."""
-    STRING = 1
-    """Starts on ellipsoids come from a tightened string."""
-    ALONE = 2
-    """The segment is bent around one surface only."""
 
 
 TURNS = 16
@@ -292,20 +271,6 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
         if combination == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
             combination, stage = 0, stage + 1
     return best_count
-
-
-def chain_length(chain: Floats, count: int) -> float:
-    """Return the length of a segment that is bent around surfaces (m).
-
-    Args:
-        chain: slots.
-        count: number of slots in use.
-    """
-    length = norm(minus(line_end(chain, 0, count), line_start(chain, 1)))
-    for k in range(1, count + 1):
-        line = minus(line_end(chain, k, count), line_start(chain, k + 1))
-        length += chain[SLOT.SIZE * k + OBSTACLE_WORK.CURVE + GEODESIC.ARC] + norm(line)
-    return length
 
 
 def fill_slots(
@@ -490,32 +455,6 @@ def node_in_surface(pose: Floats, work: Floats, node: int) -> Vector:
     return point_in_surface(pose, vector(work, NODE_WORK.SIZE * node + NODE_WORK.PLACE))
 
 
-def find_slot(chain: Floats, count: int, number: int) -> int:
-    """Return the slot of a wrap, 0 if it has no slot.
-
-    Args:
-        chain: slots.
-        count: number of slots in use.
-        number: number of the wrap.
-    """
-    for k in range(1, count + 1):
-        if chain[SLOT.SIZE * k + SLOT.OWNER] == number:
-            return k
-    return 0
-
-
-def remove_slot(chain: Floats, count: int, slot_index: int) -> None:
-    """Remove a slot from the chain, and move those after it.
-
-    Args:
-        chain: slots; changed.
-        count: number of slots in use.
-        slot_index: slot to remove.
-    """
-    for k in range(SLOT.SIZE * slot_index, SLOT.SIZE * (count + 1)):
-        chain[k] = chain[k + SLOT.SIZE]
-
-
 def find_largest_turn(
     i: Ints,
     p: Floats,
@@ -591,76 +530,3 @@ def find_largest_turn(
                             cross(point, start_direction),
                         )
     return result, slot_index, axis
-
-
-def insert_slot(
-    p: Floats, pose: Floats, chain: Floats, count: int, slot_index: int, number: int
-) -> None:
-    """Insert a surface into a slot of the chain.
-
-    Args:
-        p: numbers of the wrap.
-        pose: pose of the surface in ground.
-        chain: slots; changed.
-        count: number of slots in use.
-        slot_index: slot of the surface; those from there on move by one.
-        number: number of the wrap.
-    """
-    for k in range(SLOT.SIZE * (count + 3) - 1, SLOT.SIZE * (slot_index + 1) - 1, -1):
-        chain[k] = chain[k - SLOT.SIZE]
-    slot = at(chain, SLOT.SIZE * slot_index)
-    # GEODESIC.STEP 0 selects the exact integration of geodesics.
-    slot[SLOT.OWNER], slot[OBSTACLE_WORK.CURVE + GEODESIC.STEP] = number, 0.0
-    for k in range(SURFACE_POSE.HOW):
-        slot[OBSTACLE_WORK.IN_GROUND + k] = pose[k]
-    for k in range(SURFACE.SIZE):
-        slot[OBSTACLE_WORK.SIZE + k] = p[WRAP_NUMBERS.SURFACE + k]
-
-
-def lay_chain(
-    p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, work: Floats
-) -> bool:
-    """Lay the chain around the surface in a slot, between its neighbours.
-
-    Args:
-        p: numbers of the wrap.
-        pose: pose of the surface in ground; its axis of the turn is updated.
-        chain: slots; the geodesic of slot `k` is filled.
-        count: number of slots in use.
-        k: slot of the surface.
-        stage: MEANT, STRING or ALONE of `SEARCH_STAGE`.
-        work: workspace of a search.
-
-    Returns:
-        Whether it touches.
-    """
-    first, second = (
-        point_in_surface(pose, line_start(chain, k)),
-        point_in_surface(pose, line_end(chain, k, count)),
-    )
-    about, slot = vector(pose, SURFACE_POSE.ABOUT), at(chain, SLOT.SIZE * k)
-    turn, point, start_direction, arc = start_on_surface(
-        p,
-        first,
-        second,
-        BENDING.PULLED if stage == SEARCH_STAGE.STRING else pose[SURFACE_POSE.HOW],
-        about,
-        work,
-    )
-    if not (
-        turn > TOUCH
-        and shoot_geodesic(
-            at(slot, OBSTACLE_WORK.SIZE),
-            point,
-            start_direction,
-            arc,
-            at(slot, OBSTACLE_WORK.CURVE),
-            work,
-        )
-    ):
-        return False
-    # The axis follows the geodesic, so that later calls keep to this side of the surface.
-    if norm(about) > 0.0:
-        store_vector(pose, SURFACE_POSE.ABOUT, cross(point, start_direction))
-    ends_to_ground(slot)
-    return True

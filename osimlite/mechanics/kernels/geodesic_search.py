@@ -17,13 +17,9 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.cable_paths import (
-    OBSTACLE_WORK,
-    UNKNOWNS,
-    differentiate_end,
-    end_to_ground,
-    shoot_again,
-)
+from osimlite.mechanics.kernels.cable_correction import UNKNOWNS, differentiate_end, shoot_again
+from osimlite.mechanics.kernels.cable_paths import end_to_ground
+from osimlite.mechanics.kernels.cable_records import OBSTACLE_WORK
 from osimlite.mechanics.kernels.cable_surfaces import END_NUMBERS, GEODESIC, GEODESIC_ROOM, SURFACE
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.linear_algebra import (

@@ -13,15 +13,15 @@ import numpy as np
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.mechanics.kernels.cable_paths import (
+from osimlite.mechanics.kernels.cable_correction import solver_size
+from osimlite.mechanics.kernels.cable_paths import cable_path
+from osimlite.mechanics.kernels.cable_records import (
     CABLE,
     CABLE_POINT_WORK,
     CABLE_WORK,
     ELEMENT,
     OBSTACLE_STATE,
     OBSTACLE_WORK,
-    cable_path,
-    solver_size,
 )
 from osimlite.mechanics.kernels.cable_surfaces import (
     END_NUMBERS,
