@@ -104,6 +104,7 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
     """
     namespace = cls.__dict__
     fields: dict[str, _Field] = {}
+    # From the most general class on, so that derived classes replace defaults.
     for base in reversed(cls.__mro__[1:]):
         fields |= base.__dict__.get("__record_fields__", {})
     annotated = [
@@ -115,6 +116,8 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
         value = namespace.get(name, _NOTHING)
         fields[name] = value if isinstance(value, _Field) else _Field(value)
         fields[name].kw_only = kw_only
+        # With slots the class is made anew without these values, which would conflict with the
+        # slots.
         if value is not _NOTHING and not slots:
             if fields[name].default is _NOTHING:
                 delattr(cls, name)
@@ -126,6 +129,7 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
             for name, value in namespace.items()
             if name not in (*annotated, "__dict__", "__weakref__")
         }
+        # Slots can only be declared while a class is created, so that it is created again.
         cls = type(cls)(
             cls.__name__,
             cls.__bases__,
@@ -220,6 +224,7 @@ def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
     names: dict[str, Any] = {"_nothing": _NOTHING, "_set": object.__setattr__}
     for name, spec in cls.__record_fields__.items():
         value = name
+        # Defaults are passed by name: the text of an object need not be code that makes it again.
         names |= {f"_default_{name}": spec.default, f"_make_{name}": spec.default_factory}
         if spec.default_factory is not _NOTHING:
             value = (
@@ -316,4 +321,5 @@ def _get_state(self: Any) -> list[Any]:
 def _set_state(self: Any, values: list[Any]) -> None:
     """Set the values from pickle."""
     for name, value in zip(self.__record_fields__, values, strict=True):
+        # The record itself refuses assignments.
         object.__setattr__(self, name, value)

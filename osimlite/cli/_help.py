@@ -116,6 +116,7 @@ def _wrap(text: str, width: int, indent: int) -> list[str]:
         width,
         initial_indent=blank,
         subsequent_indent=blank,
+        # Names of options and files stay whole, so that they can be copied and searched for.
         break_on_hyphens=False,
         break_long_words=False,
     )

@@ -116,6 +116,8 @@ def linearize(
     y, c, d = (
         model.compute_outputs(time, x, u, output_indices)
         if outputs
+        # Matrices without rows still have their columns, so that products with states and controls
+        # work.
         else (np.zeros((0, size)) for size in (1, len(x), len(u)))
     )
     if not all(np.isfinite(matrix).all() for matrix in (y, c, d)):

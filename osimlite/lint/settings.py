@@ -62,6 +62,7 @@ class Settings:
         try:
             relative = path.resolve().relative_to(self.file.parent.resolve()).as_posix()
         except ValueError:
+            # A file outside of the project matches patterns by its name only.
             relative = path.as_posix()
         codes = (
             words

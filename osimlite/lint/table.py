@@ -81,6 +81,8 @@ class Table(CheckTarget):
             return RowScanner(cells * 3 + 2, markers=True).scan(
                 self.data, header.rows, header.row_line
             )
+        # OpenSim rejects tables with commas as a whole; findings for each row would say nothing
+        # new.
         if not header.labels or "," in header.labels[0].text:
             return TableRows()
         if first_row and str(len(first_row[0].split())) == header.value("nColumns"):
@@ -91,8 +93,11 @@ class Table(CheckTarget):
         """Yield the cells of the rows from a time on; the first is found by bisection."""
         data, time_column = self.data, int(self.is_markers)
         low, high = self.header.rows, len(data)
+        # The rest is some rows, which are read one by one as fast.
         while high - low > 2000:
             middle = data.find(b"\n", (low + high) // 2, high) + 1
+            # Frame number and time are in the first letters of a row, which may have thousands of
+            # cells.
             cells = data[middle : middle + 200].split(None, 2) if middle else []
             if len(cells) <= time_column or not parse_number(cells[time_column]) < time:
                 high = (low + high) // 2

@@ -95,6 +95,7 @@ def build_frame_distance_rows(
             problem.check_name(constraint, path, problem.functions.mechanism.frames, "frame")
         minimum = frame_pair.minimum_distance
         maximum = frame_pair.maximum_distance
+        # Written so that NaN is refused too.
         if not 0.0 <= minimum <= maximum:
             raise problem.invalid_error(
                 constraint,
@@ -159,6 +160,7 @@ def build_bound_rows(
         )
         for function, _ in functions
     ]
+    # In the order of `formula`: all functions of the first variable, then those of the second.
     limits: list[Range] = [limit for _ in paths for _, limit in functions]
 
     def formula(point: PointSymbols) -> Formula:

@@ -301,6 +301,7 @@ def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTraj
             continuation = (-1.0 if pair.negate else 1.0) * trajectory.columns[
                 pair.initial_variable
             ]
+        # The end of the first period is the start of the second, and has one row.
         columns[name] = np.concatenate([column, continuation[1:]])
     times = np.concatenate([trajectory.times, trajectory.times[1:] + (end - start)])
     return MocoTrajectory(times, columns, names, trajectory.parameters)

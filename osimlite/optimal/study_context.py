@@ -33,6 +33,7 @@ def name_file_in_errors(file: object) -> Iterator[None]:
     try:
         yield
     except OsimliteError as error:
+        # Files that the study names have reported themselves, and are nearer to the problem.
         if error.file is None and isinstance(file, str | Path):
             error.file = str(file)
         raise
@@ -84,12 +85,18 @@ class StudyContext:
         try:
             lines = read_file(self.file).decode("utf-8", "replace").splitlines()
         except OsimliteError:
+            # The file may have changed or gone since it was read; the error at hand must still be
+            # reported.
             return {"file": str(self.file)}
         matches = [
             (number, text) for number, text in enumerate(lines, 1) if tag_pattern.search(text)
         ]
         matches = [
-            numbered_line for numbered_line in matches if name_pattern.search(numbered_line[1])
+            # Of several parts with one tag, that with the name; the first if the name is on another
+            # line.
+            numbered_line
+            for numbered_line in matches
+            if name_pattern.search(numbered_line[1])
         ] or matches
         return {"file": str(self.file), "line": matches[0][0] if matches else 1}
 
@@ -150,6 +157,8 @@ class StudyContext:
             DocumentError: a part is of an unknown class, or a value is invalid.
         """
         for study_object in study_root.walk():
+            # Components of the model have their own rules, in the linter and when the model is
+            # built.
             if isinstance(study_object, Component) and study_object.model is not None:
                 continue
             if isinstance(study_object, Unknown):

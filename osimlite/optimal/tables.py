@@ -134,6 +134,8 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     times = table.times
     rows = table.rows
     step = float(np.diff(times).min())
+    # OpenSim's test compares the mean step with the smallest to machine precision, so that nearly
+    # all tables with rounded times are resampled.
     if float(times[-1] - times[0]) / (len(times) - 1) - step > np.finfo(float).eps:
         # Resample at equal steps before the table is padded at both ends, in the order of OpenSim's
         # Storage.
@@ -196,6 +198,7 @@ def _resolve_state_path(label: str, states: Sequence[str]) -> str:
     ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
     for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
         matches = [state for state in states if state == end or state.endswith(f"/{end}")]
+        # A label that several states could mean is not guessed.
         if len(matches) == 1:
             return matches[0]
     return label

@@ -75,6 +75,7 @@ class UnilateralConstraint(Constraint, abstract=True):
     """A constraint that can let go."""
 
 
+# OpenSim leaves these constraints off until a program turns them on.
 class RollingOnSurfaceConstraint(UnilateralConstraint):
     """A round body that rolls on a plane of another, and may lift off or slip."""
 

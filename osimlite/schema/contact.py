@@ -27,6 +27,7 @@ class ContactGeometry(ModelComponent, abstract=True):
     """How the surface is drawn."""
 
 
+# It has no bottom: a sphere deep inside is still pushed out at the front.
 class ContactHalfSpace(ContactGeometry):
     """Everything with x > 0 of its own frame; the outward normal is the negative X axis."""
 

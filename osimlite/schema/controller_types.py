@@ -24,6 +24,7 @@ class PrescribedController(Controller):
 class ControlSetController(Controller):
     """Controls read from a file of control curves."""
 
+    # If the file is missing, OpenSim writes a line to its log and simulates without controls.
     controls_file: Annotated[str, make_input_file("ControlSet or table", legacy=True)] = (
         "Unassigned"
     )

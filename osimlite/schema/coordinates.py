@@ -18,10 +18,14 @@ class Coordinate(ModelComponent):
     """Value at the start of a simulation, before assembly satisfies the constraints."""
     default_speed_value: Annotated[float, real("rad/s | m/s")] = 0.0
     """Generalized speed at the start of a simulation; if the coordinate is locked, it starts with 0."""
+    # OpenSim compares the two numbers with each other only if the coordinate is clamped.
     range: Annotated[tuple[float, float], reals("rad | m", least=2, most=2)] = (-10.0, 10.0)
     """Lowest and highest value that a user interface offers; it limits nothing in a simulation."""
+    # OpenSim rejects a clamped coordinate whose default value is outside of the range.
     clamped: Flag = False
     """Whether values that are set must lie within `range`, the default also; motion may leave it all the same."""
+    # OpenSim reads true, false, 1 and 0 only: after `yes` the coordinate is free, with a line in
+    # the log.
     locked: Flag = False
     """Whether a constraint holds the coordinate at its default value, at speed 0."""
     prescribed_function: Optional[Function] = None

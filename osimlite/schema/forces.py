@@ -29,8 +29,12 @@ class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParam
         outside={TOUCHING: "stiffness"}, doubts={"dissipation": "each impact adds energy"}
     )
 
+    # OpenSim counts a surface that is named twice as two, which doubles the force. A surface
+    # without a partner touches nothing. Both are silent.
     geometry: ContactGeometryNames = ()
     """Contact surfaces of this material; all surfaces of one force touch each other."""
+    # OpenSim's default of 0 divides 0 by 0 as soon as surfaces touch: a misspelt tag makes the
+    # motion NaN, without a message.
     stiffness: Annotated[float, real("N/m^2", "> 0")] = 0.0
     """Plane-strain modulus: of two surfaces the softer one yields more; with 0 on both, OpenSim's force is NaN."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
@@ -50,6 +54,8 @@ class HuntCrossleyContactParametersSet(Set, tag="HuntCrossleyForce::ContactParam
     """The materials, each with the surfaces that are made of it."""
 
 
+# Several spheres of one force also touch each other, and Simbody omits the contacts after one that
+# separates too fast to push. One force for each pair of surfaces avoids both.
 class HuntCrossleyForce(Force):
     """Contact between all surfaces it lists: Hertz stiffness, Hunt-Crossley dissipation, Stribeck friction."""
 
@@ -78,10 +84,12 @@ class CoordinateLimitForce(ForceProducer):
         doubts={"damping": "the limit adds energy"},
     )
 
+    # OpenSim compares it with plain names of coordinates and rejects paths.
     coordinate: CoordinateName = "UNASSIGNED"
     """Name of the coordinate that is limited; its own `range` has no part in it."""
     upper_stiffness: Annotated[float, real("N*m/deg (rotational)", "> 0")] = 1.0
     """Stiffness against values above the upper limit, beyond the transition."""
+    # A limit that is left out, or misspelt, is 0 degrees, where the force acts from the start.
     upper_limit: Annotated[float, real("deg (rotational)")] = 0.0
     """Value above which the spring begins to push back."""
     lower_stiffness: Annotated[float, real("N*m/deg (rotational)", "> 0")] = 1.0

@@ -67,11 +67,14 @@ class Body(PhysicalFrame):
         scales={"mass_center": OWN},
     )
 
+    # The default is NaN so that OpenSim rejects a body without a mass, also one with a misspelt
+    # tag.
     mass: Annotated[float, real("kg", ">= 0")] = math.nan
     """Mass of the whole body; OpenSim does not simulate a body without one."""
     mass_center: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Where the mass centre is, in the frame of the body."""
-    # About the mass centre, unlike Simbody's MassProperties, which has it about the origin.
+    # About the mass centre, unlike Simbody's MassProperties, which has it about the origin. OpenSim
+    # 4.6 accepts any six numbers, even those that no body can have.
     inertia: Annotated[Vec6, Value("double", "Vec6", "kg*m^2")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Entries xx yy zz xy xz yz of the inertia matrix about the mass centre, along the axes of the body."""
 

@@ -32,6 +32,8 @@ class Appearance(Object):
 class Geometry(Component, abstract=True):
     """A shape drawn in the frame that owns it."""
 
+    # OpenSim replaces it by `..` in shapes that a frame owns, so that a wrong path does no harm
+    # there.
     socket_frame: FrameSocket = ""
     """The frame that the shape is drawn in; OpenSim fills in the one that owns it."""
     input_transform: TransformInput = ""

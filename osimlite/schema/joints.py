@@ -39,12 +39,15 @@ class Joint(ModelComponent, abstract=True):
     speeds_are_rates: ClassVar[bool] = True
     """Whether its speeds are the rates of its coordinates; otherwise those of its rotations are an angular velocity."""
 
+    # OpenSim looks for a bare name among the children of the joint only; a body needs its path.
     socket_parent_frame: PhysicalFrameSocket = ""
     """The frame F in which the joint measures its motion, most often an offset frame of the joint."""
     socket_child_frame: PhysicalFrameSocket = ""
     """The frame M that the joint moves, most often an offset frame of the joint."""
     coordinates: Many[Coordinate] = make_empty_list()
     """The generalized coordinates in the order of the class; a CustomJoint has the order of its axes."""
+    # This list and `coordinates` add no level to paths, which are such as
+    # /jointset/hip/pelvis_offset.
     frames: Many[PhysicalOffsetFrame] = make_empty_list()
     """Offset frames that belong to the joint, so that its sockets can name places on bodies."""
 

@@ -59,6 +59,7 @@ class Model(ModelComponent):
     """Unit of all lengths, in a word; tools convert marker data to it, the mechanics assume metres."""
     force_units: Text = "N"
     """Unit of all forces, in a word for readers; the mechanics assume newtons."""
+    # In paths OpenSim calls each set by its class in lower case, whatever name the file gives it.
     body_set: Unnamed[BodySet] = make_default(BodySet, name="bodyset")
     """The rigid bodies; joints say how they hang together."""
     joint_set: Unnamed[JointSet] = make_default(JointSet, name="jointset")

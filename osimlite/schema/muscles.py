@@ -204,6 +204,8 @@ class ActivationFiberLengthMuscle(Muscle, abstract=True):
     """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
 
 
+# OpenSim's potential energy of these fibers is 0 below a length of 1 m: it takes metres for optimal
+# fiber lengths.
 class Thelen2003Muscle(ActivationFiberLengthMuscle):
     """The muscle of Thelen (2003), with tendon and fiber strains at full force and shape factors of its curves."""
 
@@ -242,6 +244,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     """Shape of force over velocity (Hill's a / F0); less is more curved."""
     Flen: Annotated[float, real(domain="> 1")] = 1.4
     """Force that lengthening fibers approach, of the isometric one."""
+    # The velocity grows without bound as the force approaches `Flen`, so that it needs a tangent.
     fv_linear_extrap_threshold: Annotated[float, real(domain="> 0")] = 0.95
     """Part of `Flen` from which force over velocity continues as a line; more than 1 / `Flen`."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
@@ -264,6 +267,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
         yield from _check_minimum_activation(self.minimum_activation)
 
 
+# OpenSim's equilibrium at the start ignores the speed of the path: fibers begin at rest.
 class Millard2012EquilibriumMuscle(Muscle):
     """The muscle of Millard et al. (2013), tendon and fiber in equilibrium, with curves one can replace."""
 
@@ -514,6 +518,7 @@ class MeyerFregly2016Muscle(Muscle):
     find_contradictions = DeGrooteFregly2016Muscle.find_contradictions
 
 
+# OpenSim takes the lengthening speed of the path as fiber velocity, whatever the pennation.
 class RigidTendonMuscle(Muscle):
     """A muscle whose tendon keeps its slack length, with splines as curves."""
 

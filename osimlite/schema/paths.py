@@ -112,6 +112,7 @@ class PathWrap(ModelComponent):
 
     wrap_object: WrapObjectName = ""
     """Name of the surface; the physical frames of the model are searched for it."""
+    # The methods differ in the plane in which the path crosses the ellipsoid, and in its length.
     method: Annotated[str, word("hybrid", "midpoint", "axial", "Unassigned")] = "hybrid"
     """How the wrap over an ellipsoid is found; other surfaces do not ask."""
     range: Annotated[tuple[int, int], Value("int", "list", least=2, most=2)] = (-1, -1)

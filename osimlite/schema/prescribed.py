@@ -39,14 +39,20 @@ class PrescribedForce(ForceProducer):
 class ExternalForce(ForceProducer):
     """A measured force, such as that of a force plate."""
 
+    # OpenSim 4.6 finds bodies here by name or path, but no offset frames.
     applied_to_body: FrameName = ""
     """The frame that is pushed."""
+    # OpenSim assumes ground for an unknown name, with a warning.
     force_expressed_in_body: ExpressedInFrame = "ground"
     """The frame along whose axes force and torque are measured."""
     point_expressed_in_body: ExpressedInFrame = "ground"
     """The frame in which the point is measured."""
+    # OpenSim takes the three columns whose labels begin so in the order of the file, whatever
+    # letter follows; another number of columns is an error.
     force_identifier: MaybeColumnName = None
     """What the labels of the three columns of the force begin with; left out, there is no force."""
+    # Without it OpenSim applies the force at the origin of the body, silently. Moments are then
+    # wrong by the force times the distance to the point.
     point_identifier: MaybeColumnName = None
     """What the labels of the three columns of the point begin with; left out, the origin of the frame."""
     torque_identifier: MaybeColumnName = None
@@ -60,5 +66,7 @@ class ExternalLoads(ModelComponentSet):
 
     objects: LegacyMany[ExternalForce] = make_empty_list()
     """The forces, each with its columns of the file."""
+    # OpenSim looks for it from its current folder, then from the folder of this file. It puts a
+    # cubic spline through all samples, and continues it straight beyond the last one.
     datafile: Annotated[str, make_input_file("table", legacy=True, required=True)] = ""
     """File of the columns (.sto, .mot); it replaces what the forces name as their source."""

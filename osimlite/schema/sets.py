@@ -57,6 +57,7 @@ class ConstraintSet(ModelComponentSet):
 class Controller(ModelComponent, abstract=True):
     """Computes the controls of the actuators it names."""
 
+    # OpenSim rejects a model in which a controller names an actuator twice.
     socket_actuators: ActuatorSockets = ()
     """The actuators that are controlled; what several controllers want of one is added up."""
     enabled: Flag = True

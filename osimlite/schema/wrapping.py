@@ -30,6 +30,8 @@ class WrapObject(ModelComponent, abstract=True):
     """How the surface is drawn."""
 
 
+# OpenSim's path over a cylinder is not quite the shortest one where its ends have different heights
+# along the axis; osimlite offers that as `wrapping="geodesic"`.
 class WrapCylinder(WrapObject):
     """A cylinder along its own Z axis."""
 
@@ -45,6 +47,8 @@ class WrapCylinder(WrapObject):
     """Extent along Z, half of it to either side; a path that would touch only beyond it does not wrap."""
 
 
+# OpenSim's tangent points are accurate to about 1e-4, and its surface length is a chain of at most
+# 499 chords: lengths jump slightly as a coordinate changes.
 class WrapEllipsoid(WrapObject):
     """An ellipsoid with half axes `dimensions`."""
 
@@ -63,6 +67,7 @@ class WrapSphere(WrapObject):
     """Distance of the surface from the middle."""
 
 
+# OpenSim wraps over a long cylinder at the point of the ring that is nearest to the path.
 class WrapTorus(WrapObject):
     """A ring about its own Z axis; paths run through its hole."""
 

@@ -43,6 +43,7 @@ __all__ = [
     "run_many",
 ]
 
+# It fits the 64-bit integers of the machine code.
 UNLIMITED_TRIES = 2**62
 """Number of attempted steps that no run reaches."""
 
@@ -83,6 +84,7 @@ class BatchOptions(IntegrationOptions):
             SettingError: a value has no meaning.
         """
         self.check_integration()
+        # Written so that NaN is refused too.
         if not self.to >= 0.0:
             raise SettingError(f"the runs must end at 0 s or later, not at {self.to} s")
         # The pairs begin at 0 s, since no report is before the start.

@@ -120,6 +120,8 @@ class IntegrationOptions:
         return {
             name: getattr(self, name)
             for name, declared in INTEGRATION_OPTIONS.items()
+            # These two are always of interest to readers of results; others only if someone has
+            # changed them.
             if name in ("accuracy", "integrator") or getattr(self, name) != declared.default
         }
 

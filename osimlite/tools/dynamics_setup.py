@@ -69,9 +69,11 @@ def compute_analyses(
         motion: all rows.
         first_row: number of the first row in the file of the motion.
     """
+    # OpenSim counts rows from the start of the file, not of the range that is analysed.
     numbers = np.arange(first_row, first_row + len(motion.times))
     for analysis, write in analyses:
         selected_motion = motion
+        # OpenSim takes 0 and negative numbers as 1.
         if analysis.step_interval > 1:
             selected = numbers % analysis.step_interval == 0
             # OpenSim always analyses the first and the last row.

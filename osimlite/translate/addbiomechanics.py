@@ -342,6 +342,7 @@ class SubjectFolder:
         distances = []
         for body in range(len(self.subject.contact_bodies)):
             file_point = file_points[:, 3 * body : 3 * body + 3]
+            # Nine columns for each body: force, point, torque.
             written_point = forces.rows[:, 9 * body + 3 : 9 * body + 6]
             # Zeros mark frames without a centre of pressure.
             selected = file_point.any(axis=1) & (
@@ -426,6 +427,7 @@ def _label_columns(header: Mapping[str, Any], key: str, axes: str, count: int) -
     if axes:
         return tuple(f"{name}_{axis}" for name in names for axis in axes)
     sizes: Sequence[int] = [count // len(names)] * len(names) if names else []
+    # Only custom signals declare their sizes; the others have the same number of columns each.
     if key == "custom_names":
         sizes = header["custom_sizes"]
     return tuple(
@@ -478,6 +480,8 @@ def _create_setups(
             results_directory=RESULTS_FOLDER,
             model_file=model,
             time_range=(start, end),
+            # OpenSim would let muscles act with their default activation, and the moments would
+            # lack their part.
             forces_to_exclude=("Muscles",),
             external_loads_file=loads,
             coordinates_file=COORDINATES_FILE,

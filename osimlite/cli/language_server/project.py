@@ -33,6 +33,7 @@ class Project:
     def __init__(self) -> None:
         self.open: dict[str, DocumentAnalysis] = {}
         self.last_readable: dict[str, DocumentAnalysis] = {}
+        # The default of the protocol, until the editor names another one.
         self.unit: str = types.PositionEncodingKind.Utf16
 
     def find_uri(self, path: str) -> str:
@@ -51,6 +52,7 @@ class Project:
             return open_analysis
         try:
             return DocumentAnalysis(Text(Source.from_file(path).text, self.unit), path)
+        # A damaged file in the folder must not end a search through the others.
         except OsimliteError:
             return None
 
@@ -246,10 +248,12 @@ def _compute_setup_edits(
         use_target = analysis.resolve_use(use)
         if use_target is None or os.path.realpath(use_target.file) != os.path.realpath(target.file):
             continue
+        # Also paths that pass through the component, such as those of its frames.
         if text.startswith("/") and target.path and f"{text}/".startswith(f"{target.path}/"):
             edits.append(
                 types.TextEdit(analysis.text.range(start, end), path + text[len(target.path) :])
             )
+        # A bare name stays one, since many properties do not accept paths.
         elif target.is_same_as(use_target) and not text.startswith("/"):
             edits.append(types.TextEdit(analysis.text.range(start, end), get_last_name(path)))
     return edits

@@ -246,6 +246,7 @@ def _register_file_events(server: Server) -> None:
         is_settings = any(uri.endswith(".toml") for uri in changed)
         files = server.project.open.items()
         server.check_again(
+            # Tables depend on no other file than the settings.
             [uri for uri, file in files if is_settings or not file.is_table or uri in changed]
         )
 
@@ -266,6 +267,7 @@ def _register_queries(server: Server) -> None:
             if analysis.is_readable
             else server.project.last_readable.get(params.text_document.uri)
         )
+        # False: the list is complete, and the editor filters it while the user types on.
         return types.CompletionList(False, list_completions(analysis, readable, offset))
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
@@ -314,6 +316,7 @@ def _register_edits(server: Server) -> None:
             action
             for action in result
             if not requested_kinds
+            # Kinds form a hierarchy: `source` includes `source.fixAll`.
             or any((action.kind or "").startswith(action_kind) for action_kind in requested_kinds)
         ]
 
@@ -354,4 +357,5 @@ def _register_edits(server: Server) -> None:
         content = analysis.text.content
         formatted = format_source(analysis.source)
         full_range = analysis.text.range(0, len(content))
+        # An edit without effect would mark the file as changed.
         return [] if formatted == content else [types.TextEdit(full_range, formatted)]

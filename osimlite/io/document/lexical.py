@@ -21,6 +21,7 @@ Trouble = Literal["unreadable", "cut", "too-many", "too-few", "empty", "ignored"
 ABSENT: Any = object()
 """Value of a text for which OpenSim keeps the default."""
 
+# Without `1`, which is true in the second property system of OpenSim and false in the first.
 _PLAIN_FLAGS = {"true": True, "false": False, "0": False}
 
 _PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -254,6 +255,7 @@ def _make_vector_converter(size: int) -> Callable[[str], Any]:
         words = split_words(raw)
         try:
             values = tuple(map(float, words))
+            # A sum is finite only if all numbers are, so that one test is enough.
             if len(values) == size and isfinite(sum(values)) and "_" not in raw and raw.isascii():
                 return values
         except ValueError:
@@ -262,6 +264,8 @@ def _make_vector_converter(size: int) -> Callable[[str], Any]:
             raise UncleanText("empty", "")
         if len(words) < size:
             raise UncleanText("too-few", raw.strip())
+        # OpenSim reads complete groups: of 6 numbers for 3 it takes the first group, while 4 are
+        # unreadable and leave the default.
         if len(words) % size:
             raise UncleanText("too-many", raw.strip())
         cleanly, first = _parse_words(words, parse_real)
@@ -342,6 +346,8 @@ def format_17_digits(value: float) -> str:
 def format_6_digits(value: float) -> str:
     """Format a number with OpenSim's six digits if they read back equal, otherwise with 17."""
     words = f"{value:g}"
+    # A file that loses digits would not read back equal, which is worse than another spelling than
+    # OpenSim's.
     return words if float(words) == value else format_17_digits(value)
 
 
@@ -375,8 +381,10 @@ def _build_formatter(kind: FieldType, like_opensim: bool) -> Callable[[Any], str
         format_word = str
     if kind.shape in ("single", "optional"):
         return lambda value: "" if value is None else format_word(value)
+    # OpenSim prints a blank after each switch of such a list, but before the other lists.
     if kind.legacy and kind.scalar == "bool":
         return lambda values: "".join(f"{format_word(value)} " for value in values)
+    # OpenSim prints lists of the first property system with a leading blank.
     prefix = " " if kind.legacy else ""
     return lambda values: prefix + " ".join(map(format_word, values)) if values else ""
 

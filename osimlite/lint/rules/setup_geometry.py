@@ -68,6 +68,7 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
         units_entry = table.entries.get("Units")
         positions, unit = (
             locate_markers(setup),
+            # With an unknown unit nothing is reported, since all comparisons with NaN are false.
             METRES_PER_UNIT.get(units_entry.value.text, math.nan) if units_entry else math.nan,
         )
         rows, columns = (
@@ -140,6 +141,8 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
             for name in columns
             if (fellow := _find_left_marker(name, positions.keys() & columns.keys()))
             and name in positions
+            # Markers that are closer have no reliable direction; arms with farther ones may be
+            # crossed.
             and 0.03 < math.dist(positions[name], positions[fellow]) < 0.5
         ]
         model = _compute_agreement(
@@ -148,6 +151,7 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
         seen_counts = [0] * len(pairs)
         turned = [0] * len(pairs)
         for row in _select_rows(user, table):
+            # Rows may lack their last cells.
             row = row + [math.nan] * (2 + 3 * len(columns) - len(row))
             directions = [
                 _compute_direction(
@@ -156,10 +160,12 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
                 for right, left in pairs
             ]
             for number, agreement in enumerate(_compute_agreement(directions)):
+                # NaN, of a pair that is not seen, differs from itself.
                 seen_counts[number] += agreement == agreement
                 turned[number] += agreement * model[number] < -0.3
         for (right, left), rows, wrong in zip(pairs, seen_counts, turned, strict=True):
             if rows and wrong >= 0.8 * rows:
+                # A finding at the task points to the name that the user has to compare.
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
                 report(
                     f"in {wrong} of {format_count(rows, 'row')} of '{user.marker_file}' that were "
@@ -226,6 +232,8 @@ def _compute_agreement(directions: list[list[float]]) -> list[float]:
     for direction in directions:
         others_sum = [total - component for total, component in zip(sums, direction, strict=True)]
         length = math.hypot(*others_sum)
+        # With fewer pairs, or pairs that point everywhere, a reversed one cannot be told from the
+        # others.
         agree = len(known_directions) > 3 and length > 0.5 * (len(known_directions) - 1)
         result.append(
             sum(a * b for a, b in zip(direction, others_sum, strict=True)) / length

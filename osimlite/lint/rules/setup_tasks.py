@@ -43,6 +43,7 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
         task_counts: Counter[tuple[str, str]] = Counter()
         for task in applied:
             task_counts[type(task).__name__, task.name] += 1
+            # One finding, at the second task, however many follow.
             if task_counts[type(task).__name__, task.name] == 2:
                 report(
                     f"'{task.name}' has two tasks: only one of them counts",
@@ -57,6 +58,8 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
                     tag="weight",
                 )
             elif task.weight == 0:
+                # OpenSim's default is 0 as well, so that only the text tells whether the user meant
+                # it.
                 is_given = setup.element_of(task, "weight") is not None
                 problem = "has the weight 0" if is_given else "has no weight, and the default is 0"
                 report(

@@ -129,6 +129,7 @@ class JointReaction(Analysis):
     """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
 
 
+# OpenSim's accelerations follow from the forces of the model at each state, not from the motion.
 class Kinematics(Analysis):
     """Values, speeds and accelerations of coordinates."""
 
@@ -138,6 +139,8 @@ class Kinematics(Analysis):
     """Coordinates that are written, or `all`."""
 
 
+# Without equilibrium, which the tool has a switch for, all quantities of fibers depend on their
+# default lengths.
 class MuscleAnalysis(Analysis):
     """Lengths, speeds, forces and moment arms of muscles."""
 
@@ -208,10 +211,13 @@ class StaticOptimization(Analysis):
     # OpenSim 4.6 crashes if this is false (segmentation fault).
     use_model_force_set: LegacyFlag = True
     """Whether the actuators are those of the model."""
+    # With 1 the solution is not unique, and OpenSim's optimizer fails.
     activation_exponent: LegacyNumber = 2.0
     """Power of the activations whose sum is made as small as possible."""
+    # Passive forces of fibers are left out in both cases.
     use_muscle_physiology: LegacyFlag = True
     """Whether forces of muscles depend on their lengths and speeds."""
+    # At this default, activations of OpenSim are up to 0.005 away from the exact solution.
     optimizer_convergence_criterion: LegacyNumber = 1e-4
     """How far the optimizer goes."""
     # Where the optimizer fails, OpenSim warns and writes the point at which it stopped.

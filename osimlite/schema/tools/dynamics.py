@@ -65,6 +65,8 @@ class InverseDynamicsTool(DynamicsTool):
 
     coordinates_file: LegacyInputMotion = "Unassigned"
     """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
+    # OpenSim first pads the data at both ends by half their length, reflected. Padded rows within
+    # the time range are results as well.
     lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the coordinates; negative for no filter."""
     # OpenSim drops a folder in this name with a warning. An empty name makes a file named `.sto`.
@@ -72,6 +74,7 @@ class InverseDynamicsTool(DynamicsTool):
         "inverse_dynamics.sto"
     )
     """File for the generalized forces, in `results_directory`."""
+    # OpenSim understands no paths here: it warns and writes no file.
     joints_to_report_body_forces: LegacyJointNames = ()
     """Joints whose generalized forces are also written as forces and torques on bodies, or ALL."""
     output_body_forces_file: LegacyOutputTable = "body_forces_at_joints.sto"
@@ -98,6 +101,7 @@ class AbstractTool(Object, abstract=True):
     """Number of digits in the results."""
     initial_time: Annotated[float, real("s", legacy=True)] = 0.0
     """Where the run begins."""
+    # OpenSim's AnalyzeTool crashes if it is before the initial time.
     final_time: Annotated[float, real("s", legacy=True)] = 1.0
     """Where the run ends."""
     solve_for_equilibrium_for_auxiliary_states: LegacyFlag = False

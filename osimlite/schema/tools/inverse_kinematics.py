@@ -50,12 +50,15 @@ class IKTask(Object, abstract=True):
 class IKMarkerTask(IKTask):
     """A marker that is to be where it was measured; the name is that of the marker, in the model and in the data."""
 
+    # OpenSim drops a task without a marker silently, but crashes if none of them has one.
     name_reference = Reference("marker-name", "Marker", consequence="left out")
 
 
 class IKCoordinateTask(IKTask):
     """A coordinate that is to have a value; the name is that of the coordinate."""
 
+    # Squares of radians stand beside a mean of squared metres: a weight of 1 outweighs centimetres
+    # of marker errors.
     name_reference = Reference("coordinate-name", "Coordinate")
 
     value_type: Annotated[str, word("default_value", "manual_value", "from_file", legacy=True)] = (

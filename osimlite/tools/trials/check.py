@@ -117,6 +117,7 @@ def check_trial(
     base_config = config or Config(parse_codes(select), parse_codes(ignore))
     folder = TrialFolder(paths or (".",), written)
     numbers: dict[Path, list[Measurement]] = {}
+    # Dictionaries serve as sets that keep their order, so that reports are reproducible.
     unchecked: dict[str, None] = {}
     checked_files: dict[str, None] = {}
     measures = [*_plan_measurements(folder)]
@@ -159,7 +160,9 @@ def check_trial(
         ]
         checked_files[name] = None
     report.findings = sorted(
-        dict.fromkeys(findings), key=lambda finding: (finding.severity.rank, finding.file or "")
+        # Tools that name the same file have the same findings.
+        dict.fromkeys(findings),
+        key=lambda finding: (finding.severity.rank, finding.file or ""),
     )
     report.checked = len(checked_files)
     return report

@@ -252,6 +252,7 @@ def _find_swapped_markers(
     errors = motion.marker_errors
     known_errors = np.where(np.isfinite(errors), errors, 0.0)
     worst_frame = int(np.argmax(known_errors.max(axis=1)))
+    # A swap moves two markers far: without a large error there is none.
     if known_errors[worst_frame].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
         return
     stations = find_marker_stations(tool.model, motion.mechanism)
@@ -290,6 +291,7 @@ def _find_swapped_markers(
         yield (
             motion.markers[first],
             motion.markers[second],
+            # The worst frame may lie between the sampled ones.
             np.array(better_frames or [worst_frame]),
         )
 
@@ -313,6 +315,7 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
         row = int(np.argmax(excess))
         # Up to 0.05 degrees or cm may come from the rounding of files.
         size = _to_display_unit(info, float(excess[row]))
+        # Ranges of the joint to ground mean nothing; missing columns have default values.
         if index in root or info.name in motion.missing or info.locked or size < 0.05:
             continue
         violation_count += 1
@@ -448,11 +451,13 @@ def _measure_noise(motion: RecordedMotion, start: float, end: float) -> float | 
     step = (times[-1] - times[0]) / (len(times) - 1)
     values = motion.values[in_span]
     even_times = np.linspace(times[0], times[-1], len(times))
+    # Slower sampling has no frequencies well above the limit (half of the rate, Nyquist).
     if step > 0.5 / (1.5 * MAX_MOVEMENT_HZ):
         return None
     noise_shares = []
     frequencies = np.fft.rfftfreq(len(times), step)
     for index, info in enumerate(motion.mechanism.coordinates):
+        # The accelerations of a coordinate that hardly moves are noise in any trial.
         if np.ptp(values[:, index]) < MIN_CHANGE[info.motion_type != "rotational"]:
             continue
         # Resample evenly for the Fourier transform; a Hann window removes the ends.
@@ -463,6 +468,7 @@ def _measure_noise(motion: RecordedMotion, start: float, end: float) -> float | 
         noise_shares.append(
             float(power[frequencies > MAX_MOVEMENT_HZ].sum() / (power.sum() or 1.0))
         )
+    # The median, so that one noisy coordinate does not decide.
     return float(np.median(noise_shares)) if noise_shares else None
 
 

@@ -80,6 +80,7 @@ def _read_vectors(table: StoTable, identifier: str | None) -> Array | None:
     indices = [
         index for index, label in enumerate(table.columns) if start and label.startswith(start)
     ]
+    # OpenSim requires exactly three columns, too.
     return table.rows[:, indices] if len(indices) == 3 else None
 
 
@@ -87,6 +88,7 @@ def compute_scale(tool: TrialTool) -> LoadScale:
     """Return the scales of residuals from the loads of a tool; NaN without loads."""
     try:
         _, table, loads = read_loads(tool)
+    # Without loads, residuals are still compared with the absolute limits.
     except OsimliteError:
         return LoadScale()
     in_span = (table.times >= tool.span[0]) & (table.times <= tool.span[1])
@@ -204,6 +206,8 @@ def _measure_distances(
     result = []
     bodies_by_name = {body.name.rpartition("/")[2]: body for body in mechanism.bodies}
     for row in np.unique(rows[np.linspace(0, len(rows) - 1, TIME_COUNT).astype(int)]):
+        # Loads are sampled faster than motions; the nearest pose is near enough for a distance of
+        # feet.
         q = motion.values[int(np.argmin(np.abs(motion.times - table.times[row])))]
         point = load.point[row]
         frame = str(load.item.point_expressed_in_body).rpartition("/")[2]

@@ -465,6 +465,7 @@ def format_value(value: str | bool | int | float | Sequence[float] | Array) -> s
     match value:
         case str():
             return value
+        # Before the numbers, because True is an int in Python.
         case bool():
             return "true" if value else "false"
         case int() | float():
