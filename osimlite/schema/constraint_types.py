@@ -24,6 +24,7 @@ class ConstantDistanceConstraint(Constraint):
     """Where the first point is, in its frame."""
     location_body_2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Where the second point is, in its frame."""
+    # OpenSim has no default and rejects a constraint without a distance.
     constant_distance: Annotated[float, real("m", "> 0")] = math.nan
     """Distance that the points keep."""
 

@@ -57,6 +57,8 @@ class ExternalForce(ForceProducer):
     """What the labels of the three columns of the point begin with; left out, the origin of the frame."""
     torque_identifier: MaybeColumnName = None
     """What the labels of the three columns of the torque begin with; left out, there is no torque."""
+    # OpenSim replaces it by the `datafile` of the loads, so that the name in the file has no effect
+    # there.
     data_source_name: MaybeColumnName = None
     """Name that the table must have; a table of another name is refused."""
 

@@ -82,6 +82,7 @@ class Probe(ModelComponent, abstract=True):
         str, word("value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs")
     ] = "value"
     """What is reported of the quantity: itself, its integral, its rate, or its extreme so far."""
+    # OpenSim replaces a wrong number of values by zeros, with an error in its log only.
     initial_conditions_for_integration: Annotated[Reals, reals()] = ()
     """Where the integrals start, one number for each quantity of the probe."""
     gain: Number = 1.0

@@ -47,6 +47,7 @@ def read_bands(path: str | Path) -> dict[str, Band]:
         DocumentError: the file has no such columns, or a cell is not a number.
     """
     file = str(path)
+    # Spreadsheet programs write a byte order mark, which would become part of the first label.
     lines = io.StringIO(read_file(path).decode("utf-8-sig", "replace")).readlines()
     comments = [line.lstrip("# \t").strip() for line in lines if line.startswith("#")]
     source = " ".join(comments).removeprefix("source:").strip() or Path(path).name
@@ -54,6 +55,7 @@ def read_bands(path: str | Path) -> dict[str, Band]:
     labels = [label.strip() for label in rows[0]] if rows else []
     names = [label.removesuffix(MEAN) for label in labels[1:] if label.endswith(MEAN)]
     missing_labels = [f"{name}{DEVIATION}" for name in names if f"{name}{DEVIATION}" not in labels]
+    # One line of labels, and two points between which a band can be drawn.
     if not names or missing_labels or len(rows) < 3:
         problem = (
             f"column '{missing_labels[0]}' is missing" if missing_labels else "there is no band"

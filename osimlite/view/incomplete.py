@@ -44,8 +44,11 @@ def build_showable(model: Model) -> ShowableModel:
         try:
             return ShowableModel(copy, build_mechanism(copy), left_out)
         except (ModelError, UnsupportedError) as error:
+            # If nothing can be left out, the first error is the one that concerns the user's own
+            # model.
             first = first or error
             if copy is model:
+                # The caller's model stays complete.
                 copy = model.copy_deep()
             path = _take_out(copy, error.message)
             if path is None:

@@ -17,6 +17,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 
 _log = logging.getLogger(__name__)
 
+# Not reachable from other machines: the page shows models that may not be public.
 HOST = "127.0.0.1"
 _LONGEST = 1_000_000
 PATIENCE = 30.0
@@ -59,6 +60,7 @@ class PageServer:
     def wait(self) -> None:
         """Serve until the program is interrupted."""
         while self._thread.is_alive():
+            # In short pieces, since a join without a limit cannot be interrupted on Windows.
             self._thread.join(0.5)
 
     def close(self) -> None:
@@ -119,6 +121,7 @@ def _make_handler(
             if not self._is_for_us() or self.path != "/assemble":
                 raise _BadQuestion(HTTPStatus.FORBIDDEN, "this server answers its own page only")
             length = self.headers.get("Content-Length", "")
+            # `int` would also accept signs, underscores and the digits of other scripts.
             if not (length.isascii() and length.isdigit() and len(length) < 20):
                 raise _BadQuestion(
                     HTTPStatus.BAD_REQUEST, "the question does not say how long it is"
@@ -136,6 +139,7 @@ def _make_handler(
             self.send_response(status)
             self.send_header("Content-Type", content_type)
             self.send_header("Content-Length", str(len(body)))
+            # The same address shows another model in the next run.
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
             self.wfile.write(body)
@@ -176,6 +180,7 @@ def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
     if not np.isfinite(q).all():
         return {"error": "a coordinate value is no number"}
     try:
+        # The page may send any numbers while a user drags; failures are answered below, not logged.
         with np.errstate(all="ignore"):
             result = mechanism.assemble(q)
     except (OsimliteError, ArithmeticError, np.linalg.LinAlgError) as error:

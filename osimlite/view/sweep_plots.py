@@ -87,6 +87,7 @@ def _rank_variables(numbers: Mapping[str, Array], varied: Sequence[str], measure
             return 0.0
         return float(abs(np.corrcoef(x, y)[0, 1]))
 
+    # The sign of a correlation says nothing about how interesting a variable is.
     return sorted(varied, key=correlate, reverse=True)[:MAX_VARIABLES]
 
 
@@ -103,6 +104,7 @@ def _draw_pages(
     pages = ceil(len(panels) / MAX_PANELS)
     for number in range(pages):
         page = panels[number * MAX_PANELS : (number + 1) * MAX_PANELS]
+        # Four panels fill a square, without a gap in a second row.
         column_count = min(MAX_COLUMNS, len(page)) if len(page) != 4 else 2
         row_count = ceil(len(page) / column_count)
         count = f" ({number + 1} of {pages})" if pages > 1 else ""
@@ -134,6 +136,7 @@ def _draw_map(figure: Any, panel: Any, x: Array, y: Array, color: Array) -> None
     # Every combination was run: cells of a grid.
     if len(xs) * len(ys) == len(x) and len(xs) > 1 and len(ys) > 1:
         cells = np.full((len(ys), len(xs)), np.nan)
+        # By values, since runs may finish in any order.
         cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = color
         mappable = panel.pcolormesh(xs, ys, cells, shading="nearest", cmap="viridis")
     else:

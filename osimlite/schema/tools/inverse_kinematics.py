@@ -104,6 +104,7 @@ class InverseKinematicsTool(InverseKinematicsToolBase):
 
     ik_task_set: Unnamed[IKTaskSet] = make_default(IKTaskSet)
     """The markers and coordinates with their weights; if none applies, all markers count the same."""
+    # OpenSim takes 0 0 0 as a measured position, and never returns from a .trc file without rows.
     marker_file: Annotated[str, make_input_file("marker data", required=True)] = ""
     """Measured markers (.trc, .sto)."""
     # OpenSim ignores `inDegrees` in the header of this file only.
