@@ -571,7 +571,7 @@ def test_a_search_for_gains(model, tmp_path) -> None:
     assert summary["value"] < 0.9 * np.ptp(begun.values[:, -1])
     assert "PrescribedController" not in (out / "best.osim").read_text()
     for more, told in (
-        (["--method", "gradient"], "has no derivatives"),
+        (["--method", "gradient"], "have no derivatives"),
         (
             ["--vary", "motor-elbow.KQ=0:1"],
             "number 'motor-elbow.KQ' to vary; did you mean 'motor-elbow.KP'",
