@@ -85,7 +85,8 @@ class SimmSpline(Function):
     """Values at the points; beyond the ends it goes on as a line with the slope there."""
 
 
-# Legacy lists: OpenSim accepts commas and one pair of brackets in them, but neither nan nor inf.
+# In the lists OpenSim accepts commas and one pair of brackets, but neither nan nor inf: they belong
+# to its first property system.
 class GCVSpline(Function):
     """A spline of degree 2 `half_order` - 1 (Woltring's), smoothed as far as `error_variance` allows."""
 

@@ -29,6 +29,7 @@ class Appearance(Object):
     """Whether points, edges or faces are drawn."""
 
 
+# OpenSim drops shapes of unknown classes with a line in its log, and simulates the rest.
 class Geometry(Component, abstract=True):
     """A shape drawn in the frame that owns it."""
 

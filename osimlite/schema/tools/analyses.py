@@ -144,6 +144,7 @@ class Kinematics(Analysis):
 class MuscleAnalysis(Analysis):
     """Lengths, speeds, forces and moment arms of muscles."""
 
+    # OpenSim leaves unknown muscles out silently, and warns of unknown coordinates.
     muscle_list: Annotated[
         Names, make_name_list("muscle-name", "Muscle", "all", consequence="left out")
     ] = ("all",)
@@ -170,6 +171,7 @@ class OutputReporter(Analysis):
     """The outputs, each as `path|output`."""
 
 
+# OpenSim labels the columns state_0 to state_2, whatever the name of the point.
 class PointKinematics(Analysis):
     """Place, velocity and acceleration of a point."""
 

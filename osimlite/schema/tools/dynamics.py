@@ -63,8 +63,8 @@ class DynamicsTool(Tool, abstract=True):
 class InverseDynamicsTool(DynamicsTool):
     """Computes the generalized forces that a measured motion takes."""
 
-    # OpenSim takes angles as degrees only after `inDegrees=yes`, letter for letter. Without it the
-    # moments of a motion in degrees are enormous, and nothing is reported.
+    # Of the values of `inDegrees` OpenSim understands only yes and y, in lower case. After `true` it
+    # takes degrees for radians: moments become enormous, and nothing is reported.
     coordinates_file: LegacyInputMotion = "Unassigned"
     """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
     # OpenSim first pads the data at both ends by half their length, reflected. Padded rows within
