@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.schema.model import Model
 from osimlite.simulation.robot.build import build_robot
-from osimlite.simulation.robot.couplings import range_limits
+from osimlite.simulation.robot.couplings import limit_to_ranges
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.mesh_files import MeshFiles
 from osimlite.simulation.robot.names import legal, legal_names
@@ -154,7 +154,7 @@ def to_urdf(
     if merge:
         robot = merge_fixed(robot)
     if limits == "range":
-        robot = range_limits(robot)
+        robot = limit_to_ranges(robot)
     robot = add_strength_limits(
         legal_names(robot), model, fidelity, effort=effort, velocity=velocity
     )

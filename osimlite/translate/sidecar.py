@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from osimlite.mechanics.multibody.functions import IDENTITY
-from osimlite.simulation.robot.couplings import couplers, mimics
+from osimlite.simulation.robot.couplings import find_mimics, list_couplers
 from osimlite.simulation.robot.robot import Robot
 from osimlite.translate.function_data import describe_function
 
@@ -90,7 +90,7 @@ def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
 
 def _list_joints(robot: Robot) -> list[dict[str, Any]]:
     """Return an entry for each moving joint: its coordinates and its function of them."""
-    mimics_by_joint = mimics(robot)
+    mimics_by_joint = find_mimics(robot)
     coordinates = robot.mechanism.coordinates
     result: list[dict[str, Any]] = []
     for joint in robot.moving:
@@ -108,7 +108,7 @@ def _list_joints(robot: Robot) -> list[dict[str, Any]]:
             entry |= {
                 "mimics": mimic.leader,
                 "multiplier": mimic.line.slope,
-                "offset": mimic.line.start,
+                "offset": mimic.line.offset,
             }
         result.append(entry)
     return result
@@ -124,7 +124,7 @@ def _list_couplers(robot: Robot) -> list[dict[str, Any]]:
             "independent": [coordinates[index].path for index in coupler.independent],
             "function": describe_function(coupler.function),
         }
-        for coupler in couplers(robot)
+        for coupler in list_couplers(robot)
     ]
 
 

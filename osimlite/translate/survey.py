@@ -17,7 +17,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.sets import Constraint, Controller, ModelComponentSet, Probe
 from osimlite.schema.tree import Tree
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
-from osimlite.simulation.robot.couplings import Mimic, couplers, mimics
+from osimlite.simulation.robot.couplings import Mimic, find_mimics, list_couplers
 from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
@@ -308,7 +308,7 @@ class _Survey:
 
     def _record_couplers(self) -> None:
         """Record coordinates that are functions of others."""
-        for coupler in couplers(self.robot):
+        for coupler in list_couplers(self.robot):
             driven_joints = [
                 robot_joint.name
                 for robot_joint in self.robot.moving
@@ -334,7 +334,7 @@ class _Survey:
     @cached_property
     def _mimics(self) -> dict[str, Mimic]:
         """Joints that mimic another one, by name."""
-        return mimics(self.robot)
+        return find_mimics(self.robot)
 
     def _record_frames(self) -> None:
         """Record frames that are no links."""

@@ -41,7 +41,7 @@ from osimlite.schema.functions import (
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
 from osimlite.simulation.robot.build import build_robot
-from osimlite.simulation.robot.couplings import mimics
+from osimlite.simulation.robot.couplings import find_mimics
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.names import legal_names
 from osimlite.simulation.robot.urdf import urdf_text
@@ -232,7 +232,7 @@ def test_axes_along_straight_splines_are_joints_of_one_coordinate():
     mechanism = one_body(make_custom_motions(axes, flat), 1)
     robot = build_robot(mechanism)
     assert [joint.name for joint in robot.moving] == ["q0", "q0_rx"]
-    assert robot.joint_of.keys() == {0} and mimics(robot)["q0_rx"].leader == "q0"
+    assert robot.joint_of.keys() == {0} and find_mimics(robot)["q0_rx"].leader == "q0"
     for q in ((0.4,), (-3.0,)):
         assert worst(sidecar(robot), mechanism, np.array(q)) < 1e-12
     assert (
@@ -344,12 +344,28 @@ def test_a_joint_that_is_a_multiple_of_its_coordinate_may_lead():
         )
     )
     urdf = to_urdf(model)
-    (mimic,) = mimics(urdf.robot).values()
+    (mimic,) = find_mimics(urdf.robot).values()
     assert mimic.leader == urdf.robot.moving[0].name
     assert mimic.line == pytest.approx((0.3 * 0.5 / 0.2, 0.0))
     assert [r.done for r in urdf.fidelity if r.kind == "coupler"] == ["a joint that mimics another"]
     q = np.array([0.8, 0.4])
     assert worst_body(urdf.robot, yourdfpy_poses(urdf.text, urdf.robot.joint_values(q)), q) < 1e-12
+
+
+def test_couplers_in_a_circle_keep_their_ratios():
+    mechanism = build_mechanism(chain())
+
+    def find_lines(*couplers: tuple[int, int, float]) -> dict[str, tuple[str, float]]:
+        constraints = tuple(
+            Coupler(dependent, (independent,), Linear(slope, 0.0))
+            for dependent, independent, slope in couplers
+        )
+        mimics = find_mimics(build_robot(replace(mechanism, constraints=constraints)))
+        return {name: (mimic.leader, mimic.line.slope) for name, mimic in mimics.items()}
+
+    assert find_lines((1, 0, 2.0), (0, 1, 0.5)) == {"b": ("a", 2.0)}
+    # The first coordinate depends on the circle, and is no part of it.
+    assert find_lines((0, 2, 3.0), (2, 1, 2.0), (1, 2, 0.5)) == {"a": ("b", 6.0), "c": ("b", 2.0)}
 
 
 def test_leaders_follow_nobody():
@@ -361,5 +377,5 @@ def test_leaders_follow_nobody():
             for a, b in generator.integers(0, 4, (int(generator.integers(1, 5)), 2))
         )
         robot = build_robot(replace(mechanism, constraints=laws))
-        following = mimics(robot)
+        following = find_mimics(robot)
         assert not {mimic.leader for mimic in following.values()} & following.keys()

@@ -257,7 +257,7 @@ class _RobotBuilder:
             yield part
         else:
             slope = line.slope
-            first = AxisMotion(part.kind, part.axis, (0,), ConstantValue(line.start))
+            first = AxisMotion(part.kind, part.axis, (0,), ConstantValue(line.offset))
             yield FixedTransform(first.transform(np.zeros(1)))
             unit = abs(slope) == 1.0
             yield AxisMotion(

@@ -1,4 +1,4 @@
-"""Functions of coordinates that are straight lines, and what drives the joints of a robot.
+"""Linear functions of coordinates, and what drives the joints of a robot.
 
 Formats of robots can express a joint that is a multiple of another one, but no other function.
 """
@@ -18,15 +18,15 @@ from osimlite.simulation.robot.robot import Robot, RobotJoint
 
 
 class StraightLine(NamedTuple):
-    """Straight line ``slope * x + start``.
+    """Straight line ``slope * x + offset``.
 
     Attributes:
         slope: slope of the line.
-        start: value at x = 0.
+        offset: value at x = 0.
     """
 
     slope: float
-    start: float
+    offset: float
 
     def compose(self, inner: StraightLine) -> StraightLine:
         """Return the composition of this line with an inner one.
@@ -34,18 +34,20 @@ class StraightLine(NamedTuple):
         Args:
             inner: line whose value is the argument of this one.
         """
-        return StraightLine(self.slope * inner.slope, self.slope * inner.start + self.start)
+        return StraightLine(self.slope * inner.slope, self.slope * inner.offset + self.offset)
 
     def inverse(self) -> StraightLine:
         """Return the line that gives x for its value; the slope must not be zero."""
         # The identity keeps its exact numbers: -0.0 would be written as an offset.
         return (
-            self if self == (1.0, 0.0) else StraightLine(1.0 / self.slope, -self.start / self.slope)
+            self
+            if self == (1.0, 0.0)
+            else StraightLine(1.0 / self.slope, -self.offset / self.slope)
         )
 
 
 def find_line(function: f.SmoothFunction) -> StraightLine | None:
-    """Return the straight line that a function of one argument is.
+    """Return a function of one argument as a straight line if it is linear.
 
     Splines count if they are straight to the last digit, as one through two points is, or one
     through points of equal height.
@@ -57,13 +59,13 @@ def find_line(function: f.SmoothFunction) -> StraightLine | None:
         The line; None if the function is not straight.
     """
     match function:
-        case f.Linear(rate, start):
-            return StraightLine(rate, start)
-        case f.WeightedSum((weight,), start):
-            return StraightLine(weight, start)
+        case f.Linear(rate, offset):
+            return StraightLine(rate, offset)
+        case f.WeightedSum((weight,), offset):
+            return StraightLine(weight, offset)
         # The highest power comes first, as in OpenSim.
-        case f.Polynomial((*high, slope, start)) if not any(high):
-            return StraightLine(slope, start)
+        case f.Polynomial((*high, slope, offset)) if not any(high):
+            return StraightLine(slope, offset)
         case f.MultivariatePolynomial(coefficients, powers) if all(
             len(item) == 1 for item in powers
         ):
@@ -85,8 +87,8 @@ def find_line(function: f.SmoothFunction) -> StraightLine | None:
 
 def _evaluate_line(function: f.SmoothFunction) -> StraightLine:
     """Return the line through value and slope at 0 of a function that is straight everywhere."""
-    start, slopes, _ = function.evaluate(np.zeros(1))
-    return StraightLine(float(slopes[0]), start)
+    offset, slopes, _ = function.evaluate(np.zeros(1))
+    return StraightLine(float(slopes[0]), offset)
 
 
 def _is_straight_spline(spline: f.SimmCubicSpline) -> bool:
@@ -106,7 +108,7 @@ def _is_straight_spline(spline: f.SimmCubicSpline) -> bool:
 
 
 class Mimic(NamedTuple):
-    """Dependence of a joint on another one by a straight line.
+    """Linear dependence of a joint on another one, as the `mimic` of URDF.
 
     Attributes:
         leader: name of the other joint.
@@ -117,91 +119,100 @@ class Mimic(NamedTuple):
     line: StraightLine
 
 
-def couplers(robot: Robot) -> list[Coupler]:
+def list_couplers(robot: Robot) -> list[Coupler]:
     """Return the constraints of a robot's mechanism that make one coordinate a function of others."""
     return [
         constraint for constraint in robot.mechanism.constraints if isinstance(constraint, Coupler)
     ]
 
 
-def mimics(robot: Robot) -> dict[str, Mimic]:
-    """Return the joints whose value is a straight line of another's.
+def find_mimics(robot: Robot) -> dict[str, Mimic]:
+    """Find the joints whose value is a linear function of the value of another joint.
 
     Such joints exist where one coordinate drives several motions of a joint, and where a coupler
-    makes a coordinate a straight line of another. A leader never follows another joint itself,
-    because most programs do not resolve chains.
+    makes a coordinate a linear function of another one. A leader never follows another joint
+    itself, because most programs do not resolve chains.
 
     Args:
         robot: the robot.
 
     Returns:
-        Leader and line by the name of the joint.
+        Leader and linear function by the name of the following joint.
     """
-    leads = leaders(robot)
-    follows: dict[int, tuple[int, StraightLine]] = {}
-    for coupler in couplers(robot):
+    leaders = find_leaders(robot)
+    # The coordinate on which each dependent coordinate depends, and the linear function.
+    couplings: dict[int, tuple[int, StraightLine]] = {}
+    for coupler in list_couplers(robot):
         line = find_line(coupler.function)
         if len(coupler.independent) == 1 and line is not None:
             # Of two couplers of a coordinate the first one counts; both must agree anyway.
-            follows.setdefault(coupler.dependent, (coupler.independent[0], line))
+            couplings.setdefault(coupler.dependent, (coupler.independent[0], line))
 
-    def find_origin(place: int) -> tuple[int, StraightLine]:
-        """Return the most remote coordinate that has a leader, and the line from it to this one.
+    def find_driving_coordinate(dependent: int) -> tuple[int, StraightLine]:
+        """Follow the couplers from a coordinate to the last one that has a leader.
 
         Args:
-            place: index of the coordinate.
+            dependent: index of the coordinate.
 
         Returns:
-            Index of that coordinate, and this coordinate as a line of it.
+            Index of the last coordinate with a leader, or of the coordinate itself, and the value of
+            the dependent coordinate as a linear function of it.
         """
-        results = place, StraightLine(1.0, 0.0)
-        line, seen = results[1], {place}
-        while place in follows:
-            place, step = follows[place]
-            if place in seen:
-                # Couplers in a circle: each coordinate keeps its own joint.
-                return min(seen), StraightLine(1.0, 0.0)
-            seen.add(place)
-            line = line.compose(step)
-            # Only a coordinate that a joint follows as a line can lead others in the file.
-            if place in leads:
-                results = place, line
-        return results
+        # The value of the dependent coordinate as a linear function of each visited one.
+        lines = {dependent: StraightLine(1.0, 0.0)}
+        index = driving_index = dependent
+        while index in couplings:
+            line = lines[index]
+            index, coupling_line = couplings[index]
+            if index in lines:
+                # Couplers in a circle have no end. Each coordinate that leads into it selects the
+                # same one, so that all of them have the same leader.
+                visited = list(lines)
+                driving_index = min(visited[visited.index(index) :])
+                break
+            lines[index] = line.compose(coupling_line)
+            # A coordinate without a joint that is linear in it cannot lead others in the file.
+            if index in leaders:
+                driving_index = index
+        return driving_index, lines[driving_index]
 
     result: dict[str, Mimic] = {}
     for joint in robot.moving:
         line = find_line(joint.function)
         if len(joint.coordinates) != 1 or line is None:
             continue
-        place, way = find_origin(joint.coordinates[0])
+        driving_index, driving_line = find_driving_coordinate(joint.coordinates[0])
         # The leader of a coordinate mimics none, and is not its own follower.
-        if place not in leads or leads[place][0] is joint:
+        if driving_index not in leaders or leaders[driving_index][0] is joint:
             continue
-        leader, own = leads[place]
-        result[joint.name] = Mimic(leader.name, line.compose(way).compose(own.inverse()))
+        leader, leader_line = leaders[driving_index]
+        # From the leader's value to the driving coordinate, to the joint's coordinate, to its value.
+        result[joint.name] = Mimic(
+            leader.name, line.compose(driving_line).compose(leader_line.inverse())
+        )
     return result
 
 
-def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, StraightLine]]:
-    """Return the joint that others follow for each coordinate.
+def find_leaders(robot: Robot) -> dict[int, tuple[RobotJoint, StraightLine]]:
+    """Find the joint that others follow for each coordinate.
 
-    It is the joint that equals the coordinate, else the first one that is a line of it.
+    It is the joint whose value is the coordinate, else the first one whose value is linear in it.
 
     Args:
         robot: the robot.
 
     Returns:
-        The joint, and its value as a line of the coordinate, by index of the coordinate.
+        The joint, and its value as a linear function of the coordinate, by index of the coordinate.
     """
     result: dict[int, tuple[RobotJoint, StraightLine]] = {}
     for joint in robot.moving:
         line = find_line(joint.function)
         if len(joint.coordinates) == 1 and line is not None and line.slope:
             # A joint whose value is the coordinate itself is the better leader: it replaces these
-            # below.
+            # in the union below.
             result.setdefault(joint.coordinates[0], (joint, line))
     return result | {
-        place: (joint, StraightLine(1.0, 0.0)) for place, joint in robot.joint_of.items()
+        index: (joint, StraightLine(1.0, 0.0)) for index, joint in robot.joint_of.items()
     }
 
 
@@ -210,7 +221,7 @@ class CouplingDriver(NamedTuple):
 
     Attributes:
         coordinate: index of the coordinate; None if the value is constant.
-        function: the function of it.
+        function: function of this coordinate.
     """
 
     coordinate: int | None
@@ -240,16 +251,18 @@ class Composition(f.SmoothFunction):
         """
         inner, gradient, hessian = self.inner.evaluate(arguments)
         value, (first,), ((second,),) = self.outer.evaluate((inner,))
-        bends = [
-            # Second derivative of a composition: f'(g) g'' + f''(g) g' g'.
-            [first * bend + second * one * two for bend, two in zip(row, gradient, strict=True)]
-            for row, one in zip(hessian, gradient, strict=True)
+        composed_hessian = [
+            [
+                first * curvature + second * row_slope * column_slope
+                for curvature, column_slope in zip(row, gradient, strict=True)
+            ]
+            for row, row_slope in zip(hessian, gradient, strict=True)
         ]
-        return value, [first * slope for slope in gradient], bends
+        return value, [first * slope for slope in gradient], composed_hessian
 
 
-def coordinate_drivers(robot: Robot) -> dict[int, CouplingDriver]:
-    """Return what determines the coordinates that do not move freely.
+def find_coordinate_drivers(robot: Robot) -> dict[int, CouplingDriver]:
+    """Find what determines the coordinates that do not move freely.
 
     A lock makes a coordinate constant, and a coupler of one coordinate makes it a function of that
     one. Couplers of several coordinates are not followed, and couplers in a circle leave the first
@@ -264,44 +277,51 @@ def coordinate_drivers(robot: Robot) -> dict[int, CouplingDriver]:
     infos = robot.mechanism.coordinates
     values = robot.mechanism.values({})
     result = {
-        place: CouplingDriver(None, f.ConstantValue(float(values[place])))
-        for place, info in enumerate(infos)
+        index: CouplingDriver(None, f.ConstantValue(float(values[index])))
+        for index, info in enumerate(infos)
         if info.locked
     }
-    steps = {item.dependent: item for item in couplers(robot) if len(item.independent) == 1}
+    couplers = {
+        coupler.dependent: coupler
+        for coupler in list_couplers(robot)
+        if len(coupler.independent) == 1
+    }
 
-    def drive(place: int, above: frozenset[int]) -> CouplingDriver:
-        if place in result:
-            return result[place]
-        step = steps.get(place)
+    def find_driver(index: int, visited: frozenset[int]) -> CouplingDriver:
+        """Return the driver of a coordinate; `visited` are the coordinates that depend on it."""
+        if index in result:
+            return result[index]
+        coupler = couplers.get(index)
         # Couplers in a circle: the coordinate at which it closes moves freely.
-        if step is None or step.independent[0] in above | {place}:
-            return CouplingDriver(place, f.IDENTITY)
-        return _substitute(step.function, drive(step.independent[0], above | {place}))
+        if coupler is None or coupler.independent[0] in visited | {index}:
+            return CouplingDriver(index, f.IDENTITY)
+        return _substitute(coupler.function, find_driver(coupler.independent[0], visited | {index}))
 
-    for place in steps:
-        if place not in result and (driver := drive(place, frozenset())).coordinate != place:
-            result[place] = driver
+    for index in couplers:
+        if index not in result and (driver := find_driver(index, frozenset())).coordinate != index:
+            result[index] = driver
     return result
 
 
-def joint_driver(joint: RobotJoint, drivers: dict[int, CouplingDriver]) -> CouplingDriver | None:
+def find_joint_driver(
+    joint: RobotJoint, drivers: dict[int, CouplingDriver]
+) -> CouplingDriver | None:
     """Return what determines the value of a moving joint.
 
     Args:
         joint: the joint.
-        drivers: drivers of the coordinates, see :func:`coordinate_drivers`.
+        drivers: drivers of the coordinates, see :func:`find_coordinate_drivers`.
 
     Returns:
         The driver; None if the joint's function has several coordinates.
     """
     if len(joint.coordinates) != 1:
         return None
-    (place,) = joint.coordinates
-    return _substitute(joint.function, drivers.get(place, CouplingDriver(place, f.IDENTITY)))
+    (index,) = joint.coordinates
+    return _substitute(joint.function, drivers.get(index, CouplingDriver(index, f.IDENTITY)))
 
 
-def knots(function: f.SmoothFunction) -> tuple[float, ...]:
+def find_knots(function: f.SmoothFunction) -> tuple[float, ...]:
     """Return the arguments at which the pieces of a function meet.
 
     Args:
@@ -317,31 +337,34 @@ def knots(function: f.SmoothFunction) -> tuple[float, ...]:
         case PiecewisePolynomial():
             return tuple(function.knots[1:].tolist())
         case f.ScaledFunction(_, inner) | Composition(_, inner):
-            own = knots(inner)
+            result = find_knots(inner)
             line = find_line(inner)
+            # The knots of the outer function are values of the inner one. Only where that is linear
+            # do they belong to known arguments.
             if isinstance(function, Composition) and line is not None and line.slope:
-                own = tuple((x - line.start) / line.slope for x in knots(function.outer))
-            return own
+                result = tuple((x - line.offset) / line.slope for x in find_knots(function.outer))
+            return result
     return ()
 
 
 def _substitute(outer: f.SmoothFunction, driver: CouplingDriver) -> CouplingDriver:
+    """Return the composition of a function with a driver, simplified if both are linear."""
     if driver.coordinate is None:
         return CouplingDriver(
             None, f.ConstantValue(outer.evaluate((driver.function.evaluate((0.0,))[0],))[0])
         )
-    first, second = find_line(driver.function), find_line(outer)
-    if first == (1.0, 0.0):
+    inner_line, outer_line = find_line(driver.function), find_line(outer)
+    if inner_line == (1.0, 0.0):
         return CouplingDriver(driver.coordinate, outer)
-    if first is not None and second is not None:
-        return CouplingDriver(driver.coordinate, f.Linear(*second.compose(first)))
+    if inner_line is not None and outer_line is not None:
+        return CouplingDriver(driver.coordinate, f.Linear(*outer_line.compose(inner_line)))
     return CouplingDriver(driver.coordinate, Composition(outer, driver.function))
 
 
-def range_limits(robot: Robot) -> Robot:
+def limit_to_ranges(robot: Robot) -> Robot:
     """Return a robot whose joints are limited to the ranges of their coordinates.
 
-    Only joints that are a straight line of one coordinate are limited.
+    Only joints whose value is linear in one coordinate are limited.
 
     Args:
         robot: the robot.
@@ -352,7 +375,7 @@ def range_limits(robot: Robot) -> Robot:
         if joint.kind == "fixed" or len(joint.coordinates) != 1 or line is None:
             return joint
         low, high = (
-            line.slope * end + line.start
+            line.slope * end + line.offset
             for end in robot.mechanism.coordinates[joint.coordinates[0]].range
         )
         return replace(joint, limits=(min(low, high), max(low, high)))

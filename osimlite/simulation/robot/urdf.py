@@ -32,7 +32,7 @@ from itertools import pairwise
 from osimlite.io.document.lexical import format_shortest
 from osimlite.io.document.xml_text import quote_attribute
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.couplings import Mimic, mimics
+from osimlite.simulation.robot.couplings import Mimic, find_mimics
 from osimlite.simulation.robot.names import UniqueNames
 from osimlite.simulation.robot.robot import (
     Ball,
@@ -95,7 +95,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
                         "collision", {"name": unique(collision.source.rsplit("/", 1)[-1])}
                     ):
                         _write_shape(out, collision)
-        following = mimics(robot)
+        following = find_mimics(robot)
         for joint in robot.joints:
             # Joints of coordinates that others follow.
             _write_joint(out, joint, following.get(joint.name))
@@ -181,7 +181,7 @@ def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> Non
             lower, upper = (-UNLIMITED, UNLIMITED) if joint.limits is None else joint.limits
             out.empty("limit", {"lower": number(lower), "upper": number(upper), **strength})
         if mimic is not None:
-            offset = {"offset": number(mimic.line.start)} if mimic.line.start else {}
+            offset = {"offset": number(mimic.line.offset)} if mimic.line.offset else {}
             out.empty(
                 "mimic", {"joint": mimic.leader, "multiplier": number(mimic.line.slope), **offset}
             )

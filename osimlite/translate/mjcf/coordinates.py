@@ -53,7 +53,7 @@ def add_coordinates(draft: MjcfDraft) -> None:
             )
             draft.add_follower(
                 leader.joint,
-                Follower(None, (leader.line.slope * start + leader.line.start,), joint_function),
+                Follower(None, (leader.line.slope * start + leader.line.offset,), joint_function),
             )
             if joint_function is None:
                 note(

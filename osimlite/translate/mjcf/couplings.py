@@ -14,10 +14,10 @@ from osimlite.simulation.robot.couplings import (
     Composition,
     CouplingDriver,
     StraightLine,
-    coordinate_drivers,
-    couplers,
-    joint_driver,
-    leaders,
+    find_coordinate_drivers,
+    find_joint_driver,
+    find_leaders,
+    list_couplers,
 )
 from osimlite.simulation.robot.names import joint_names
 from osimlite.simulation.robot.robot import RobotJoint
@@ -51,19 +51,19 @@ def add_couplings(draft: MjcfDraft) -> None:
     """Add an equality for every joint that follows a function or a coupler."""
     robot = draft.robot
     draft.leads |= {
-        index: Lead(joint.name, line) for index, (joint, line) in leaders(robot).items()
+        index: Lead(joint.name, line) for index, (joint, line) in find_leaders(robot).items()
     }
     # The driver computes ellipsoid joints exactly, without the mechanism.
     if not draft.options.driver:
         add_ellipsoids(draft)
-    drivers = coordinate_drivers(robot)
+    drivers = find_coordinate_drivers(robot)
     coupler_by_coordinate = {
         coupler.dependent: coupler.name
-        for coupler in couplers(robot)
+        for coupler in list_couplers(robot)
         if coupler.dependent in drivers
     }
     for joint in robot.moving:
-        driver = joint_driver(joint, drivers)
+        driver = find_joint_driver(joint, drivers)
         # The mechanism of an ellipsoid joint already moves this joint.
         if joint.name in draft.followers:
             continue
@@ -84,7 +84,7 @@ def add_couplings(draft: MjcfDraft) -> None:
         draft.fidelity.translated[path] = (
             f"equality {names}" if names else "what it binds is locked"
         )
-    for coupler in couplers(robot):
+    for coupler in list_couplers(robot):
         if coupler.dependent not in drivers:
             description = "a coordinate that is a function of several others, or of itself"
             draft.fidelity.add(
@@ -104,7 +104,7 @@ def _add_follower(
     leader = draft.leads.get(driver.coordinate) or _add_argument_joint(draft, driver.coordinate)
     coordinate_line, function = leader.line.inverse(), driver.function
     lower, upper = select_span(function, coordinate.range, coordinate.default_value)
-    first, last = sorted(leader.line.slope * end + leader.line.start for end in (lower, upper))
+    first, last = sorted(leader.line.slope * end + leader.line.offset for end in (lower, upper))
     exact = (
         function
         if coordinate_line == (1.0, 0.0)
@@ -179,7 +179,7 @@ def _compute_inertia(draft: MjcfDraft, coordinate_index: int) -> float:
     q = draft.default_state[0]
     rates = np.zeros(len(q))
     rates[coordinate_index] = 1.0
-    for follower_index, driver in coordinate_drivers(draft.robot).items():
+    for follower_index, driver in find_coordinate_drivers(draft.robot).items():
         if driver.coordinate == coordinate_index:
             rates[follower_index] = driver.function.evaluate(q[[coordinate_index]])[1][0]
     # Kinetic energy at unit rate: twice of it is the inertia.
@@ -243,7 +243,7 @@ def compose_with_line(line: StraightLine, polynomial: Array) -> tuple[float, ...
     Returns:
         Coefficients of the composition, constant first.
     """
-    composed: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
+    composed: Any = Polynomial(polynomial)(Polynomial((line.offset, line.slope)))
     return tuple(composed.coef.tolist())
 
 

@@ -25,7 +25,7 @@ from osimlite.mechanics.multibody.mechanism import Values
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.robot.couplings import coordinate_drivers
+from osimlite.simulation.robot.couplings import find_coordinate_drivers
 from osimlite.simulation.robot.robot import principal_axes
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Version
@@ -148,7 +148,7 @@ class Driver:
         # Coordinates without a joint of their own follow a leading coordinate.
         self._following = {
             k: coupling_driver
-            for k, coupling_driver in coordinate_drivers(self.mjcf.robot).items()
+            for k, coupling_driver in find_coordinate_drivers(self.mjcf.robot).items()
             if k not in leading_indices
         }
         self._followed = [self._make_follower(name) for name in self.mjcf.followers]

@@ -103,7 +103,7 @@ class Mjcf:
         """
         values = self.robot.mechanism.values(q)
         leads = {
-            joint: line.slope * values[place] + line.start
+            joint: line.slope * values[place] + line.offset
             for place, (joint, line) in self.leads.items()
         }
         # The robot has the exact functions; `leads` adds joints that it does not have.

@@ -30,7 +30,7 @@ def add_keyframe(draft: MjcfDraft) -> None:
     values = draft.robot.joint_values(q)
     rates = dict(zip(values, (draft.robot.joint_jacobian(q) @ qdot).tolist(), strict=True))
     for index, (joint, line) in draft.leads.items():
-        values[joint], rates[joint] = line.slope * q[index] + line.start, line.slope * qdot[index]
+        values[joint], rates[joint] = line.slope * q[index] + line.offset, line.slope * qdot[index]
     # Joints of helper bodies are not part of the robot.
     values |= draft.starts
     # Followers last: their leaders have values by now.

@@ -9,7 +9,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.couplings import Composition, find_line, knots
+from osimlite.simulation.robot.couplings import Composition, find_knots, find_line
 from osimlite.translate.fidelity import Error
 
 DEGREE = 4
@@ -39,7 +39,7 @@ def find_polynomial(function: f.SmoothFunction) -> Polynomial | None:
     """Return the polynomial that a function of one argument is, or None."""
     line = find_line(function)
     if line is not None:
-        return Polynomial((line.start, line.slope))
+        return Polynomial((line.offset, line.slope))
     match function:
         case f.ConstantValue(value):
             return Polynomial((value,))
@@ -145,7 +145,7 @@ def select_span(
         Lower and upper end.
     """
     lower, upper = limits
-    points = knots(function)
+    points = find_knots(function)
     if not upper - lower <= _MAX_RANGE and points:
         lower = max(lower, min(points))
         upper = min(upper, max(points))

@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.mechanism import (
 from osimlite.mechanics.multibody.spatial import make_offset, skew_matrix
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.robot.build import build_robot
-from osimlite.simulation.robot.couplings import range_limits
+from osimlite.simulation.robot.couplings import limit_to_ranges
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.names import legal, legal_names
 from osimlite.simulation.robot.robot import WORLD, Robot
@@ -186,7 +186,7 @@ def test_ranges_become_limits_on_demand():
     ]
     robot = build_robot(one_body(make_custom_motions(axes, ()), 1))
     assert [joint.limits for joint in robot.moving] == [None, None]
-    assert [joint.limits for joint in range_limits(robot).moving] == [(-1.0, 2.0), (-1.0, 0.5)]
+    assert [joint.limits for joint in limit_to_ranges(robot).moving] == [(-1.0, 2.0), (-1.0, 0.5)]
 
 
 @pytest.mark.parametrize(

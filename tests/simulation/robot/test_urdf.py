@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.joints import JointAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.robot.build import build_robot
-from osimlite.simulation.robot.couplings import range_limits
+from osimlite.simulation.robot.couplings import limit_to_ranges
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.names import legal_names
 from osimlite.simulation.robot.robot import MeshFile, Robot, Visual
@@ -139,7 +139,7 @@ def test_nothing_stops_a_coordinate_at_its_range():
         q[mechanism.coordinate_index(name)], u[mechanism.coordinate_index(name)] = value, speed
     free = build_robot(mechanism)
     assert _after_one_step(free, q, u) < 1e-11
-    assert _after_one_step(range_limits(free), q, u) > 0.1
+    assert _after_one_step(limit_to_ranges(free), q, u) > 0.1
 
 
 def _after_one_step(robot: Robot, q, u) -> float:
