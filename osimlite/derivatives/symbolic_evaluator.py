@@ -275,7 +275,11 @@ class SymbolicEvaluator:
             data[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
                 data[self.structure[MODEL.WORK_CONTROL] + k] = control
-            with replace_kernel(evaluate_load, self._find_load) if self._loads else nullcontext():
+            with (
+                replace_kernel(evaluate_load, self._write_load_values)
+                if self._loads
+                else nullcontext()
+            ):
                 result = law(model, reals, data, y, f)
             return SymbolicWorkspace(model, reals, data, f, result, branches.run.failures)
 
@@ -295,23 +299,31 @@ class SymbolicEvaluator:
                 f"{subject} has no formula for CasADi: {error}; set its appliesForce to false, or use another class"
             ) from error
 
-    def _find_load(
-        self, g: RecordedVector, gp: RecordedVector, values: RecordedVector, t: Any
+    def _write_load_values(
+        self,
+        load_ints: RecordedVector,
+        _reals: RecordedVector,
+        values: RecordedVector,
+        _time: Any,
     ) -> None:
-        """Write the values of loads into the work vector, instead of the kernel :func:`evaluate_load`.
+        """Write the symbols of one load; stands in for the kernel :func:`evaluate_load`.
+
+        The kernel evaluates the tables of the load at a time. Here the values are arguments of the
+        formula, so that its tables and the time are not used.
 
         Args:
-            g: integers of the load.
-            gp: its numbers.
-            values: receives force, point and torque (9,).
-            t: time, s.
+            load_ints: integers of the load, from which the load is recognized.
+            values: receives force (N), point (m) and torque (N.m), three numbers each (9,).
         """
-        # The load's record is the last one that begins before its own integers.
+        # The integers of a load stand inside its record, which is therefore the last one that
+        # begins before them.
         element_index = self._packed.owners[
-            max(item for item in self._packed.owners if item <= g.first)
+            max(item for item in self._packed.owners if item <= load_ints.first)
         ]
         element: Any = self._elements[element_index]
         first_load = len(list_load_functions(self._elements[:element_index]))
+        # The groups are force, point and torque; one that the load lacks has no functions, and
+        # leaves its three values at zero.
         for group, functions in enumerate(element.location.groups):
             for k in range(len(functions)):
                 values[3 * group + k] = self._loads[first_load + k]
