@@ -48,7 +48,7 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
         source: the text.
         config: configuration of the check.
     """
-    use_classes(config)
+    activate_plugin_classes(config)
     if source.file is not None and is_table(source.file):
         from osimlite.lint.table import Table
 
@@ -72,11 +72,17 @@ def load_subject(file: str, config: Config | None = None) -> CheckTarget:
         return _make_document_subject(Survey(Source(b"", file), None, [fault]), config)
 
 
-def use_classes(config: Config | None) -> None:
-    """Activate the classes of plug-ins that a configuration names, and no others."""
+def activate_plugin_classes(config: Config | None) -> None:
+    """Make the classes of plug-ins that a configuration names known to the reader, and no others.
+
+    Args:
+        config: configuration whose `classes` names the files of plug-in classes; None for none.
+    """
     if config is None or not config.classes:
+        # Those of an earlier check in the same process must not stay.
         register_plugin_classes({})
         return
+    # Imported here only, because few projects have plug-ins.
     from osimlite.io.document.plugins import use_classes
 
     use_classes(config.classes)

@@ -264,10 +264,10 @@ class Subject(CheckTarget):
         Returns:
             The word or None, and the count.
         """
-        number = self.element_of(item, tag)
-        if number is None or self.source is None:
+        element = self.element_of(item, tag)
+        if element is None or self.source is None:
             return None, 0
-        span = self.source.spans[number]
+        span = self.source.spans[element]
         # OpenSim accepts commas between the words of a list.
         words = self.source.text[span.tag_end : span.inner_end].replace(",", " ").split()
         if index >= len(words):
@@ -300,7 +300,7 @@ class Subject(CheckTarget):
         }
 
     def element_of(self, item: Object, tag: str) -> int | None:
-        """Return the index of the element that gives a property of an object; None without one.
+        """Return the index in the text of the element of a property; None if the text has none.
 
         Args:
             item: the object.
@@ -329,19 +329,19 @@ class Subject(CheckTarget):
             word: the `nth` occurrence of this word in that text.
             nth: how many equal words precede it.
             attribute: an attribute, for the position of its value.
-            number: index of an element, instead of `item`.
+            number: index of an element in the text, instead of `item`.
         """
         if self.source is None:
             return None
         if number is None:
-            number = self._find_element(item)
+            number = self._find_element_index(item)
             if number is None:
                 return None
             if tag is not None:
-                inner = self.source.child(number, tag)
-                if inner is None:
+                property_index = self.source.child(number, tag)
+                if property_index is None:
                     return self.source.locate_tag(number)
-                return self.source.locate_text(inner, word, nth)
+                return self.source.locate_text(property_index, word, nth)
         if number >= len(self.source.spans):
             return None
         if attribute is not None:
@@ -398,19 +398,29 @@ class Subject(CheckTarget):
         """
         if self.source is None:
             return None
-        result = self.source.get_attributes(number).get(name)
+        attribute = self.source.get_attributes(number).get(name)
         return (
-            self.source.position(result.start, len(name))
-            if result
+            self.source.position(attribute.start, len(name))
+            if attribute
             else self.source.locate_tag(number)
         )
 
-    def _find_element(self, item: Object | None) -> int | None:
-        """Return the element of an object; that of the component above if the text does not contain the object."""
+    def _find_element_index(self, item: Object | None) -> int | None:
+        """Return the index in the text of the element that contains an object most closely.
+
+        Args:
+            item: the object, or None.
+
+        Returns:
+            Index of its own element. For an object that the reader has added, such as a default
+            frame, that of the nearest component above it; None without one.
+        """
         while item is not None:
-            number = cast("int | None", item._index)
-            if number is not None:
-                return number
-            owner = self.owner(item)
-            item = owner if owner is not item else self.tree.parent_of(owner)
+            element_index = cast("int | None", item._index)
+            if element_index is not None:
+                return element_index
+            # First from a part, such as a function, to its component, then from component to
+            # component: only components have a parent in the tree.
+            component = self.owner(item)
+            item = component if component is not item else self.tree.parent_of(component)
         return None

@@ -15,7 +15,7 @@ from osimlite.io.document.survey import survey_source
 from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import make_subject, run_rules, use_classes
+from osimlite.lint.engine import activate_plugin_classes, make_subject, run_rules
 from osimlite.lint.measures import MEASURES
 from osimlite.lint.project_files import BEGINNING, is_opensim_xml, is_table
 from osimlite.lint.registry import all_rules
@@ -99,7 +99,7 @@ class DocumentAnalysis:
         """Return what is at an offset: a tag, an attribute or text, with the elements around it."""
         # Registered classes are global, and the file analysed before may belong to a project with
         # other plug-ins.
-        use_classes(self.config)
+        activate_plugin_classes(self.config)
         return find_cursor(self.markup, min(offset, len(self.markup)))
 
     @cached_property

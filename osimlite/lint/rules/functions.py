@@ -63,7 +63,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
             previous_x, current_x = function.x[index - 1], function.x[index]
             if current_x < previous_x or (strictly and current_x == previous_x):
                 rejected = isinstance(function, GCVSpline)
-                is_off = is_unused(subject, function)
+                is_disabled = is_unused(subject, function)
                 # Where both values repeat, the slope of 0/0 is never used: SimmSpline gives the
                 # constant.
                 level = (
@@ -73,7 +73,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                 )
                 consequence = (
                     UNUSED
-                    if is_off
+                    if is_disabled
                     else _describe_refusal(subject, function)
                     if rejected
                     else "the function is constant there"
@@ -89,7 +89,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     tag="x",
                     word=word,
                     nth=nth,
-                    severity=WARNING if level or is_off else None,
+                    severity=WARNING if level or is_disabled else None,
                 )
                 # A reversed order makes many pairs wrong; the first is reported. Equal points are
                 # reported each.
@@ -119,10 +119,10 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
         xs, ys = len(function.x), len(function.y)
         if xs == ys:
             continue
-        is_off = is_unused(subject, function)
+        is_disabled = is_unused(subject, function)
         consequence = (
             UNUSED
-            if is_off
+            if is_disabled
             else "OpenSim reads beyond the end of the list"
             if ys < xs
             else "the extra values are ignored"
@@ -131,7 +131,7 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
             f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {consequence}",
             function,
             tag="y",
-            severity=WARNING if is_off or ys > xs else None,
+            severity=WARNING if is_disabled or ys > xs else None,
         )
 
 
@@ -153,8 +153,8 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for function in _find_tabulated(subject):
-        min_count, is_off = 1, is_unused(subject, function)
-        severity = WARNING if is_off else None
+        min_count, is_disabled = 1, is_unused(subject, function)
+        severity = WARNING if is_disabled else None
         if isinstance(function, SimmSpline):
             min_count = 2
         elif isinstance(function, GCVSpline):
@@ -176,7 +176,7 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
             )
         elif len(function.x) < min_count:
             consequence = "it has no value"
-            if is_off or isinstance(function, GCVSpline):
+            if is_disabled or isinstance(function, GCVSpline):
                 consequence = _describe_refusal(subject, function)
             given_text = format_count(len(function.x), "point")
             report(
@@ -196,9 +196,10 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     a joint or of a coordinate coupler that have fewer (an error) or more than one per coordinate
     and a constant. More than one coefficient for no coordinate is an error too.
 
-    OpenSim crashes on an empty list, and rejects a polynomial. Where the constant is missing it
-    reads beyond the end of the list. Of too many it uses the first as weights, the next as the
-    constant, and ignores the rest.
+    OpenSim crashes on an empty list of a linear function, and fails when it needs the value of such
+    a polynomial. Where the constant of a linear function is missing, it reads beyond the end of the
+    list. Of too many coefficients it uses the first as weights, the next as the constant, and
+    ignores the rest.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -211,13 +212,13 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     """
     for function in subject.find_instances(LinearFunction):
         if not function.coefficients:
-            is_off = is_unused(subject, function)
-            consequence = UNUSED if is_off else "OpenSim crashes when it needs a value"
+            is_disabled = is_unused(subject, function)
+            consequence = UNUSED if is_disabled else "OpenSim crashes when it needs a value"
             report(
                 f"{subject.describe_part(function)} has no coefficients: {consequence}",
                 function,
                 tag="coefficients",
-                severity=WARNING if is_off else ERROR,
+                severity=WARNING if is_disabled else ERROR,
             )
     for polynomial in subject.find_instances(MultivariatePolynomialFunction):
         dimension, order, coefficient_count = (
@@ -233,31 +234,32 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             else coefficient_count
         )
         if coefficient_count != expected_count:
-            is_off = is_unused(subject, polynomial)
-            consequence = UNUSED if is_off else "OpenSim fails when it needs a value"
+            is_disabled = is_unused(subject, polynomial)
+            consequence = UNUSED if is_disabled else "OpenSim fails when it needs a value"
             report(
                 f"{subject.describe_part(polynomial)} has {format_count(coefficient_count, 'coefficient')}; "
                 f"{format_count(dimension, 'variable')} to order {order} need {expected_count}: {consequence}",
                 polynomial,
                 tag="coefficients",
-                severity=WARNING if is_off else ERROR,
+                severity=WARNING if is_disabled else ERROR,
             )
-    for holder, names, function in _find_linear_functions(subject):
-        # The last coefficient is the constant.
-        coefficient_count, expected_count = len(function.coefficients), names + 1
+    for owner, coordinate_count, function in _find_linear_functions(subject):
+        # One weight per coordinate; the last coefficient is the constant.
+        coefficient_count, expected_count = len(function.coefficients), coordinate_count + 1
         if coefficient_count and coefficient_count != expected_count:
             # Measured: of ten runs with no coordinate, three computed NaN.
-            is_broken = coefficient_count < expected_count or not names
+            is_broken = coefficient_count < expected_count or not coordinate_count
             consequence = (
                 "OpenSim reads beyond the end of the list"
                 if coefficient_count < expected_count
                 else "OpenSim ignores the rest"
-                if names
+                if coordinate_count
                 else "OpenSim reads memory that it has not set"
             )
             report(
-                f"the LinearFunction of {describe_object(holder)} has "
-                f"{format_count(coefficient_count, 'coefficient')} for {format_count(names, 'coordinate')}, expected "
+                f"the LinearFunction of {describe_object(owner)} has "
+                f"{format_count(coefficient_count, 'coefficient')} for "
+                f"{format_count(coordinate_count, 'coordinate')}, expected "
                 f"{expected_count}; {consequence}",
                 function,
                 tag="coefficients",
@@ -288,7 +290,7 @@ def report_function_of_several(subject: Subject, report: FindingCollector) -> No
       </CoordinateCouplerConstraint>
     ```
     """
-    for holder, count, wrapped_function in _find_functions_of_coordinates(subject):
+    for owner, coordinate_count, wrapped_function in _find_functions_of_coordinates(subject):
         # Scaling wraps functions in multipliers, maybe several times.
         function = wrapped_function
         while isinstance(function, MultiplierFunction):
@@ -299,15 +301,15 @@ def report_function_of_several(subject: Subject, report: FindingCollector) -> No
         )
         if (
             not isinstance(function, (*_ONE_VARIABLE, MultivariatePolynomialFunction))
-            or count == dimension
-            or not count
+            or coordinate_count == dimension
+            or not coordinate_count
         ):
             continue
         report(
-            f"the {type(function).tag} of {describe_object(holder)} takes "
-            f"{format_count(dimension, 'variable')} but is given {format_count(count, 'coordinate')}: OpenSim "
-            "computes wrong values",
-            holder,
+            f"the {type(function).tag} of {describe_object(owner)} takes "
+            f"{format_count(dimension, 'variable')} but is given "
+            f"{format_count(coordinate_count, 'coordinate')}: OpenSim computes wrong values",
+            owner,
         )
 
 
@@ -372,12 +374,12 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
                     report(f"{describe_object(item)} has no {name}: {rejected}", item, tag=name)
     for function in subject.find_instances(MultiplierFunction):
         if function.function is None:
-            is_off = is_unused(subject, function)
-            consequence = UNUSED if is_off else "OpenSim fails when it needs a value"
+            is_disabled = is_unused(subject, function)
+            consequence = UNUSED if is_disabled else "OpenSim fails when it needs a value"
             report(
                 f"{subject.describe_part(function)} has no function to multiply: {consequence}",
                 function,
-                severity=WARNING if is_off else None,
+                severity=WARNING if is_disabled else None,
             )
 
 
@@ -395,7 +397,7 @@ _ONE_VARIABLE: Final = (
 def _find_functions_of_coordinates(
     subject: Subject,
 ) -> Iterator[tuple[Object, int, Function | None]]:
-    """Yield the functions of coordinates: what they belong to, the number of coordinates, the function."""
+    """Yield the functions of coordinates: owner, number of coordinates, function."""
     for joint in subject.find_by_class("CustomJoint"):
         # An axis without coordinates takes any function that needs none.
         for axis in list_axes(joint):
@@ -410,8 +412,8 @@ def _find_functions_of_coordinates(
 
 
 def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
-    """Yield the linear functions of several variables: their owner, the number of variables, the function."""
-    for holder, count, wrapped_function in _find_functions_of_coordinates(subject):
+    """Yield the linear functions of coordinates: owner, number of coordinates, function."""
+    for owner, coordinate_count, wrapped_function in _find_functions_of_coordinates(subject):
         function = wrapped_function
         while isinstance(function, MultiplierFunction):
             function = function.function
@@ -419,45 +421,63 @@ def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, Line
         if isinstance(function, LinearFunction) and (
             function._index is not None or subject.source is None
         ):
-            yield holder, count, function
+            yield owner, coordinate_count, function
 
 
 UNUSED: Final = "its owner is disabled, so OpenSim does not compute it"
+"""Consequence, in findings, of a fault in a function of a disabled force or controller."""
 
 
 def is_unused(subject: Subject, part: Object) -> bool:
-    """Return whether OpenSim never computes a function or a force, since what it belongs to is off.
+    """Return whether OpenSim never computes a part, because its force or controller is disabled.
 
-    That is a force that is not applied or a controller that is not enabled. Functions of
-    coordinates and constraints are made with the system, even where they are off, and the
-    integrator asks each enabled controller, even if no actuator does.
+    A force is disabled if it is not applied. Functions of coordinates and constraints are made with
+    the system, even where they are off, and the integrator evaluates each enabled controller, even
+    if no actuator does.
+
+    Args:
+        subject: model under check.
+        part: function, force or controller.
     """
-    user = None if subject.model is None else _find_user(subject, part)
-    if isinstance(user, Force):
-        return not user.appliesForce
-    return isinstance(user, Controller) and not user.enabled
+    owner = None if subject.model is None else _find_force_or_controller(subject, part)
+    if isinstance(owner, Force):
+        return not owner.appliesForce
+    return isinstance(owner, Controller) and not owner.enabled
 
 
-def _find_user(subject: Subject, function: Object) -> Force | Controller | None:
-    """Return what asks for the values of a function; None if it is made with the model or the system."""
-    item: Component | None = subject.owner(function)
-    while item is not None and not isinstance(item, Force | Controller):
+def _find_force_or_controller(subject: Subject, part: Object) -> Force | Controller | None:
+    """Return the force or controller that evaluates a function, and that the function belongs to.
+
+    Args:
+        subject: model under check.
+        part: the function; a force or controller is returned itself.
+
+    Returns:
+        The nearest force or controller above the part. None for functions of coordinates,
+        constraints and paths, which OpenSim makes with the model or its system.
+    """
+    component: Component | None = subject.owner(part)
+    while component is not None and not isinstance(component, Force | Controller):
         # OpenSim makes the functions of such a path as it reads it, whether the force is applied or
         # not.
-        item = None if isinstance(item, FunctionBasedPath) else subject.tree.parent_of(item)
-    return item
+        component = (
+            None if isinstance(component, FunctionBasedPath) else subject.tree.parent_of(component)
+        )
+    return component
 
 
 def _describe_refusal(subject: Subject, function: Object) -> str:
-    """Return what OpenSim does with a spline that it cannot make."""
+    """Return the consequence, in findings, of a spline that OpenSim cannot make."""
     if is_unused(subject, function):
         return UNUSED
-    # What a force or a controller asks for is made at the first acceleration.
-    is_late = _find_user(subject, function) is not None
+    # Functions of forces and controllers are made at the first acceleration, those of coordinates
+    # with the system.
+    is_late = _find_force_or_controller(subject, function) is not None
     return "OpenSim fails when it needs a value" if is_late else "OpenSim rejects it"
 
 
 def _find_tabulated(subject: Subject) -> Iterator[Tabulated]:
+    """Yield the functions given by points, without those that the reader has added."""
     for cls in (SimmSpline, GCVSpline, PiecewiseLinearFunction, PiecewiseConstantFunction):
         for function in subject.find_instances(cls):
             # Functions that the reader adds by default have no element in the text.

@@ -37,36 +37,41 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
     ```
     """
     for note, owner in subject.notes_of("unknown-attribute"):
-        message = f"OpenSim ignores the attribute '{note.word}' of {describe_object(owner)}"
+        attribute_name = note.word
+        message = f"OpenSim ignores the attribute '{attribute_name}' of {describe_object(owner)}"
         # The author meant a property, and wrote it as an attribute.
-        if note.word in get_field_specs(type(owner)):
-            message += f"; write <{note.word}>{note.value}</{note.word}> inside"
+        if attribute_name in get_field_specs(type(owner)):
+            message += f"; write <{attribute_name}>{note.value}</{attribute_name}> inside"
         suggestion = (
             "name"
-            if find_nearest(note.word, ["name", "file"]) == "name" and not owner.name
+            if find_nearest(attribute_name, ["name", "file"]) == "name" and not owner.name
             else None
         )
         fix = (
-            remove_attribute(subject.source, note.number, note.word) if suggestion is None else None
+            remove_attribute(subject.source, note.number, attribute_name)
+            if suggestion is None
+            else None
         )
         # Namespaces are added by editors and do no harm.
-        of_xml = INFO if _is_xml_attribute(note.word) else None
-        position = subject.attribute_name(note.number, note.word)
+        is_of_xml = _is_xml_attribute(attribute_name)
         report(
             message,
             owner,
-            at=position,
-            severity=of_xml,
+            at=subject.attribute_name(note.number, attribute_name),
+            severity=INFO if is_of_xml else None,
             suggestion=suggestion,
-            fix=None if of_xml else fix,
+            fix=None if is_of_xml else fix,
         )
-    for number, tag, word in _find_ignored_attributes(subject):
+    for element_index, tag, attribute_name in _find_ignored_attributes(subject):
+        is_of_xml = _is_xml_attribute(attribute_name)
         report(
-            f"OpenSim ignores the attribute '{word}' of <{tag}>; it is lost when the model is "
-            "written",
-            at=subject.attribute_name(number, word),
-            severity=INFO if _is_xml_attribute(word) else WARNING,
-            fix=None if _is_xml_attribute(word) else remove_attribute(subject.source, number, word),
+            f"OpenSim ignores the attribute '{attribute_name}' of <{tag}>; it is lost when the model "
+            "is written",
+            at=subject.attribute_name(element_index, attribute_name),
+            severity=INFO if is_of_xml else WARNING,
+            fix=None
+            if is_of_xml
+            else remove_attribute(subject.source, element_index, attribute_name),
         )
 
 
@@ -76,21 +81,30 @@ def _is_xml_attribute(attribute: str) -> bool:
 
 
 def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]:
-    """Yield every attribute without meaning on elements that are not objects: element, tag, name."""
+    """Yield every attribute without meaning on elements that are not objects.
+
+    Args:
+        subject: model or setup under check.
+
+    Yields:
+        Index of the element in the text, its tag, and the name of the attribute.
+    """
     source = subject.source
     if source is None or not source.attributes:
         return
-    # Attributes of objects have the findings above.
-    reported = {
+    # The reader has noted the unknown attributes of objects, as pairs of element and name; the
+    # rule reports them from these notes.
+    noted_attributes = {
         (note.number, note.word) for note in subject.notes if note.kind == "unknown-attribute"
     }
-    # What OpenSim does not read has a finding as a whole.
+    # Elements that OpenSim does not read have a finding of another rule, and all that is inside
+    # them is skipped.
     unread_elements = {note.number for note in subject.notes if note.kind in _UNREAD_KINDS}
     unread_end = 0
-    for number, span in enumerate(source.spans):
+    for element_index, span in enumerate(source.spans):
         if span.start < unread_end:
             continue
-        if number in unread_elements:
+        if element_index in unread_elements:
             unread_end = span.end
             continue
         start_tag = source.text[span.start : span.tag_end]
@@ -98,9 +112,12 @@ def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]
             attribute_name = match["name"]
             # The root has a version; other elements may have a name, or the file of an included
             # object.
-            known_names = ("Version",) if number == 0 else ("name", "file")
-            if attribute_name not in known_names and (number, attribute_name) not in reported:
-                yield number, span.tag, attribute_name
+            known_names = ("Version",) if element_index == 0 else ("name", "file")
+            if (
+                attribute_name not in known_names
+                and (element_index, attribute_name) not in noted_attributes
+            ):
+                yield element_index, span.tag, attribute_name
 
 
 @rule("OSIM106", "stray-text", severity=WARNING, fixes="safe")
@@ -145,7 +162,7 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
 
 
 def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
-    """Yield each text beside elements with its offset; comments do not count."""
+    """Yield the offset of each text beside elements, and the text; comments do not count."""
     if source.mixed is None:
         # A ">" inside a value of an attribute would end the tag for the patterns.
         plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_comments(source.text))
@@ -156,14 +173,17 @@ def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
             yield start, plain[start:end].rstrip()
         return
     for number in source.mixed:
-        begin, around = source.spans[number].tag_end, source.spans[number].inner_end
-        inner = [source.spans[child] for child in source.children(number)]
-        # The last pair closes the element: text after its last child.
-        for end, behind in (*((span.start, span.end) for span in inner), (around, around)):
-            plain = blank_comments(source.text[begin:end])
+        text_start, inner_end = source.spans[number].tag_end, source.spans[number].inner_end
+        child_spans = [source.spans[child] for child in source.children(number)]
+        # Text stands before each child, and after the last one: hence the pair of the inner end.
+        for text_end, next_start in (
+            *((span.start, span.end) for span in child_spans),
+            (inner_end, inner_end),
+        ):
+            plain = blank_comments(source.text[text_start:text_end])
             if text := plain.strip():
-                yield begin + plain.index(text), text
-            begin = behind
+                yield text_start + plain.index(text), text
+            text_start = next_start
 
 
 @rule("OSIM110", "defaults", severity=WARNING, fixes="safe")
@@ -295,7 +315,13 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
 
 
 def _describe_unreadable(source: Source, number: int, kind: str) -> str:
-    """Return what an element should contain; empty if it does."""
+    """Return the content that OpenSim expects in an element, for messages; empty if it can read it.
+
+    Args:
+        source: the text.
+        number: index of the element in the text.
+        kind: expected content: "text", "number" or "numbers".
+    """
     span, children = source.spans[number], source.children(number)
     texts = [
         text_piece
@@ -321,16 +347,19 @@ def _describe_unreadable(source: Source, number: int, kind: str) -> str:
 
 
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+"""XML comment."""
 _TOOL_CLASSES = {
     "CMC_Joint": dict.fromkeys(["on", "wrt_body", "express_body", "active", "coordinate"], "text")
     | dict.fromkeys(["weight", "kp", "kv", "ka", "r0", "r1", "r2"], "numbers")
     | {"limit": "number"},
 }
-"""Classes that are no part of a model and that old files hold defaults of: how OpenSim reads what they say."""
+"""Expected content of each property by class of tools; old files have defaults of these classes."""
 _UNREAD_KINDS = frozenset(
     ("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag")
 )
+"""Kinds of notes about elements that OpenSim does not read."""
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
+"""Value of an attribute that contains a ">"."""
 # A tag is looked for from the last "<" before its ">": else the time would be that of all open
 # ones.
 _AFTER = re.compile(r"(?:</[^<>]+>|/>)\s*+([^<]++)")
