@@ -14,8 +14,7 @@ import numpy as np
 
 from osimlite.errors import SettingError
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.starts import lift_to_depth
-from osimlite.studies.gait.starts import plant_feet as at_rest
+from osimlite.studies.gait.starts import lift_to_depth, plant_feet
 from osimlite.studies.gait.steps import (
     MIN_STEP_LENGTH_M,
     WalkerSteps,
@@ -114,7 +113,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
     def place(
         states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]
     ) -> Floats:
-        resting = at_rest(engine, footing, states, numbers=numbers)
+        resting = plant_feet(engine, footing, states, numbers=numbers)
         return started(
             lift_to_depth(engine, footing, resting, PLANTED_DEPTH_M, -1, numbers=numbers)
         )

@@ -21,29 +21,30 @@ class Carriers:
     """Coordinates that translate the complete walker.
 
     Attributes:
-        places: offsets in the state of the coordinates that move all contacts by the same vector
+        offsets: offsets in the state of the coordinates that move all contacts by the same vector
             (m,).
-        lift: offset of the one among them that lifts the walker off the ground, or None.
+        lift_offset: offset of the one among them that lifts the walker off the ground, or None.
     """
 
-    places: tuple[int, ...]
-    lift: int | None
+    offsets: tuple[int, ...]
+    lift_offset: int | None
 
 
-def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
+def find_carriers(engine: BatchEngine, foot_contacts: FootContacts) -> Carriers:
     """Find the coordinates that translate the complete walker, by moving each one in random poses.
 
     Args:
         engine: engine of the model.
-        footing: contacts of the walker.
+        foot_contacts: contacts of the walker.
     """
     dof_count = len(engine.order)
-    contacts = _list_contacts(engine, footing)
+    contacts = _list_contacts(engine, foot_contacts)
     rng = np.random.default_rng(0)
     poses = np.hstack((rng.uniform(-0.2, 0.2, (3, dof_count)), np.zeros((3, dof_count))))
     centres = _compute_contact_centres(engine, poses)[:, contacts]
     depths = measure_along_slope(engine, poses)[1][:, contacts]
-    carrier_indices, lift = [], None
+    carrier_offsets: list[int] = []
+    lift_offset: int | None = None
     for index in range(dof_count):
         moved_poses = poses.copy()
         moved_poses[:, index] += PROBE_STEP
@@ -53,49 +54,51 @@ def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
         # A carrier moves all contacts equally, in all poses, and by a noticeable amount.
         if np.ptp(directions, axis=0).max() > 1e-9 or np.linalg.norm(directions[0]) < 1e-3:
             continue
-        carrier_indices.append(index)
+        carrier_offsets.append(index)
+        # The lifting coordinate is the first one that reduces the penetration of all contacts.
         if (
-            lift is None
+            lift_offset is None
             and (
                 measure_along_slope(engine, moved_poses)[1][:, contacts] - depths
                 < -0.1 * PROBE_STEP
             ).all()
         ):
-            lift = index
-    return Carriers(tuple(carrier_indices), lift)
+            lift_offset = index
+    return Carriers(tuple(carrier_offsets), lift_offset)
 
 
 def lift_to_depth(
     engine: BatchEngine,
-    footing: FootContacts,
+    foot_contacts: FootContacts,
     states: Floats,
     depth: float = 0.0,
     foot: int = 0,
     *,
     numbers: Floats | None = None,
 ) -> Floats:
-    """Lift or lower walkers until one foot has a given penetration.
+    """Lift or lower walkers until the deepest contact of a foot has a given penetration.
 
     Args:
         engine: engine of the model.
-        footing: contacts of the feet.
+        foot_contacts: contacts of the feet.
         states: states (W, y); they are returned as they are if no coordinate lifts the walker.
         depth: penetration of the deepest contact of the foot (m).
         foot: index of the foot; -1 for the deeper one.
-        numbers: numbers of models of the same structure, one row per state; by default those of the
-            engine.
+        numbers: parameters of a packed model of the same structure for each state (W, m); by
+            default all states are of the model of the engine.
 
     Returns:
         States (W, y).
     """
-    lift = find_carriers(engine, footing).lift
-    if lift is None:
+    lift_offset = find_carriers(engine, foot_contacts).lift_offset
+    if lift_offset is None:
         return states
+    # Row of `numbers` that belongs to each state.
     rows = np.arange(len(states)) if numbers is not None else None
-    feet = footing.feet if foot < 0 else footing.feet[foot : foot + 1]
+    feet = foot_contacts.feet if foot < 0 else foot_contacts.feet[foot : foot + 1]
     contacts = [engine.contacts.index(name) for names in feet for name in names]
     lifted = states.copy()
-    lifted[:, lift] += PROBE_STEP
+    lifted[:, lift_offset] += PROBE_STEP
     # The depth is linear in the lifting coordinate, so that two poses determine it.
     depths, lifted_depths = (
         measure_along_slope(engine, poses, numbers, rows)[1][:, contacts]
@@ -103,14 +106,18 @@ def lift_to_depth(
     )
     deepest = np.arange(len(states)), depths.argmax(axis=1)
     result = states.copy()
-    result[:, lift] += (
+    result[:, lift_offset] += (
         (depth - depths[deepest]) * PROBE_STEP / (lifted_depths[deepest] - depths[deepest])
     )
     return result
 
 
 def plant_feet(
-    engine: BatchEngine, footing: FootContacts, states: Floats, *, numbers: Floats | None = None
+    engine: BatchEngine,
+    foot_contacts: FootContacts,
+    states: Floats,
+    *,
+    numbers: Floats | None = None,
 ) -> Floats:
     """Put walkers on the ground with the deeper foot, which is at rest there.
 
@@ -120,27 +127,30 @@ def plant_feet(
 
     Args:
         engine: engine of the model.
-        footing: contacts of the feet.
+        foot_contacts: contacts of the feet.
         states: states (W, y) with values and speeds of all other coordinates.
-        numbers: numbers of models of the same structure, one row per state; by default those of the
-            engine.
+        numbers: parameters of a packed model of the same structure for each state (W, m); by
+            default all states are of the model of the engine.
 
     Returns:
         States (W, y).
     """
-    dof_count, count = len(engine.order), np.arange(len(states))
-    result = find_carriers(engine, footing)
+    dof_count, state_indices = len(engine.order), np.arange(len(states))
+    carriers = find_carriers(engine, foot_contacts)
     unplaced = states.copy()
     # The result must not depend on the carriers' previous values, not even by rounding.
-    unplaced[:, [dof_count + index for index in result.places]] = 0.0
-    if result.lift is not None:
-        unplaced[:, result.lift] = 0.0
-    planted = lift_to_depth(engine, footing, unplaced, foot=-1, numbers=numbers)
-    if not result.places:
+    unplaced[:, [dof_count + index for index in carriers.offsets]] = 0.0
+    if carriers.lift_offset is not None:
+        unplaced[:, carriers.lift_offset] = 0.0
+    planted = lift_to_depth(engine, foot_contacts, unplaced, foot=-1, numbers=numbers)
+    if not carriers.offsets:
         return planted
-    rows = None if numbers is None else count
-    feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
-    deepest = feet[measure_along_slope(engine, planted, numbers, rows)[1][:, feet].argmax(axis=1)]
+    rows = None if numbers is None else state_indices
+    contacts = np.array(
+        [engine.contacts.index(name) for names in foot_contacts.feet for name in names]
+    )
+    depths = measure_along_slope(engine, planted, numbers, rows)[1][:, contacts]
+    deepest = contacts[depths.argmax(axis=1)]
     poses_ahead, poses_behind = planted.copy(), planted.copy()
     # Speeds are rates of coordinates here, so that a small step in time moves the values by them.
     poses_ahead[:, :dof_count] += PROBE_TIME_S * planted[:, dof_count:]
@@ -148,14 +158,16 @@ def plant_feet(
     motions = _compute_contact_centres(
         engine, poses_ahead, numbers, rows
     ) - _compute_contact_centres(engine, poses_behind, numbers, rows)
-    speeds = motions[count, deepest] / (2.0 * PROBE_TIME_S)
+    speeds = motions[state_indices, deepest] / (2.0 * PROBE_TIME_S)
     carrier_directions = []
     centres = _compute_contact_centres(engine, planted, numbers, rows)
-    for index in result.places:
+    for index in carriers.offsets:
         moved_poses = planted.copy()
         moved_poses[:, index] += PROBE_STEP
         carrier_directions.append(
-            (_compute_contact_centres(engine, moved_poses, numbers, rows) - centres)[count, deepest]
+            (_compute_contact_centres(engine, moved_poses, numbers, rows) - centres)[
+                state_indices, deepest
+            ]
             / PROBE_STEP
         )
     # The least-squares solution for the speeds of the carriers that cancel the velocity of the
@@ -163,7 +175,7 @@ def plant_feet(
     carrier_speeds = np.einsum(
         "wi,wij->wj", speeds, np.linalg.pinv(np.stack(carrier_directions, axis=1))
     )
-    planted[:, [dof_count + index for index in result.places]] -= carrier_speeds
+    planted[:, [dof_count + index for index in carriers.offsets]] -= carrier_speeds
     return planted
 
 
@@ -189,13 +201,25 @@ def move_along_neutral_directions(states: Floats, neutral: Floats) -> Floats:
 
 
 def _compute_contact_centres(
-    engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None
+    engine: BatchEngine,
+    states: Floats,
+    numbers: Floats | None = None,
+    rows: Ints | None = None,
 ) -> Floats:
-    """Return the centres of the spheres of contacts (k, P, 3) in ground (m)."""
+    """Return the centres of the spheres of contacts (W, P, 3) in ground (m).
+
+    Args:
+        engine: engine of the model.
+        states: states (W, y).
+        numbers: parameters of packed models of the same structure, one row per model; by
+            default those of the engine.
+        rows: row of `numbers` for each state.
+    """
+    # Centre and normal of the surface below come first, then the centre of the sphere.
     return engine.locate_contacts(states, numbers, rows)[..., 6:]
 
 
-def _list_contacts(engine: BatchEngine, footing: FootContacts) -> Ints:
-    """Return the indices of the contacts of feet and falls in the engine."""
-    names = [name for foot in footing.feet for name in foot] + list(footing.falls)
+def _list_contacts(engine: BatchEngine, foot_contacts: FootContacts) -> Ints:
+    """Return the indices in the engine of the contacts of feet, and of those that mean a fall."""
+    names = [name for foot in foot_contacts.feet for name in foot] + list(foot_contacts.falls)
     return np.array([engine.contacts.index(name) for name in names])

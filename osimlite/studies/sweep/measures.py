@@ -224,18 +224,24 @@ def get_measure_name(spec: Any) -> str:
 
 @registry.register_measure(is_maximized=True)
 def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Return the measure of the displacement of the first free translational coordinate (m).
+    """Make the measure `distance`: displacement along the first free translational coordinate (m).
 
     Args:
         engine: engine of the model.
-        feet: unused.
+        feet: contacts of each foot, which every maker of a measure is given; not used here.
 
     Raises:
         SettingError: the model has no such coordinate.
     """
-    infos = engine.mechanism.coordinates
+    coordinates = engine.mechanism.coordinates
+    # The state begins with the values of the free coordinates, in the order of the engine.
     offset = next(
-        (k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None
+        (
+            state_offset
+            for state_offset, coordinate_index in enumerate(engine.order)
+            if coordinates[coordinate_index].motion_type == "translational"
+        ),
+        None,
     )
     if offset is None:
         raise SettingError(
@@ -248,26 +254,26 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
 @registry.register_measure()
 def largest_force(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Return the measure of the largest force of any contact at the ends of integrator steps (N).
+    """Make the measure `largest_force`: largest force of any contact at the ends of steps (N).
 
     Args:
         engine: engine of the model.
-        feet: unused.
+        feet: contacts of each foot, which every maker of a measure is given; not used here.
     """
     return RunMeasure(
-        # A model without contacts has no peaks, hence the initial 0.
         "largest_force",
+        # A model without contacts has no peaks, hence the initial 0.
         lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0),
     )
 
 
 @registry.register_measure()
 def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Return the measure of the change of mechanical energy (J); contact and damping reduce it.
+    """Make the measure `energy`: change of mechanical energy (J); contact and damping reduce it.
 
     Args:
         engine: engine of the model.
-        feet: unused.
+        feet: contacts of each foot, which every maker of a measure is given; not used here.
     """
 
     def compute_change(batch: Batch) -> Floats:
@@ -276,9 +282,9 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
             runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True
         )
         result = []
-        for number, (t, start, end) in enumerate(end_points):
-            engine = batch.engine_of(number)
+        for run_index, (t, start, end) in enumerate(end_points):
             # Each run has its own masses and springs.
+            engine = batch.engine_of(run_index)
             result.append(
                 sum(engine.compute_energies(t, end)) - sum(engine.compute_energies(0.0, start))
             )

@@ -38,7 +38,7 @@ def places_of(walker, *names: str) -> list[int]:
 def test_the_pelvis_carries_the_walker(walker):
     result = find_carriers(walker, find_footing(walker))
     forward, up = places_of(walker, "Pelvis_tx", "Pelvis_ty")
-    assert result.places == (forward, up) and result.lift == up
+    assert result.offsets == (forward, up) and result.lift_offset == up
 
 
 @pytest.mark.parametrize("slope", [None, 2.0, 25.0])
