@@ -122,7 +122,7 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
     # What remains are joints that are the coordinate itself or a multiple of it, as the couplings
     # of `build_robot` make them.
     line = find_line(function)
-    assert line is not None and line.start == 0.0, f"nothing moves '{joint.name}'"
+    assert line is not None and line.offset == 0.0, f"nothing moves '{joint.name}'"
     packer.numbers.append(line.slope)
     return JOINT_KIND.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
 

@@ -33,7 +33,7 @@ class ContactEvent(NamedTuple):
     begins: bool
 
 
-class _Change(NamedTuple):
+class _ContactChange(NamedTuple):
     """Step within which contacts began or ended.
 
     Attributes:
@@ -65,10 +65,12 @@ class Recorder:
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._loads: list[Any] = engine.loads
-        self._touching = 0
-        self._changes: list[_Change] = []
+        # One bit for each contact that touches, at the start and after the last step.
+        self._initially_touching = self._touching = 0
+        self._changes: list[_ContactChange] = []
         self._start = self._last = 0.0
-        self._numbers: dict[int, tuple[int, ...]] = {0: ()}
+        self._set_bits: dict[int, tuple[int, ...]] = {0: ()}
+        # Largest force (N) of each contact, and its time (s).
         self._largest = [(0.0, 0.0)] * len(engine.contacts)
         self._stepper: Stepper | None = None
         self._keeps_steps = need_steps(engine.probes)
@@ -79,10 +81,9 @@ class Recorder:
         self._stepper = stepper
         self._start = self._last = stepper.time
         # The last entry of the loads has one bit for each contact that touches.
-        self._touching = self._loads[-1]
-        self.initially = self._touching
+        self._initially_touching = self._touching = self._loads[-1]
         self._steps = [(stepper.time, stepper.state)]
-        self._note_forces(stepper.time)
+        self._update_largest_forces(stepper.time)
 
     def observe_step(self, t: float, y: list[float]) -> None:
         """Record an accepted step.
@@ -95,20 +96,20 @@ class Recorder:
         if touching != self._touching:
             assert self._stepper is not None
             # The interpolant is stored; events are located when the summary is read.
-            change = _Change(
+            change = _ContactChange(
                 self._last, t, self._stepper.make_interpolant(), self._touching, touching
             )
             self._changes.append(change)
             self._touching = touching
         self._last = t
         if touching:
-            self._note_forces(t)
+            self._update_largest_forces(t)
         if self._keeps_steps:
             self._steps.append((t, y))
 
     def get_steps(self) -> list[Moment]:
         """Return the start and the ends of all steps if a probe needs them, else the start alone."""
-        self._catch_up()
+        self._observe_outstanding_steps()
         return self._steps
 
     def get_largest_forces(self) -> dict[str, tuple[float, float]]:
@@ -117,7 +118,7 @@ class Recorder:
         Returns:
             Force (N) and its time (s) by contact, for contacts that touched.
         """
-        self._catch_up()
+        self._observe_outstanding_steps()
         return {
             name: largest
             for name, largest in zip(self._engine.contacts, self._largest, strict=True)
@@ -125,20 +126,27 @@ class Recorder:
         }
 
     def locate_events(self) -> list[ContactEvent]:
-        """Return all begins and ends in order of time; contacts that touch at the start begin there."""
-        self._catch_up()
+        """Return the begins and ends of all contacts in order of time.
+
+        Contacts that touch at the start of the motion begin there.
+        """
+        self._observe_outstanding_steps()
         result = [
-            ContactEvent(self._start, name, True)
-            for name in self._get_contact_names(self.initially)
+            ContactEvent(self._start, name, begins=True)
+            for name in self._get_contact_names(self._initially_touching)
         ]
         for change in self._changes:
             result += sorted(self._locate_changes(change))
         return result
 
-    def _locate_changes(self, change: _Change) -> Iterator[ContactEvent]:
-        """Yield the events of a step in which contacts changed, located by bisection."""
-        for number in self._get_set_bits(change.before ^ change.after):
-            bit = 1 << number
+    def _locate_changes(self, change: _ContactChange) -> Iterator[ContactEvent]:
+        """Yield the events of a step in which contacts changed, located by bisection.
+
+        Args:
+            change: the step.
+        """
+        for contact_index in self._get_set_bits(change.before ^ change.after):
+            bit = 1 << contact_index
             low, high = change.start, change.end
             # Bisection, since the force of a contact is not smooth where it begins.
             # The bit at the middle says in which half the contact changed.
@@ -151,31 +159,40 @@ class Recorder:
                 else:
                     high = middle
             yield ContactEvent(
-                0.5 * (low + high), self._engine.contacts[number], bool(change.after & bit)
+                0.5 * (low + high),
+                self._engine.contacts[contact_index],
+                begins=bool(change.after & bit),
             )
 
-    def _catch_up(self) -> None:
+    def _observe_outstanding_steps(self) -> None:
+        """Observe the steps that the stepper has taken but not reported yet."""
         if self._stepper is not None:
             self._stepper.catch_up()
 
-    def _note_forces(self, t: float) -> None:
-        for number in self._get_set_bits(self._touching):
-            x, y, z = self._loads[number]
+    def _update_largest_forces(self, t: float) -> None:
+        """Record the forces of the touching contacts that are the largest so far.
+
+        Args:
+            t: time, s.
+        """
+        for contact_index in self._get_set_bits(self._touching):
+            x, y, z = self._loads[contact_index]
             size = sqrt(x * x + y * y + z * z)
-            if size > self._largest[number][0]:
-                self._largest[number] = size, t
+            if size > self._largest[contact_index][0]:
+                self._largest[contact_index] = size, t
 
     def _get_contact_names(self, bits: int) -> list[str]:
-        return [self._engine.contacts[number] for number in self._get_set_bits(bits)]
+        """Return the names of the contacts whose bits are set."""
+        return [self._engine.contacts[contact_index] for contact_index in self._get_set_bits(bits)]
 
     def _get_set_bits(self, bits: int) -> tuple[int, ...]:
         """Return the indices of the bits that are set."""
         # Feet touch in few combinations, so the indices of each are cached.
-        numbers = self._numbers.get(bits)
-        if numbers is None:
-            numbers = tuple(number for number in range(bits.bit_length()) if bits >> number & 1)
-            self._numbers[bits] = numbers
-        return numbers
+        indices = self._set_bits.get(bits)
+        if indices is None:
+            indices = tuple(index for index in range(bits.bit_length()) if bits >> index & 1)
+            self._set_bits[bits] = indices
+        return indices
 
 
 EXTREME_RULES: dict[str, tuple[float, Callable[[float, float], bool]]] = {
@@ -290,11 +307,12 @@ def compute_probe_rows(
             integrated.
     """
 
-    def memory_of(operation: str) -> Rate | Extreme:
+    def make_memory(operation: str) -> Rate | Extreme:
+        """Return the state of a measure that depends on earlier steps."""
         return Rate() if operation == "differentiate" else Extreme(operation, is_known=not steps)
 
     memories = [
-        [memory_of(probe.operation) for _ in probe.reading.labels] if need_steps([probe]) else []
+        [make_memory(probe.operation) for _ in probe.reading.labels] if need_steps([probe]) else []
         for probe in engine.probes
     ]
     # Steps and rows are merged in order of time; `pop` takes the earliest from the end.

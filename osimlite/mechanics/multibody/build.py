@@ -211,7 +211,7 @@ class _Builder:
             low, high = coordinate.range
             self.coordinates.append(
                 CoordinateInfo(
-                    name=_find_last_body(coordinate_path),
+                    name=_get_last_name(coordinate_path),
                     path=coordinate_path,
                     joint=path,
                     motion_type=motion_type,
@@ -280,7 +280,7 @@ class _Builder:
             )
             properties = mass_properties(self.bodies[outer], outer)
             bodies.append(
-                MobileBody(_find_last_body(outer), outer, index[carrier], properties, mobilizer)
+                MobileBody(_get_last_name(outer), outer, index[carrier], properties, mobilizer)
             )
         for edge in loops:
             if not edge.coordinates:
@@ -295,7 +295,7 @@ class _Builder:
                     path = f"{edge.child}_again{len(bodies)}"
                     bodies.append(
                         MobileBody(
-                            _find_last_body(path), path, index[edge.parent], repeated_mass, carried
+                            _get_last_name(path), path, index[edge.parent], repeated_mass, carried
                         )
                     )
             elif edge.child == ground or edge.kind == "FreeJoint":
@@ -314,7 +314,7 @@ class _Builder:
             body: path of the body.
             ground: path of ground.
         """
-        name, motions = f"free_{_find_last_body(body)}", MOTIONS["FreeJoint"]
+        name, motions = f"free_{_get_last_name(body)}", MOTIONS["FreeJoint"]
         path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
         for index, motion_type in enumerate(motion_types(motions, 6)):
             coordinate_name = f"{name}_coord_{index}"
@@ -325,17 +325,20 @@ class _Builder:
         return _Edge("FreeJoint", path, ground, body, identity, identity, motions, indices)
 
     def _split_child(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
-        """Split the child of a joint that closes a loop, and weld the parts.
+        """Split the child of a joint that closes a loop, and weld the parts, as OpenSim does.
+
+        Mass and inertia are divided equally among the body and all of its parts. With the option
+        `opensim_derivatives` the parts have the inertia that OpenSim 4.6 gives them instead, which
+        is wrong.
 
         Args:
             edge: joint that closes the loop; it carries the new part.
             index: index of each body, by path.
             bodies: bodies; the part is appended, and masses are divided.
         """
-        child_index, undivided = (
-            index[edge.child],
-            mass_properties(self.bodies[edge.child], edge.child),
-        )
+        child_index = index[edge.child]
+        complete_mass = mass_properties(self.bodies[edge.child], edge.child)
+        # The body may have been split before, if it closes several loops.
         part_indices = [
             child_index,
             *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part")),
@@ -343,26 +346,26 @@ class _Builder:
         path = f"{edge.child}_part{len(part_indices)}"
         bodies.append(
             MobileBody(
-                _find_last_body(path),
+                _get_last_name(path),
                 path,
                 index[edge.parent],
-                undivided,
+                complete_mass,
                 edge.build_mobilizer(reversed=False),
             )
         )
         part_indices.append(len(bodies) - 1)
-        share = undivided.share(len(part_indices))
+        part_mass = complete_mass.share(len(part_indices))
         for part_index in part_indices:
             # OpenSim gives all parts but the body itself the inertia about the origin per kg of
             # body.
-            wrong = self.opensim_derivatives and part_index != child_index
+            has_opensim_error = self.opensim_derivatives and part_index != child_index
             inertia = (
-                undivided.about_origin() / undivided.mass
-                if wrong and undivided.mass
-                else share.inertia
+                complete_mass.about_origin() / complete_mass.mass
+                if has_opensim_error and complete_mass.mass
+                else part_mass.inertia
             )
             bodies[part_index] = replace(
-                bodies[part_index], mass_properties=replace(share, inertia=inertia)
+                bodies[part_index], mass_properties=replace(part_mass, inertia=inertia)
             )
         identity = np.eye(4)
         weld = WeldEquations(
@@ -373,12 +376,16 @@ class _Builder:
         self.constraints.append(weld)
 
     def _build_constraints(self, index: dict[str, int]) -> None:
-        """Add the constraints that are enforced.
+        """Add the enforced constraints of the model, and free their dependent coordinates.
+
+        Rolling constraints are left out unless the builder was made with `rolling`.
 
         Args:
             index: index of each body and of ground, by path.
         """
-        coordinate_indices = {info.path: number for number, info in enumerate(self.coordinates)}
+        coordinate_indices = {
+            info.path: coordinate_index for coordinate_index, info in enumerate(self.coordinates)
+        }
         reader = ConstraintReader(
             self.placements, index, coordinate_indices, self.opensim_derivatives
         )
@@ -389,10 +396,11 @@ class _Builder:
             if isinstance(constraint, RollingConstraint) and not self.rolling:
                 continue
             self.constraints.append(constraint)
-            # OpenSim's assembly does not penalize the change of a dependent coordinate.
+            # OpenSim's assembly does not penalize the change of a dependent coordinate: `yielding`
+            # means that it may move freely to satisfy the constraints.
             if isinstance(constraint, Coupler):
-                number = constraint.dependent
-                self.coordinates[number] = replace(self.coordinates[number], yielding=True)
+                dependent = constraint.dependent
+                self.coordinates[dependent] = replace(self.coordinates[dependent], yielding=True)
 
 
 RIGHT_ANGLE_GAP = 1e-6
@@ -439,5 +447,6 @@ def mass_properties(body: Body, path: str) -> MassProperties:
     return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
 
 
-def _find_last_body(path: str) -> str:
+def _get_last_name(path: str) -> str:
+    """Return the last name of a path."""
     return path.rsplit("/", 1)[1]

@@ -145,8 +145,8 @@ class Link:
     parent: int  # index of the link that carries it, -1 for ground
     operations: list[Operation]  # motions of the joint, in order
     mass: float = 0.0  # kg
-    first: Array = field(default_factory=lambda: np.zeros(3))  # first moment of mass, kg m
-    second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about origin, kg m²
+    mass_moment: Array = field(default_factory=lambda: np.zeros(3))  # mass times centre, kg m
+    origin_inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))  # about origin, kg m²
 
 
 class LinkTree(NamedTuple):
@@ -293,38 +293,39 @@ def _to_axis(axis: Array) -> Array:
 
 
 def _add_body_mass(link: Link, properties: Any, frame: Array) -> None:
-    """Add the mass of a body to its link.
+    """Add mass, first moment of mass and inertia of a body to those of its link.
 
     Args:
-        link: link; changed.
+        link: link; changed. Its moments are about its origin, so that those of bodies add up.
         properties: mass properties of the body.
         frame: frame of the body in the link (4, 4).
     """
     rotation = frame[:3, :3]
     center = rotation @ properties.center + frame[:3, 3]
     link.mass += properties.mass
-    link.first = link.first + properties.mass * center
-    link.second = (
-        link.second
+    link.mass_moment = link.mass_moment + properties.mass * center
+    # Parallel axis theorem: R I R' - m [c] [c], from the mass centre to the origin of the link.
+    link.origin_inertia = (
+        link.origin_inertia
         + rotation @ properties.inertia @ rotation.T
         - properties.mass * _square_of_skew(center)
     )
 
 
 def _square_of_skew(v: Array) -> Array:
-    """Return [v] [v], the negative inertia about the origin of a unit mass at v."""
+    """Return [v] [v], where [v] is the cross-product matrix: minus the inertia of a unit mass at v."""
     return skew_matrix(v) @ skew_matrix(v)
 
 
-def _move_inertia(link: Link) -> list[float]:
+def _list_inertia(link: Link) -> list[float]:
     """Return mass (kg), mass centre (m) and inertia (kg m²) of a link, in the order of `INERTIA`.
 
-    The link has the inertia about its origin; that of the record is about the mass centre, by the
+    The inertia of the link is about its origin. That of the record is about the mass centre, by the
     parallel axis theorem, as xx, yy, zz, xy, xz, yz.
     """
     # The mass centre of a link without mass does not matter.
-    center = link.first / link.mass if link.mass != 0.0 else link.first
-    i = link.second + link.mass * _square_of_skew(center)
+    center = link.mass_moment / link.mass if link.mass != 0.0 else link.mass_moment
+    i = link.origin_inertia + link.mass * _square_of_skew(center)
     return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
 
@@ -353,7 +354,7 @@ class LinkPacker:
         """
         ints, size = self.ints, len(self.order)
         for link in self.links:
-            self.numbers += _move_inertia(link)
+            self.numbers += _list_inertia(link)
         ints[MODEL.FIXED_AT] = len(self.numbers)
         for operation in self.operations:
             frame = operation.before

@@ -124,49 +124,60 @@ def check_muscle(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
         number.read(builder, force)
 
 
-def _describe_failure(known: Mapping[str, float]) -> str:
+def _describe_failure(values: Mapping[str, float]) -> str:
+    """Return the part of a message that says why a muscle has no equilibrium.
+
+    Args:
+        values: values of inputs, parameters and outputs of the law, by name.
+    """
     # Most failures come from a path whose length does not fit the fibers and the tendon.
-    off = known["length"] - known["tendon_slack_length"] - known["optimal_fiber_length"]
+    excess_length = (
+        values["length"] - values["tendon_slack_length"] - values["optimal_fiber_length"]
+    )
     # Not every search is for a fiber length.
-    fibers = (
-        f", with fibers of {known['fiber_length']:.4g} m" if known["fiber_length"] > 0.0 else ""
+    fibers_text = (
+        f", with fibers of {values['fiber_length']:.4g} m" if values["fiber_length"] > 0.0 else ""
     )
     return (
-        f", whose path of {known['length']:.4g} m is {abs(off):.3g} m {'longer' if off > 0.0 else 'shorter'} than its "
-        f"tendon_slack_length and optimal_fiber_length together{fibers}"
+        f", whose path of {values['length']:.4g} m is {abs(excess_length):.3g} m "
+        f"{'longer' if excess_length > 0.0 else 'shorter'} than its "
+        f"tendon_slack_length and optimal_fiber_length together{fibers_text}"
     )
 
 
 def define_muscle(
-    component: type,
+    component_class: type,
     law: Callable[..., Any],
-    rates: tuple[str, ...],
+    further_outputs: tuple[str, ...],
     *parameters: Parameter,
-    **more: Any,
+    **attributes: Any,
 ) -> ForceType:
-    """Return the force type of a muscle.
+    """Return the declaration of a muscle: a tension along a path that a control excites.
 
     Args:
-        component: class of the muscle.
-        law: function of :class:`MuscleInputs` and the parameters, which returns `RECORDED` and
-            `rates`.
-        rates: outputs after `RECORDED`: rates of states, including "fiber_velocity", and others.
+        component_class: class of the muscle.
+        law: function of :class:`MuscleInputs` and the parameters, which returns the outputs
+            `RECORDED` and `further_outputs`.
+        further_outputs: names of the outputs after `RECORDED`: rates of states, including
+            "fiber_velocity", and other quantities of the class.
         parameters: parameters of the law.
-        more: attributes of the force type.
+        attributes: further attributes of :class:`ForceType`, such as its states.
 
     Returns:
         The declaration, which still has to be registered.
     """
     return ForceType(
-        component,
+        component_class,
         PATH,
         law,
-        outputs=(*RECORDED, *rates),
+        outputs=(*RECORDED, *further_outputs),
         parameters=parameters,
+        # Recorded as well, since reports and messages of muscles show them.
         recorded_inputs=("length", "rate", "fiber_velocity"),
         has_control=True,
         inputs_type=MuscleInputs,
+        # OpenSim's force reporter has one column for a muscle: its name, with the tension.
         labels={"{name}": "tension"},
         describe_failure=_describe_failure,
-        **more,
+        **attributes,
     )

@@ -302,14 +302,14 @@ class Specialisation(Kernel):
             self.effects |= READS
             return kind.element
         if isinstance(kind, Tuple):
-            constant = self.constant_index(index)
-            if constant is None:
+            item_index = self.constant_index(index)
+            if item_index is None:
                 if not kind.is_array:
                     raise self.refuse(node, "its type depends on the index")
                 return kind.parts[0]
-            if not -len(kind.parts) <= constant < len(kind.parts):
+            if not -len(kind.parts) <= item_index < len(kind.parts):
                 raise self.refuse(node, "there is no such item")
-            return kind.parts[constant]
+            return kind.parts[item_index]
         if kind is not None:
             raise self.refuse(node, f"{kind!r} has no items")
         return None
@@ -408,7 +408,17 @@ class Specialisation(Kernel):
         return isinstance(node, ast.Call) and not node.keywords and self.value(node.func) is range
 
     def constant_index(self, node: ast.expr) -> int | None:
-        """Return the value of an integer constant, or None for any other expression."""
+        """Return the value of an expression that is an integer when the code is generated.
+
+        Such are literals, with or without a minus sign, and names and attributes whose value is an
+        integer, such as fields of layouts.
+
+        Args:
+            node: the expression.
+
+        Returns:
+            Its value; None if it is computed at run time, or is no integer.
+        """
         match node:
             case ast.Constant(value=int() as value):
                 return value
