@@ -90,9 +90,15 @@ def _break_line(line: str) -> str:
 MIN_TEXT_WIDTH = 30
 """Letters of the narrowest column of text beside others."""
 
+TEXT_INDENT = 4
+"""Letters by which text is indented below its row, where it does not fit beside."""
+
+MIN_WRAP_WIDTH = 10
+"""Letters of the narrowest text in a terminal that is too narrow for any."""
+
 
 def show_rows(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
+    headings: Sequence[str], rows: Sequence[Sequence[str]], right_aligned: Sequence[int] = ()
 ) -> None:
     """Print a table whose last column is text that is broken between words.
 
@@ -102,30 +108,31 @@ def show_rows(
     Args:
         headings: headings of the columns.
         rows: cells of each row, as many as headings.
-        right: indices of the columns that are aligned to the right.
+        right_aligned: indices of the columns that are aligned to the right.
     """
     from textwrap import wrap
 
     escaped = [[escape_unprintable(cell) for cell in row] for row in rows]
-    heads = [*headings]
-    last = len(heads) - 1
-    widths = [max(len(row[index]) for row in [heads, *escaped]) for index in range(last)]
+    all_rows = [[*headings], *escaped]
+    last = len(headings) - 1
+    widths = [max(len(row[index]) for row in all_rows) for index in range(last)]
     indent = sum(widths) + 2 * last
     fits_beside = count_columns() - indent >= MIN_TEXT_WIDTH
-    start = indent if fits_beside else 4
-    bold, end = ("\033[1m", "\033[0m") if wants_colour() else ("", "")
-    for number, row in enumerate([heads, *escaped]):
+    text_indent = indent if fits_beside else TEXT_INDENT
+    bold, reset = ("\033[1m", "\033[0m") if wants_colour() else ("", "")
+    for row_index, row in enumerate(all_rows):
         cells = [
-            f"{cell:>{width}}" if index in right else f"{cell:{width}}"
+            f"{cell:>{width}}" if index in right_aligned else f"{cell:{width}}"
             for index, (cell, width) in enumerate(zip(row[:last], widths, strict=True))
         ]
-        beginning = "  ".join(cells if fits_beside else filter(None, row[:last]))
-        text_width = max(count_columns() - start, 10)
+        # Above its text a row is not aligned with others, so that empty cells are left out.
+        first_line = "  ".join(cells if fits_beside else [cell for cell in row[:last] if cell])
+        text_width = max(count_columns() - text_indent, MIN_WRAP_WIDTH)
         lines = wrap(row[last], text_width, break_on_hyphens=False, break_long_words=False)
         if fits_beside:
-            beginning = f"{beginning}  {lines.pop(0) if lines else ''}"
-        text = "\n".join([beginning.rstrip(), *(f"{'':{start}}{line}" for line in lines)])
-        show((f"{bold}{text}{end}" if number == 0 else text) + "\n")
+            first_line = f"{first_line}  {lines.pop(0) if lines else ''}"
+        text = "\n".join([first_line.rstrip(), *(f"{'':{text_indent}}{line}" for line in lines)])
+        show((f"{bold}{text}{reset}" if row_index == 0 else text) + "\n")
 
 
 def complain(text: object, advice: str = "") -> None:

@@ -184,8 +184,10 @@ class Request:
         # given.
         for name in option_values:
             if name not in known_names:
+                option = f"--{name.replace('_', '-')}"
                 raise SettingError(
-                    f"--{name.replace('_', '-')} is not an option of a conversion from '{self.source}' to '{self.target}'"
+                    f"{option} is not an option of a conversion from '{self.source}' to '{self.target}'; "
+                    f"leave out {option}"
                 )
         if motion is not None and (exporter is None or not exporter.takes_motion):
             raise SettingError(f"the format '{self.target}' has no motion; leave out --motion")
@@ -253,9 +255,25 @@ class Request:
         option_values: Mapping[str, Any],
         guard: OutputGuard,
     ) -> Conversion:
-        """Write a model in the format of an exporter."""
+        """Write a model with an exporter, and return the record of what was translated.
+
+        There are two kinds of exporters. Those of model formats, such as URDF, translate the model
+        and make their own record. Those of the command `view`, such as glTF, write the scene that the
+        viewer shows; their record is made here.
+
+        Args:
+            model: model to write.
+            exporter: exporter of the target format.
+            motion: file of coordinates over time; None without a motion.
+            geometry: folders in which mesh files are searched.
+            option_values: options of the exporter that were set.
+            guard: guard of the output folder; it is asked before anything is written.
+
+        Raises:
+            SettingError: a file would be replaced that this conversion has not written before.
+            OsimliteError: the model cannot be translated, or the results cannot be written.
+        """
         folders = options.list_mesh_folders(self.file, geometry)
-        # Exporters of pages and pictures take what the viewer shows; the others take the model.
         if exporter.command != "view":
             motion_argument = {"motion": motion} if exporter.takes_motion else {}
             exported = exporter.write(
@@ -268,6 +286,28 @@ class Request:
             )
             guard.protect_files(exported)
             return Conversion(exported.write(self.folder), exported.fidelity)
+        return self._export_scene(model, exporter, motion, folders, option_values, guard)
+
+    def _export_scene(
+        self,
+        model: Model,
+        exporter: Exporter,
+        motion: Path | None,
+        mesh_folders: list[Path],
+        option_values: Mapping[str, Any],
+        guard: OutputGuard,
+    ) -> Conversion:
+        """Write the scene that the viewer shows of a model, with a record of its parts.
+
+        Args:
+            model: model to show; parts that cannot be shown are left out and recorded.
+            exporter: exporter of the command `view`.
+            motion: file of coordinates over time; None without a motion.
+            mesh_folders: folders in which mesh files are searched.
+            option_values: options of the exporter that were set.
+            guard: guard of the output folder.
+        """
+        # A scene is one file; there are no further ones beside it.
         guard.protect_files(None)
         from osimlite.schema.forces import Force
         from osimlite.schema.frames import Body
@@ -277,7 +317,7 @@ class Request:
 
         model, mechanism, left_out = build_showable(model)
         viewed = Shown.of(
-            model, mechanism, folders, file=self.file, motion=motion, left_out=left_out
+            model, mechanism, mesh_folders, file=self.file, motion=motion, left_out=left_out
         )
         fidelity = Fidelity(mechanism.name, exporter.name)
         # Bodies become nodes of the scene; forces are no part of it.

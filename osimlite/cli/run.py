@@ -333,7 +333,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
         status = trial.status + (", before" if trial.was_done else "")
         rows.append((trial.setup, status, seconds, result_text))
-    show_rows(("setup", "", "s", ""), rows, right=(2,))
+    show_rows(("setup", "", "s", ""), rows, right_aligned=(2,))
     counts = Counter(trial.status for trial in trials)
     status_text = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):

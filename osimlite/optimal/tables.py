@@ -39,23 +39,27 @@ TIME_TOLERANCE_S = 1e-6
 
 
 def read_reference(problem: Problem, goal: Object, processor: TableProcessor) -> StoTable:
-    """Read the reference table of a goal, with angles in rad.
+    """Return the reference table of a goal, with angles in rad.
+
+    The table is read from a file, unless the caller of the solver has passed a table for the goal
+    in `problem.tables`, by the goal's name.
 
     Args:
         problem: problem of the study.
-        goal: goal with the processor, for messages; a table of `problem.tables` replaces the file.
-        processor: processor that names the file.
+        goal: goal that has the reference; messages name it too.
+        processor: processor of the goal, which names the file and its operators.
 
     Returns:
-        Table after the operators of the processor.
+        Table of the file after the operators of the processor; or the passed table, to which the
+        operators are not applied.
 
     Raises:
         UnsupportedError: an operator of the processor is not supported here.
         OsimliteError: the file cannot be read.
     """
-    known_table = problem.tables.get(goal.name)
-    if known_table is not None:
-        return known_table
+    passed_table = problem.tables.get(goal.name)
+    if passed_table is not None:
+        return passed_table
     return process_table(
         problem, goal, processor, problem.functions.states, problem.functions.mechanism
     )

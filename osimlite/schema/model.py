@@ -185,7 +185,10 @@ class Model(ModelComponent):
                     break
             else:
                 if not isinstance(component, ModelComponent):
-                    raise ModelError(f"a model has no place for a {type(component).__name__}")
+                    raise ModelError(
+                        f"no set of a model accepts a {type(component).__name__}; add it to its owner, such as "
+                        "a frame or a force"
+                    )
                 _append_member(self.component_set.objects, component)
             if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
                 # OpenSim's API gives new joints such coordinate names, too. Reading a file that leaves the

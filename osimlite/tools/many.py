@@ -90,7 +90,11 @@ def find_setups(names_or_patterns: Iterable[str | Path]) -> list[Path]:
             ]
             if not setups:
                 raise OsimliteError(
-                    f"no {'setup' if matches else 'file'} matches '{name_or_pattern}'"
+                    f"no setup matches '{name_or_pattern}': it matches models and sets only; name setup "
+                    "files"
+                    if matches
+                    else f"no file matches '{name_or_pattern}'; correct the pattern, or change to the folder "
+                    "of the setups"
                 )
             files.update(dict.fromkeys(setups))
         elif os.path.isdir(name_or_pattern):

@@ -216,11 +216,18 @@ def group_columns(
 
 
 def _describe_constant(column: Column, values: Array) -> str:
+    """Return name and value of a column that does not change, for the note below the panels.
+
+    Args:
+        column: the column.
+        values: its values (n,), of which those that are not finite are unknown.
+    """
     finite_values = values[np.isfinite(values)]
     if not finite_values.size:
         return f"{column.name} (no values)"
     unit = f" {column.unit}" if column.unit else ""
-    # Adding 0.0 turns -0.0 into 0.0.
+    # Rounding to 9 places turns rounding errors, such as 1e-17, into 0; adding 0.0 turns -0.0 into
+    # 0.0.
     return f"{column.name} {0.0 + round(float(finite_values[0]), 9):.4g}{unit}"
 
 

@@ -166,7 +166,7 @@ def test_tables_and_sentences_are_never_broken_inside_a_word(monkeypatch, capsys
     monkeypatch.setenv("COLUMNS", "60")
     path = "results/subject01/a_very_long_name_of_a_setup_of_inverse_dynamics.xml"
     rows = [(path, "done", "0.10", "largest moment 12 N·m at 0.3 s"), ("b.xml", "failed", "", path)]
-    show_rows(("setup", "", "s", ""), rows, right=(2,))
+    show_rows(("setup", "", "s", ""), rows, right_aligned=(2,))
     out = capsys.readouterr().out
     assert out.count(path) == 2
     assert all(len(line) <= 60 or path in line for line in out.splitlines())

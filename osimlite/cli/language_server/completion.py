@@ -27,13 +27,14 @@ _TOP_TAGS = (
 
 
 def list_completions(
-    analysis: DocumentAnalysis, readable: DocumentAnalysis | None, offset: int
+    analysis: DocumentAnalysis, last_readable: DocumentAnalysis | None, offset: int
 ) -> list[types.CompletionItem]:
     """Return the completions at an offset.
 
     Args:
         analysis: the text as it is, usually half-typed.
-        readable: last version of the text that could be read; it provides the names.
+        last_readable: last version of the text that could be read, which provides the names; None if
+            there was none.
         offset: character offset of the cursor.
     """
     cursor = analysis.cursor(offset)
@@ -53,7 +54,7 @@ def list_completions(
     if cursor.kind == "attribute" and cursor.attribute == "name" and cursor.element is not None:
         reference = find_name_reference(cursor)
         if reference is not None:
-            return [*_complete_names(analysis, readable, cursor, reference, cursor.element)]
+            return [*_complete_names(analysis, last_readable, cursor, reference, cursor.element)]
     if cursor.kind != "text" or enclosing is None:
         return []
     if enclosing.cls is not None or (
@@ -73,7 +74,7 @@ def list_completions(
         return [
             *_complete_names(
                 analysis,
-                readable,
+                last_readable,
                 cursor,
                 field_type,
                 cursor.around[-2] if len(cursor.around) > 1 else None,
@@ -84,13 +85,24 @@ def list_completions(
 
 def _complete_names(
     analysis: DocumentAnalysis,
-    readable: DocumentAnalysis | None,
+    last_readable: DocumentAnalysis | None,
     cursor: Cursor,
     reference: Reference,
-    owner: Element | None,
+    object_element: Element | None,
 ) -> Iterator[types.CompletionItem]:
-    """Yield completions for the text of a reference."""
-    for name in list_names(readable, cursor, reference, owner) if readable is not None else ():
+    """Yield the names of the components, files or columns to which a reference may refer.
+
+    Args:
+        analysis: the text as it is, in which the completion is inserted.
+        last_readable: last version of the text that could be read, which provides the names.
+        cursor: the cursor in the text.
+        reference: type of the reference, which says what it may refer to.
+        object_element: element of the object that has the reference; None if it is not known.
+    """
+    # Half-typed text often cannot be read; without an earlier version no name is known.
+    if last_readable is None:
+        return
+    for name in list_names(last_readable, cursor, reference, object_element):
         item = _make_item(
             analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail
         )
@@ -102,12 +114,19 @@ def _complete_names(
 def _complete_tags(
     analysis: DocumentAnalysis, cursor: Cursor, enclosing: Element | None, bracket: str
 ) -> Iterator[types.CompletionItem]:
-    """Yield completions for the elements that may be inside the enclosing one."""
-    # The tag of an object, or of a list of objects; values have no tags inside.
+    """Yield the tags that may be inside an element: properties of an object, objects of a property.
+
+    Args:
+        analysis: the text as it is.
+        cursor: the cursor in the text.
+        enclosing: element around the cursor; None outside all, where nothing is offered.
+        bracket: "<" if the completion has to insert it, "" if it is typed already.
+    """
     if enclosing is None:
         return
     if enclosing.cls is None:
         if enclosing.tag == "OpenSimDocument":
+            # The object of the document: a model, or in setups one of the tools and sets.
             for tag in _TOP_TAGS if is_document(analysis.file) else ("Model",):
                 yield _complete_object(analysis, cursor, tag, bracket, "")
         elif (
@@ -115,12 +134,14 @@ def _complete_tags(
             and is_list_property(enclosing.spec)
             and enclosing.spec.accepts is not None
         ):
+            # A property with a list of objects: all classes that derive from the accepted one.
             for tag in list_class_tags(enclosing.spec.accepts):
                 yield _complete_object(analysis, cursor, tag, bracket, "")
         return
     # Properties that the object has already would be ignored by OpenSim.
     written_tags = _list_written_tags(analysis, enclosing)
     for spec in get_field_specs(enclosing.cls).values():
+        # The object of a property without a tag of its own stands directly in the enclosing one.
         if spec in list_single_object_properties(enclosing.cls):
             assert spec.accepts is not None
             for tag in list_class_tags(spec.accepts):
@@ -144,6 +165,7 @@ def _list_written_tags(analysis: DocumentAnalysis, enclosing: Element) -> set[st
 def _complete_property(
     analysis: DocumentAnalysis, cursor: Cursor, spec: FieldSpec, bracket: str
 ) -> types.CompletionItem:
+    """Return the completion for the element of a property, with its default as a placeholder."""
     if isinstance(spec.kind, ObjectField):
         # An unnamed property takes objects of several classes, which a name tells apart.
         content = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
@@ -171,6 +193,7 @@ def _complete_property(
 def _complete_object(
     analysis: DocumentAnalysis, cursor: Cursor, tag: str, bracket: str, name: str
 ) -> types.CompletionItem:
+    """Return the completion for the element of an object; an empty name becomes a placeholder."""
     name_attribute = f'name="{name}"' if name else 'name="$1"'
     text = f"{bracket}{tag} {name_attribute}>\n\t$0\n</{tag}>"
     item = _make_item(analysis, cursor, tag, text, types.CompletionItemKind.Class, name)
@@ -188,6 +211,7 @@ def _make_item(
     kind: types.CompletionItemKind,
     detail: str = "",
 ) -> types.CompletionItem:
+    """Return a completion that replaces the word at the cursor by a text."""
     edit_range = analysis.text.range(cursor.start, cursor.end)
     # Editors match the typed text against `filter_text`, which therefore has the opening bracket if
     # the inserted text has one.
@@ -201,4 +225,5 @@ def _make_item(
 
 
 def _escape_snippet(text: str) -> str:
+    """Escape the characters that have a meaning in a snippet."""
     return text.replace("\\", "\\\\").replace("$", "\\$").replace("}", "\\}")

@@ -175,7 +175,10 @@ class _Declarations:
                 row["name"] == name for row in self.list_properties(owner)
             ):
                 raise self.make_error(
-                    f"no class of this file has a property '{owner}.{name}'", "references", name
+                    f"no class of this file has a property '{owner}.{name}'; add it to the properties of "
+                    f"'{owner}', or delete the reference",
+                    "references",
+                    name,
                 )
 
     def find_class(self, name: str, *words: str) -> type[Object]:

@@ -124,7 +124,8 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
         measures = "measurements" in scaler.scaling_order
         if scaler.scaling_order[:1] == ("manualScale",) and measures:
             report(
-                "measurements come last and overwrite the manual scale factors",
+                "OpenSim applies the measurements last, so that they overwrite the manual scale factors; "
+                "write 'measurements manualScale' if the manual factors should count",
                 scaler,
                 tag="scaling_order",
                 fault="manual-scale-overwritten",

@@ -139,7 +139,8 @@ def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
             outside_count = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
             if coordinate.locked:
                 report(
-                    f"{describe_object(coordinate)} is locked: the task has no effect",
+                    f"{describe_object(coordinate)} is locked: the task has no effect; unlock the "
+                    "coordinate, or delete the task",
                     task,
                     attribute="name",
                 )

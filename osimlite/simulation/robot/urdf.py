@@ -95,10 +95,9 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
                         "collision", {"name": unique(collision.source.rsplit("/", 1)[-1])}
                     ):
                         _write_shape(out, collision)
-        following = find_mimics(robot)
+        mimics = find_mimics(robot)
         for joint in robot.joints:
-            # Joints of coordinates that others follow.
-            _write_joint(out, joint, following.get(joint.name))
+            _write_joint(out, joint, mimics.get(joint.name))
     return out.text()
 
 
@@ -136,6 +135,7 @@ def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
 
 
 def _write_inertial(out: _XmlWriter, link: RobotLink) -> None:
+    """Write mass and inertia of a link, about the principal axes at its mass centre."""
     moments, axes = principal_axes(link.inertia)
     ixx, iyy, izz = (number(moment) for moment in moments)
     with out.element("inertial"):
@@ -147,6 +147,7 @@ def _write_inertial(out: _XmlWriter, link: RobotLink) -> None:
 
 
 def _write_shape(out: _XmlWriter, shape: Visual) -> None:
+    """Write pose and geometry of a shape of a link."""
     _write_origin(out, shape.origin)
     with out.element("geometry"):
         match shape.shape:
@@ -161,6 +162,14 @@ def _write_shape(out: _XmlWriter, shape: Visual) -> None:
 
 
 def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> None:
+    """Write the `<joint>` element of a joint.
+
+    Args:
+        out: receives the element.
+        joint: the joint; a limit, effort or velocity that it lacks is written as `UNLIMITED` where
+            URDF or most of its readers require one.
+        mimic: leader of the joint and the linear function; None if it follows no other joint.
+    """
     # URDF requires limits of a revolute joint, and has no prismatic joint without them.
     kind = "continuous" if joint.kind == "revolute" and joint.limits is None else joint.kind
     with out.element("joint", {"name": joint.name, "type": kind}):
@@ -170,16 +179,17 @@ def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> Non
         if joint.kind == "fixed":
             return
         out.empty("axis", {"xyz": numbers(joint.axis)})
-        # Most readers require effort and velocity.
-        strength = {
+        # Most readers require the limits of effort (N or N.m) and velocity (m/s or rad/s).
+        effort_and_velocity = {
             "effort": number(UNLIMITED if joint.effort is None else joint.effort),
             "velocity": number(UNLIMITED if joint.velocity is None else joint.velocity),
         }
         if kind == "continuous":
-            out.empty("limit", strength)
+            out.empty("limit", effort_and_velocity)
         else:
             lower, upper = (-UNLIMITED, UNLIMITED) if joint.limits is None else joint.limits
-            out.empty("limit", {"lower": number(lower), "upper": number(upper), **strength})
+            position_limits = {"lower": number(lower), "upper": number(upper)}
+            out.empty("limit", {**position_limits, **effort_and_velocity})
         if mimic is not None:
             offset = {"offset": number(mimic.line.offset)} if mimic.line.offset else {}
             out.empty(
@@ -188,6 +198,7 @@ def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> Non
 
 
 def _write_origin(out: _XmlWriter, matrix: Array) -> None:
+    """Write a pose, given as a homogeneous matrix (4, 4), as position and angles."""
     out.empty(
         "origin", {"xyz": numbers(matrix[:3, 3]), "rpy": numbers(roll_pitch_yaw(matrix[:3, :3]))}
     )

@@ -223,7 +223,9 @@ class PartialTable:
                 raise
         except OSError as error:
             raise OsimliteError(
-                f"cannot write here: {error.strerror}", file=str(self.partial)
+                f"cannot write here: {error.strerror}; name another output file, or correct the "
+                "permissions of the folder",
+                file=str(self.partial),
             ) from None
 
     def add(self, columns: Sequence[Any]) -> None:
@@ -372,7 +374,10 @@ def _lock_file(path: Path) -> Any:
     filelock = require("filelock", extra="sweep", purpose="a table of results")
     if not path.parent.is_dir():
         # filelock would create the folder.
-        raise OsimliteError("cannot write here: the folder does not exist", file=str(path))
+        raise OsimliteError(
+            "cannot write here: the folder does not exist; make it, or name another output file",
+            file=str(path),
+        )
     lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), thread_local=False)
     try:
         lock.acquire(blocking=False)

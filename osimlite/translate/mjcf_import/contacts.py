@@ -49,9 +49,17 @@ TRANSITION_M_S = 0.1
 
 
 def add_contacts(draft: ConversionDraft) -> None:
-    """Add the surfaces that can touch, and forces between planes and what moves above them."""
+    """Add the contact surfaces of a model, and Hunt-Crossley forces between planes and round geoms.
+
+    The option `contact` selects what is added: "none" adds nothing, "geometry" the surfaces of all
+    geoms that can collide, "forces" the surfaces and the forces. What is left out or approximated
+    is recorded.
+
+    Args:
+        draft: the conversion; the elements are added to its model.
+    """
     if draft.options.contact == "none":
-        _record_all(draft)
+        _record_left_out(draft)
         return
     surfaces: dict[int, list[ContactGeometry]] = {}
     # Sorted, so that equal files give equal models.
@@ -65,15 +73,16 @@ def add_contacts(draft: ConversionDraft) -> None:
         _add_forces(draft, surfaces)
 
 
-def _record_all(draft: ConversionDraft) -> None:
+def _record_left_out(draft: ConversionDraft) -> None:
+    """Record that the contact of every geom that can collide is left out."""
     for geom in sorted(_find_colliding_geoms(draft)):
         draft.record("geom", geom, "contact", "left out, as requested")
 
 
 def _find_colliding_geoms(draft: ConversionDraft) -> set[int]:
-    """Return the geoms that can touch another."""
+    """Return the indices of the geoms that can touch another one."""
     model = draft.mj
-    result = {int(geom) for pair in range(model.npair) for geom in _pair(model, pair)}
+    result = {int(geom) for pair in range(model.npair) for geom in _get_pair(model, pair)}
     types, affinities = model.geom_contype, model.geom_conaffinity
     for geom in range(model.ngeom):
         # MuJoCo's test: the type of one and the affinity of the other, in either order.
@@ -83,11 +92,13 @@ def _find_colliding_geoms(draft: ConversionDraft) -> set[int]:
     return result
 
 
-def _pair(model: object, pair: int) -> tuple[int, int]:
+def _get_pair(model: object, pair: int) -> tuple[int, int]:
+    """Return the indices of the two geoms of an explicit contact pair of the file."""
     return int(model.pair_geom1[pair]), int(model.pair_geom2[pair])  # type: ignore[attr-defined]
 
 
 def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
+    """Return the contact surfaces in place of a geom; none, with a record, if OpenSim has none for it."""
     model = draft.mj
     name = draft.source.name_of("geom", geom)
     frame = draft.frames[int(model.geom_bodyid[geom])]
@@ -96,7 +107,8 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
     size = [float(value) for value in model.geom_size[geom]]
     geom_type = int(model.geom_type[geom])
 
-    def sphere(center: Array, radius: float) -> ContactSphere:
+    def make_sphere(center: Array, radius: float) -> ContactSphere:
+        """Return a sphere around a point in the frame of the geom (m)."""
         return ContactSphere(
             name=draft.unique("contact", name),
             socket_frame=frame,
@@ -114,10 +126,10 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
             )
         ]
     if geom_type == SPHERE:
-        return [sphere(np.zeros(3), size[0])]
+        return [make_sphere(np.zeros(3), size[0])]
     if geom_type == CAPSULE:
         draft.record("geom", geom, "contact of a capsule", "contact of the spheres at its ends")
-        return [sphere(np.array((0.0, 0.0, end)), size[0]) for end in (-size[1], size[1])]
+        return [make_sphere(np.array((0.0, 0.0, end)), size[0]) for end in (-size[1], size[1])]
     if geom_type == BOX:
         # Spheres in the corners touch a plane as the box does, up to rounded corners.
         radius = CORNER_RADIUS * min(size)
@@ -130,7 +142,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
         )
         # The spheres lie inside of the box.
         return [
-            sphere(np.array(signs) * (np.array(size) - radius), radius)
+            make_sphere(np.array(signs) * (np.array(size) - radius), radius)
             for signs in product((-1.0, 1.0), repeat=3)
         ]
     if geom_type == ELLIPSOID:
@@ -166,10 +178,15 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
 
 
 def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry]]) -> None:
-    """Add a force for each plane and what can touch it; record what else can touch."""
+    """Add a force between each plane and each round geom that can touch it; record other pairs.
+
+    Args:
+        draft: the conversion.
+        surfaces: contact surfaces of each geom, by its index.
+    """
     model = draft.mj
     unsupported_counts: dict[int, int] = {}
-    pairs = {tuple(sorted(_pair(model, pair))): pair for pair in range(model.npair)}
+    pairs = {tuple(sorted(_get_pair(model, pair))): pair for pair in range(model.npair)}
     touching_pairs = [
         (first, second)
         for position, first in enumerate(surfaces)
