@@ -43,7 +43,7 @@ def write_results(
         from osimlite.io.tables.writers import write_trc
 
         markers = tables["markers.sto"]
-        # Each marker has three columns, the first of which ends with _X.
+        # Each marker has three columns, and the first one ends with _X.
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]
         write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
         names.append("markers.trc")

@@ -252,7 +252,7 @@ def _find_swapped_markers(
     errors = motion.marker_errors
     known_errors = np.where(np.isfinite(errors), errors, 0.0)
     worst_frame = int(np.argmax(known_errors.max(axis=1)))
-    # A swap moves two markers far: without a large error there is none.
+    # A swap moves two markers far: without a large error there was no swap.
     if known_errors[worst_frame].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
         return
     stations = find_marker_stations(tool.model, motion.mechanism)

@@ -124,8 +124,8 @@ def _read_linear_law(
 ) -> tuple[float, tuple[float, float, float], float] | None:
     """Return gain, bias and time constant (s) of a force that is a linear function of the control.
 
-    The bias has a constant and factors of length and speed. For any other actuator the
-    result is None, and the draft has a record of it.
+    The bias has a constant and factors of length and speed. For any other actuator it
+    returns None, and the draft has a record of it.
 
     Args:
         draft: draft of the model.
