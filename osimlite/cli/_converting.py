@@ -307,7 +307,7 @@ class Request:
             option_values: options of the exporter that were set.
             guard: guard of the output folder.
         """
-        # A scene is one file; there are no further ones beside it.
+        # A scene is one file: no other file of the folder may be replaced.
         guard.protect_files(None)
         from osimlite.schema.forces import Force
         from osimlite.schema.frames import Body

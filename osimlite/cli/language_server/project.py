@@ -63,10 +63,8 @@ class Project:
             Whether the text differs from what readers saw before.
         """
         path = os.path.realpath(analysis.file)
-        # The byte order mark overrides the encoding that the XML declaration names. The editor has
-        # decoded the text already.
-        # Readers of files get the text in the encoding of a byte-order mark, whatever the
-        # declaration says.
+        # The editor has decoded the text already. A byte order mark makes readers take UTF-8
+        # whatever encoding the XML declaration names.
         content = codecs.BOM_UTF8 + analysis.source.data
         previous = unsaved.get(path)
         if previous is None:

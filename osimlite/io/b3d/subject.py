@@ -402,7 +402,7 @@ class B3dSubject:
 
     @property
     def contact_bodies(self) -> tuple[str, ...]:
-        """Names of the bodies on which the ground acts."""
+        """Names (b,) of the bodies on which the ground acts."""
         return self.header["contact_bodies"]
 
     @property
@@ -444,7 +444,7 @@ class B3dSubject:
         return self._read_shared_model(processing_pass).copy_deep()
 
     def _read_shared_model(self, processing_pass: int) -> Model:
-        """Return the model of a processing pass, which nobody may change."""
+        """Return the model of a processing pass; callers share it and must not change it."""
         count = len(self.model_texts)
         # Negative indices count from the last pass, as for lists.
         index = processing_pass + count if processing_pass < 0 else processing_pass

@@ -156,10 +156,11 @@ def linearise_state(
 ) -> int:
     """Linearise the equations of motion at a state: mass matrix M, stiffness K and damping D.
 
-    M d(udot) = -K dq - D du for forces that depend on positions and speeds. Each contact or spring
-    contributes one row: its generalized force r per newton, and the derivatives k and d of the
-    force by its displacement and speed, so that K and D grow by the rank-one matrices k r rᵀ and
-    d r rᵀ.
+    M d(udot) = K dq + D du, where K and D are the derivatives of the generalized forces by
+    coordinates and speeds (a stiff spring has a negative K). Each contact or spring contributes one
+    row: its generalized force r per newton, and the derivatives k and d of the force by its
+    displacement and speed, so that K and D grow by the rank-one matrices s k r rᵀ and s d r rᵀ,
+    where s is `RESPONSE.SENSE` (-1 for a force that pulls against the displacement).
 
     Args:
         model: integers of the model.
