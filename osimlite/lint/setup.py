@@ -106,6 +106,9 @@ class Setup(Subject):
             if all(name in cls.model_fields for name in properties):
                 yield from items
 
+    def _find_parent(self, component: Object) -> None:
+        """Return None: a part that the class of a setup adds has no element, and no component above it."""
+
     def owner(self, item: Object) -> Any:
         """Return the object itself: a setup has no tree of components."""
         return item

@@ -422,5 +422,9 @@ class Subject(CheckTarget):
             # First from a part, such as a function, to its component, then from component to
             # component: only components have a parent in the tree.
             component = self.owner(item)
-            item = component if component is not item else self.tree.parent_of(component)
+            item = component if component is not item else self._find_parent(component)
         return None
+
+    def _find_parent(self, component: Component) -> Component | None:
+        """Return the component above a component; None for the model."""
+        return self.tree.parent_of(component)
