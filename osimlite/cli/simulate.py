@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -272,10 +273,10 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
             for event in summary["contact_events"]
             if event["contact"] == name
         ]
+        # A contact that touches at the start has an end without a beginning.
+        intervals = re.sub(r" (?=from)", ", ", " ".join(times[:6]))
         # The unit is printed once, after the last time.
-        contact_text = (
-            " ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
-        )
+        contact_text = f"{intervals} s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
         size, moment = peak["force_N"], peak["time_s"]
         facts.add(
             name,

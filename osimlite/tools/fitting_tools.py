@@ -110,7 +110,7 @@ def run_scale_tool(job: Job, outcome: Outcome) -> None:
     if result.measured is not None:
         outcome.summary["ratios"] = dict(result.measured.ratios)
         for name, ratio in result.measured.ratios.items():
-            outcome.add_message(name, f"{ratio:.6g}")
+            outcome.add_message(name, f"scaled by {ratio:.6g}")
         for note in result.measured.notes:
             outcome.add_message("left out", note)
     if result.placed is not None:

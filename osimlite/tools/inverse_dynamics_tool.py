@@ -79,7 +79,9 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
         loads=loads,
     )
     row, column = np.unravel_index(int(np.abs(table.rows).argmax()), table.rows.shape)
-    largest = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
+    label = table.columns[column]
+    unit = "N" if label.endswith("_force") else "N m"
+    largest = f"{label}, {table.rows[row, column]:.6g} {unit} at {table.times[row]:g} s"
     outcome.add_message("largest", largest)
     _report_residuals(outcome, recorded.mechanism, table)
 
