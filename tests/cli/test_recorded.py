@@ -52,7 +52,7 @@ def test_files_that_are_no_motion_are_named_for_what_they_are(
             (walker, "m.trc"),
             "m.trc: these are markers over time (.trc); a storage file is needed here (.sto, .mot)",
         ),
-        ((walker, "m.csv"), "m.csv: this is no storage file (.sto, .mot)"),
+        ((walker, "m.csv"), "m.csv: this is not a storage file (.sto, .mot)"),
         ((walker, walker), "this is XML, and no storage file"),
     ):
         for command in ("kinematics", "inverse-dynamics"):

@@ -155,12 +155,12 @@ def test_a_path_without_its_slash_is_told():
         ("0:1:0", "above zero"),
         ("0:1:x", "above zero"),
         ("0:1:2:3", "takes LOW:HIGH"),
-        ("a:1", "no number"),
-        ("0:inf", "no number"),
+        ("a:1", "not a number"),
+        ("0:inf", "not a number"),
         ("0:1:log", "above zero"),
         ("1:1:5", "give it one"),
         ("0:1:1", "one value only"),
-        ((0.0, math.nan), "no number"),
+        ((0.0, math.nan), "not a number"),
     ],
 )
 def test_ranges_that_are_none(given, words):
