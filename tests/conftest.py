@@ -31,6 +31,9 @@ ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
 than OpenSim converts.
 """
 
+LIBRARY_PATHS = {name: os.environ.get(name) for name in ("PATH", "LD_LIBRARY_PATH", "SIMBODY_HOME")}
+"""Variables that an import of OpenSim changes, as they are before it."""
+
 # A busy machine must not fail a property, and CI must fail the same way twice.
 settings.register_profile(
     "osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True
@@ -111,6 +114,19 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         ]
         absent = pytest.param(None, id="absent", marks=pytest.mark.skip(reason=NO_SHARED))
         metafunc.parametrize("corpus_model", models or [absent])
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup() -> None:
+    """Take OpenSim's folder out of the paths of programs and libraries, into which its import puts it.
+
+    Processes that tests start would load OpenSim's CasADi in place of ours.
+    """
+    for name, value in LIBRARY_PATHS.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
