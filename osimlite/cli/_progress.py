@@ -220,7 +220,7 @@ class _Line:
         self.erase()
 
     def erase(self) -> None:
-        """Remove the line."""
+        """Overwrite the line with blanks, and what the terminal wrote behind it."""
         with self._lock:
             if self._shown:
                 # Terminals write ^C for Ctrl-C behind the line.

@@ -224,13 +224,14 @@ def _fix_file(path: str, config: Config, unsafe: bool) -> tuple[int, int]:
     """Fix a file in place; return the number of fixes and of remaining unsafe fixes."""
     from osimlite.base.files import open_atomically
 
-    def put(pieces: list[bytes | memoryview]) -> Source:
+    def replace_file(pieces: list[bytes | memoryview]) -> Source:
+        """Replace the file by a fixed text in pieces, and read it again."""
         with open_atomically(path) as stream:
             stream.writelines(pieces)
         pieces.clear()
         return _read_source(path)
 
-    _, count, unsafe_count = _apply_fixes(_read_source(path), config, unsafe, put)
+    _, count, unsafe_count = _apply_fixes(_read_source(path), config, unsafe, replace_file)
     return count, unsafe_count
 
 

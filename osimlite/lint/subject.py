@@ -373,7 +373,7 @@ class Subject(CheckTarget):
                 for item in items:
                     name = getattr(item, spec.name)
                     if name:
-                        paths = [os.path.join(folder_name, name) for folder_name in folders]
+                        paths = [os.path.join(folder, name) for folder in folders]
                         result |= dict.fromkeys(paths)
                         if not any(map(os.path.isfile, paths)):
                             # Another file in the same folder may be what was meant.

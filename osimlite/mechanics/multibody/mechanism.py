@@ -55,6 +55,7 @@ __all__ = [
 class Mechanism(MechanismStructure):
     """Tree of bodies under gravity.
 
+    Attributes are those of :class:`osimlite.mechanics.multibody.structure.MechanismStructure`.
     Wherever a method takes q or u, it accepts an array (n,) in the order of `coordinates` or a
     mapping by coordinate name; omitted names have their default. A body or frame is named by its
     absolute path, a body also by its name. Every method raises ModelError for an unknown name and
