@@ -31,7 +31,10 @@ ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
 than OpenSim converts.
 """
 
-LIBRARY_PATHS = {name: os.environ.get(name) for name in ("PATH", "LD_LIBRARY_PATH", "SIMBODY_HOME")}
+LIBRARY_PATHS = {
+    name: os.environ.get(name)
+    for name in ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "SIMBODY_HOME")
+}
 """Variables that an import of OpenSim changes, as they are before it."""
 
 # A busy machine must not fail a property, and CI must fail the same way twice.
@@ -120,7 +123,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def pytest_runtest_setup() -> None:
     """Take OpenSim's folder out of the paths of programs and libraries, into which its import puts it.
 
-    Processes that tests start would load OpenSim's CasADi in place of ours.
+    Processes that tests start would load OpenSim's CasADi in place of ours. tests/oracle/conftest.py
+    does the same while tests are collected, before workers are started with these variables.
     """
     for name, value in LIBRARY_PATHS.items():
         if value is None:
