@@ -10,7 +10,7 @@ this one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the m
 NaN accelerations, and the linter has no new error; it is *false* if OpenSim loads and initialises
 the model and an error says that it does not. The models are those of `shared/corpus`.
 
-OpenSim runs each model in a child process. A model that it does not finish within the limit of
+OpenSim and the linters look at a model at the same time, in child processes. A model that it does not finish within the limit of
 seconds counts for neither side.
 """
 
@@ -38,6 +38,25 @@ LARGEST_BYTES = 400_000
 LINTER = """
 import json, sys
 from osimlite.lint import validate
+from osimlite.simulation.elements.geometries.paths import scholz2015_geometry_path as paths
+
+# The search for a cable takes seconds, and most edits do not change its input.
+search, results = paths.cable_path, {}
+
+def search_once(ints, numbers, work, *others):
+    key = ints.tobytes(), numbers.tobytes()
+    if key not in results:
+        error = None
+        try:
+            search(ints, numbers, work, *others)
+        except ArithmeticError as failure:
+            error = failure
+        results[key] = ints.copy(), work.copy(), error
+    ints[:], work[:], error = results[key]
+    if error is not None:
+        raise error
+
+paths.cable_path = search_once
 for line in sys.stdin:
     try:
         report = validate(line.rstrip("\\n"), ignore="OSIM63")
@@ -59,11 +78,20 @@ class Linter:
             command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=folder
         )
 
-    def errors(self, path: Path) -> list[tuple[str, str]]:
-        """Return code and message of each error of a file."""
-        assert self._process.stdin is not None and self._process.stdout is not None
+    def send(self, path: Path) -> None:
+        """Let the linter begin with a file."""
+        assert self._process.stdin is not None
         self._process.stdin.write(f"{path}\n")
         self._process.stdin.flush()
+
+    def errors(self, path: Path) -> list[tuple[str, str]]:
+        """Return code and message of each error of a file."""
+        self.send(path)
+        return self.receive()
+
+    def receive(self) -> list[tuple[str, str]]:
+        """Return code and message of each error of the file that was sent."""
+        assert self._process.stdout is not None
         return [(code, message) for code, message in json.loads(self._process.stdout.readline())]
 
     def close(self) -> None:
@@ -73,40 +101,103 @@ class Linter:
         self._process.wait()
 
 
-def ask_opensim(path: Path) -> str:
-    """Return what OpenSim does with a file: "runs", "refuses", "NaN", or "hangs"."""
+def answer_requests(reader: int, writer: int) -> None:
+    """Load the files whose paths come through a pipe with OpenSim, and write its verdicts into another.
+
+    A line of the answer is "initialised" after that step, then "runs", "refuses", or "NaN".
+
+    Args:
+        reader: descriptor of the pipe of paths, one a line.
+        writer: descriptor of the pipe of answers.
+    """
     import opensim
 
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        signal.alarm(SECONDS)
-        for stream in (1, 2):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-        verdict = "refuses"
-        try:
-            model = opensim.Model(str(path))
-            state = model.initSystem()
-            os.write(writer, b"initialised ")
-            model.realizeAcceleration(state)
-            finite = all(map(math.isfinite, state.getUDot().to_numpy()))
-            verdict = "runs" if finite else "NaN"
-        except RuntimeError:
-            verdict = "refuses"
-        os.write(writer, verdict.encode())
-        os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        words = pipe.read().decode().split()
-    _, status = os.waitpid(child, 0)
-    if status & 127 == signal.SIGALRM:
-        return "hangs"
-    if not words or words == ["initialised"]:
-        return "refuses"
-    if words == ["initialised", "refuses"]:
-        # It initialises, and fails when it is asked for accelerations.
-        return "fails"
-    return words[-1]
+    for stream in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    with os.fdopen(reader) as requests:
+        for path in requests:
+            signal.alarm(SECONDS)
+            try:
+                model = opensim.Model(path.rstrip("\n"))
+                state = model.initSystem()
+                os.write(writer, b"initialised\n")
+                model.realizeAcceleration(state)
+                finite = all(map(math.isfinite, state.getUDot().to_numpy()))
+                verdict = "runs" if finite else "NaN"
+            except RuntimeError:
+                verdict = "refuses"
+            signal.alarm(0)
+            os.write(writer, f"{verdict}\n".encode())
+
+
+class Judge:
+    """OpenSim in a child process, which is started again after a crash and after `MODELS` models."""
+
+    MODELS = 200
+
+    def __init__(self) -> None:
+        self._child = self._asked = 0
+
+    def send(self, path: Path) -> None:
+        """Let OpenSim begin with a file."""
+        if self._asked == self.MODELS:
+            self.close()
+        if not self._child:
+            self._start()
+        self._asked += 1
+        self._requests.write(f"{path}\n")
+        self._requests.flush()
+
+    def receive(self) -> str:
+        """Return what OpenSim does with the file: "runs", "refuses", "NaN", "fails", or "hangs"."""
+        words = [self._answers.readline().strip()]
+        if words == ["initialised"]:
+            words.append(self._answers.readline().strip())
+        if words[-1] == "":
+            status = self.close()
+            return "hangs" if status & 127 == signal.SIGALRM else "refuses"
+        if words == ["initialised", "refuses"]:
+            # It initialises, and fails when it is asked for accelerations.
+            return "fails"
+        return words[-1]
+
+    def ask(self, path: Path) -> str:
+        """Return what OpenSim does with a file."""
+        self.send(path)
+        return self.receive()
+
+    def close(self) -> int:
+        """End the process and return its status."""
+        if not self._child:
+            return 0
+        self._requests.close()
+        self._answers.close()
+        _, status = os.waitpid(self._child, 0)
+        self._child = self._asked = 0
+        return status
+
+    def _start(self) -> None:
+        paths, requests = os.pipe()
+        answers, results = os.pipe()
+        self._child = os.fork()
+        if self._child == 0:
+            os.close(requests)
+            os.close(answers)
+            try:
+                answer_requests(paths, results)
+            finally:
+                os._exit(0)
+        os.close(paths)
+        os.close(results)
+        self._requests, self._answers = os.fdopen(requests, "w"), os.fdopen(answers)
+
+
+def ask_opensim(path: Path) -> str:
+    """Return what OpenSim does with one file, in a process of its own."""
+    judge = Judge()
+    verdict = judge.ask(path)
+    judge.close()
+    return verdict
 
 
 def read_models(shared: Path, folder: Path, names: Sequence[str] = ()) -> list[Path]:
@@ -232,6 +323,7 @@ def main() -> None:
 
     opensim.Logger.setLevelString("Off")
     opensim.Logger.removeFileSink()
+    judge = Judge()
     linters = {"now": Linter(HERE.parent)}
     if chosen.before is not None:
         linters["before"] = Linter(chosen.before)
@@ -266,15 +358,20 @@ def main() -> None:
                 print(f"{number}: {dict(counts)}", file=sys.stderr, flush=True)
             edited = path.with_name("edited.osim")
             edited.write_text(text, encoding="utf-8")
-            verdict = ask_opensim(edited)
+            judge.send(edited)
+            for linter in linters.values():
+                linter.send(edited)
+            errors = {name: linter.receive() for name, linter in linters.items()}
+            verdict = judge.receive()
             counts["edits"] += 1
+            counts["model", path.parent.name] += 1
             counts[verdict] += 1
             if verdict == "hangs":
                 continue
-            for name, linter in linters.items():
+            for name in linters:
                 left = known[name][path].copy()
                 new = []
-                for error in linter.errors(edited):
+                for error in errors[name]:
                     if left[error] > 0:
                         left[error] -= 1
                     else:
@@ -295,6 +392,7 @@ def main() -> None:
                         file.flush()
     for key, count in counts.items():
         print(f"{key if isinstance(key, str) else ' '.join(key):30} {count:6}")
+    judge.close()
     for linter in linters.values():
         linter.close()
 
