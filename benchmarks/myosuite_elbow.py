@@ -22,8 +22,6 @@ from osimlite.io.tables.storage import write_sto
 
 FILE = "elbow/myoelbow_2dof6muscles.xml"
 COORDINATES = ("r_shoulder_elev", "r_elbow_flex")
-LEAST_CONTROL = 0.01
-"""Least control of the muscles: below, Millard's muscle without activation dynamics has a flat part."""
 
 
 def main(folder: Path) -> None:
@@ -51,8 +49,6 @@ def main(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as place:
         rows = np.column_stack(list(motion.values()))
         write_sto(Path(place, "flexion.mot"), "flexion", times, COORDINATES, rows)
-        for muscle in model.components(osimlite.Muscle):
-            muscle.min_control = LEAST_CONTROL
         osimlite.write(model, Path(place, "elbow.osim"))
         for title, operators in {
             "Millard": [],

@@ -7,7 +7,7 @@ lengths by `tendon_slack_length`.
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -267,6 +267,10 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
         yield from _check_minimum_activation(self.minimum_activation)
 
 
+_MODEL_MINIMUM = "_model_minimum"
+"""Key in the state of a muscle for the minimum of its activation model, which no file holds."""
+
+
 # OpenSim's equilibrium at the start ignores the speed of the path: fibers begin at rest.
 class Millard2012EquilibriumMuscle(Muscle):
     """The muscle of Millard et al. (2013), tendon and fiber in equilibrium, with curves one can replace."""
@@ -323,6 +327,28 @@ class Millard2012EquilibriumMuscle(Muscle):
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
     """Force of the tendon over its length."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        had_dynamics = not self.ignore_activation_dynamics
+        super().__setattr__(name, value)
+        if had_dynamics and self.ignore_activation_dynamics:
+            self.__dict__[_MODEL_MINIMUM] = self.minimum_activation
+
+    @property
+    def least_activation(self) -> float:
+        """Activation below which OpenSim computes no force.
+
+        It belongs to the activation model inside the muscle, to which OpenSim passes
+        `minimum_activation` on only while the muscle has activation dynamics. Hence a muscle that is
+        read without dynamics has the model's default of 0.01, and one that loses them later, by
+        ModOpIgnoreActivationDynamics for example, keeps its value until it is written to a file.
+        """
+        if not self.ignore_activation_dynamics:
+            return self.minimum_activation
+        value: float | None = self.__dict__.get(_MODEL_MINIMUM)
+        return (
+            MuscleFirstOrderActivationDynamicModel().minimum_activation if value is None else value
+        )
 
     @property
     def is_classic(self) -> bool:

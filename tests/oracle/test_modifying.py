@@ -13,7 +13,9 @@ import osimlite
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.fitting.modifying.path_fitting import fit_paths
 from osimlite.schema.difference import find_differences
+from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.tools import processors as p
+from tests.simulation.elements.muscle_rows import hung, line
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -110,3 +112,54 @@ def test_files_of_loads_and_paths_are_put_in_as_there(corpus: Any, tmp_path: Pat
     # Here the whole path of the data, so that the model finds it from any folder.
     (data,) = changed(tmp_path, path, operators)
     assert "what='datafile'" in data and f"old='{tmp_path / 'push.sto'}', new='push.sto'" in data
+
+
+@pytest.mark.parametrize("minimum", [0.0, 0.005, 0.01, 0.05])
+def test_a_muscle_without_dynamics_keeps_the_minimum_that_it_was_read_with(
+    tmp_path: Path, minimum: float
+) -> None:
+    """OpenSim's activation model learns `minimum_activation` only while the muscle has dynamics."""
+    import opensim
+
+    from osimlite.mechanics.multibody import build_mechanism
+    from osimlite.simulation.elements import force_elements
+    from osimlite.simulation.engines.compiled import CompiledEngine
+
+    opensim.Logger.setLevelString("Off")
+    for excitation in (0.0, 0.003, 0.03, 0.5):
+        muscle = Millard2012EquilibriumMuscle(
+            name="mu",
+            geometry_path=line(),
+            optimal_fiber_length=0.1,
+            tendon_slack_length=0.2,
+            min_control=minimum,
+            minimum_activation=minimum,
+            ignore_tendon_compliance=True,
+        )
+        model = hung(muscle, [excitation, excitation])
+        model.find("/jointset/slide/x").default_value = 0.3
+        processor = p.ModelProcessor(
+            filepath="model.osim", operators=[p.ModOpIgnoreActivationDynamics()]
+        )
+        osimlite.write(model, tmp_path / "model.osim")
+        osimlite.write(processor, tmp_path / "processor.xml")
+        ours = process_model(processor, tmp_path)
+        theirs = opensim.ModelProcessor(str(tmp_path / "model.osim"))
+        theirs.append(opensim.ModOpIgnoreActivationDynamics())
+        processed = theirs.process()
+        osimlite.write(ours, tmp_path / "written.osim")
+        for one, other in (
+            (ours, processed),
+            (ours.copy_deep(), processed),
+            (
+                osimlite.read(tmp_path / "written.osim"),
+                opensim.Model(str(tmp_path / "written.osim")),
+            ),
+        ):
+            state = other.initSystem()
+            other.realizeDynamics(state)
+            expected = other.getMuscles().get(0).getActuation(state)
+            mechanism = build_mechanism(one)
+            engine = CompiledEngine(mechanism, force_elements(one, mechanism))
+            (actual,) = engine.force_records(0.0, [0.3, 0.0])
+            assert actual == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -45,7 +45,6 @@ from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation_constants
 from osimlite.schema.muscles import (
     Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
-    MuscleFirstOrderActivationDynamicModel,
 )
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import DeclaredForce, State
@@ -62,12 +61,6 @@ from osimlite.simulation.elements.registry import register_force_type
 
 MIN_FIBER_DAMPING = 0.001
 """As in OpenSim, a smaller `fiber_damping` counts as 0."""
-
-
-def _read_minimum_activation(force: Any) -> float:
-    # OpenSim passes the property on to its activation model only if that model is used.
-    owner = MuscleFirstOrderActivationDynamicModel() if force.ignore_activation_dynamics else force
-    return float(owner.minimum_activation)
 
 
 def _read_pennation(force: Any) -> tuple[float, ...]:
@@ -89,7 +82,7 @@ def _read_equilibrium_fields(builder: ElementBuilder, force: Any) -> tuple[float
     damping = force.fiber_damping if force.fiber_damping >= MIN_FIBER_DAMPING else 0.0
     return (
         damping,
-        _read_minimum_activation(force),
+        force.least_activation,
         *_read_pennation(force),
         _min_fiber_length(force),
     )
@@ -188,9 +181,7 @@ register_force_type(
         states=(
             State(
                 "activation",
-                lambda force: min(
-                    max(force.default_activation, _read_minimum_activation(force)), 1.0
-                ),
+                lambda force: min(max(force.default_activation, force.least_activation), 1.0),
             ),
             State(
                 "fiber_length",
