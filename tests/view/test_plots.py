@@ -164,12 +164,13 @@ def test_states_of_a_kind_share_pages_and_probes_have_theirs():
     motion = stroll(12)
     motion.auxiliary = states
     motion.probes = {"work": np.arange(12.0)}
-    (panel,) = drawn("probes.png", motion).axes
+    figures = dict(draw_figures(motion, walker()))
+    (panel,) = laid_out(figures["probes.png"]).axes
     assert panel.get_lines()[0].get_ydata().tolist() == list(range(12))
-    figure = drawn("states.png", motion)
+    figure = laid_out(figures["states.png"])
     assert figure.get_suptitle() == "States: activations"
     assert titles(figure) == [f"m{index}" for index in range(9)]
-    figure = drawn("states-2.png", motion)
+    figure = laid_out(figures["states-2.png"])
     assert titles(figure)[8] == "m8 (m)"
     assert figure.axes[8].get_lines()[0].get_ydata() == pytest.approx(8.0 + waves)
 
