@@ -641,40 +641,47 @@ COUPLED = """
 import json
 import opensim as osim
 osim.Logger.setLevelString("Off")
-processor = osim.TableProcessor("motion.sto")
-processor.append(osim.TabOpUseAbsoluteStateNames())
-processor.append(osim.TabOpAppendCoupledCoordinateValues(OVERWRITE))
 model = osim.Model("model.osim")
 model.initSystem()
-table = processor.process(model)
-print(json.dumps([list(table.getColumnLabels()), table.getMatrix().to_numpy().tolist()]))
+result = []
+for overwrite in (True, False):
+    processor = osim.TableProcessor("motion.sto")
+    processor.append(osim.TabOpUseAbsoluteStateNames())
+    processor.append(osim.TabOpAppendCoupledCoordinateValues(overwrite))
+    table = processor.process(model)
+    result.append([list(table.getColumnLabels()), table.getMatrix().to_numpy().tolist()])
+print(json.dumps(result))
 """
 OUR_COUPLED = """
 import json
 import osimlite
 from osimlite import moco
 from osimlite.optimal.tables import read_reference
-operators = [
-    osimlite.TabOpUseAbsoluteStateNames(),
-    osimlite.TabOpAppendCoupledCoordinateValues(overwrite_existing_columns=OVERWRITE),
-]
-processor = osimlite.TableProcessor(filepath="motion.sto", operators=operators)
 phase = osimlite.MocoPhase(model=osimlite.ModelProcessor(filepath="model.osim"))
-table = read_reference(moco.build_problem(osimlite.MocoStudy(problem=osimlite.MocoProblem(phases=phase))), phase, processor)
-print(json.dumps([table.columns, table.rows.tolist()]))
+problem = moco.build_problem(osimlite.MocoStudy(problem=osimlite.MocoProblem(phases=phase)))
+result = []
+for overwrite in (True, False):
+    operators = [
+        osimlite.TabOpUseAbsoluteStateNames(),
+        osimlite.TabOpAppendCoupledCoordinateValues(overwrite_existing_columns=overwrite),
+    ]
+    processor = osimlite.TableProcessor(filepath="motion.sto", operators=operators)
+    table = read_reference(problem, phase, processor)
+    result.append([table.columns, table.rows.tolist()])
+print(json.dumps(result))
 """
 
 
-@pytest.mark.parametrize("overwrite", ["True", "False"])
-def test_values_of_coupled_coordinates(overwrite, tmp_path):
+def test_values_of_coupled_coordinates(tmp_path):
+    """Also where the table has a column of the coordinate that another one determines."""
     pytest.importorskip("opensim")
     osimlite.write(coupled(links(), "q1"), tmp_path / "model.osim")
     t = np.linspace(0.0, 1.0, 7)
     write_sto(tmp_path / "motion.sto", "", t, ("q1", "q0"), np.column_stack([t, np.sin(3 * t)]))
-    codes = (code.replace("OVERWRITE", overwrite) for code in (COUPLED, OUR_COUPLED))
-    (names, theirs), (columns, ours) = (_said(tmp_path, ["-c", code]) for code in codes)
-    assert columns == names and len(names) == 2
-    assert ours == pytest.approx(np.array(theirs), rel=1e-12)
+    said = [_said(tmp_path, ["-c", code]) for code in (COUPLED, OUR_COUPLED)]
+    for (names, theirs), (columns, ours) in zip(*said, strict=True):
+        assert columns == names and len(names) == 2
+        assert ours == pytest.approx(np.array(theirs), rel=1e-12)
 
 
 def _said(folder, command):
