@@ -7,6 +7,10 @@ expensive test has ``@pytest.mark.full`` instead.
 from __future__ import annotations
 
 QUICK_CASES: dict[str, tuple[str, ...]] = {
+    "tests/fitting/test_person.py::test_somebody_is_found_again": ("0",),
+    "tests/view/test_panels.py::test_titles_are_where_matplotlib_puts_them": ("3.0",),
+    "tests/oracle/test_run_tools.py::test_coordinates_that_a_motion_lacks_or_names_in_old_ways": ("prescribed",),
+    "tests/translate/mjcf_import/test_tendons.py::test_geodesics_are_nearer_than_wrap_objects": ("y",),
     "tests/oracle/test_casadi.py::test_accelerations_are_those_of_opensim": ("m0115",),
     "tests/oracle/test_contact_motions.py::test_published_models": ("m0466",),
     "tests/oracle/test_contact_motions.py::test_walkers": ("mesh feet",),
@@ -46,9 +50,13 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 QUICK_STRIDES: dict[str, int] = {
+    "tests/cli/test_simulate.py::test_results_do_not_depend_on_pybullet": 2,
+    "tests/fitting/test_turning.py::test_who_turns_around_goes_on_at_the_other_end": 3,
+    "tests/derivatives/check_classes.py::test_trees_of_joints": 4,
+    "tests/io/document/test_damage.py::test_a_damaged_file_is_read_or_refused": 3,
     "tests/optimal/check_derivatives.py::test_models_with_constraints": 3,
     "tests/optimal/check_derivatives.py::test_schemes_and_dynamics": 3,
-    "tests/oracle/test_moco.py::test_what_moco_takes_without_a_word": 3,
+    "tests/oracle/test_moco.py::test_what_moco_takes_without_a_word": 5,
     "tests/simulation/engines/test_imports.py::test_neither_numba_nor_scipy_is_imported": 3,
     "tests/studies/sweep/test_optimize.py::test_an_interrupted_search_goes_on": 3,
     "tests/cli/test_doctor.py::test_what_is_needed_is_enough_and_is_needed": 3,
@@ -63,8 +71,8 @@ QUICK_STRIDES: dict[str, int] = {
     "tests/oracle/test_lint_custom_joints.py::test_there_is_an_error_where_opensim_fails": 3,
     "tests/oracle/test_lint_old_formats.py::test_the_verdict_on_an_old_document_is_that_of_opensim": 4,
     "tests/oracle/test_lint_references.py::test_the_verdict_on_broken_references_is_that_of_opensim": 2,
-    "tests/oracle/test_path_wraps_and_starts.py::test_models_whose_ranges_leave_their_paths": 3,
-    "tests/oracle/test_path_wraps_and_starts.py::test_ranges_of_wraps": 5,
+    "tests/oracle/test_path_wraps_and_starts.py::test_models_whose_ranges_leave_their_paths": 5,
+    "tests/oracle/test_path_wraps_and_starts.py::test_ranges_of_wraps": 9,
     "tests/test_readme.py::test_every_command_explains_itself": 4,
     "tests/tools/test_lab_pipelines.py::test_parts_of_unknown_classes_are_named": 3,
     "tests/tools/test_lab_pipelines.py::test_results_put_elsewhere_are_found": 3,

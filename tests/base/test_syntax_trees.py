@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.base.syntax_trees import parse_expression, parse_module
+from tests.suite import choose
 
 LONG = "\n".join(f"x{k} = (a + b) * [c for c in d if c]" for k in range(2000))
 
@@ -29,7 +30,7 @@ def test_a_finalizer_that_parses_disturbs_nothing():
     thresholds = gc.get_threshold()
     gc.set_threshold(50)
     try:
-        for _ in range(5):
+        for _ in range(choose(2, 5)):
             for _ in range(30):
                 Cycle()
             assert len(parse_module(LONG).body) == 2000

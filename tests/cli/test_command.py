@@ -15,6 +15,7 @@ from osimlite.cli import COMMANDS, create_app
 from osimlite.cli._command import Command
 from osimlite.simulation.options import Options
 from tests.cli.support import loaded
+from tests.suite import choose
 
 WORDS = [
     "walker.osim", "b.osim", "-", "1", "0", "-1", "2.5", "1e-6", ".5", "5.", "1_0", "inf", "nan", "x", "a=1", "a==", "",
@@ -43,7 +44,7 @@ def spellings(name: str) -> list[str]:
     ]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=choose(15, 60), deadline=None)
 @given(data=st.data())
 @pytest.mark.parametrize(
     "name", ["simulate", "validate", "translate", "view", "find-gait", "gait", "diff", "build"]

@@ -63,10 +63,10 @@ def test_a_name_that_is_near_by_chance_suggests_nothing(tmp_path: Path) -> None:
 
 def test_check_without_a_file_compares_what_is_written(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
-    assert run("build", "jumper", "-o", "jumper.osim", folder=tmp_path).code == 0
+    assert run("build", "arm", "-o", "arm.osim", folder=tmp_path).code == 0
     for words in (("--check", "-o", "out"), ("-o", "out", "--check")):
-        done = run("translate", "jumper.osim", *words, folder=tmp_path)
+        done = run("translate", "arm.osim", *words, folder=tmp_path)
         assert (done.code, done.err) == (0, ""), done.err
-        assert "jumper.xml: root mean square errors" in done.out
+        assert "arm.xml: root mean square errors" in done.out
         assert json.loads((tmp_path / "out" / "check.json").read_text())["muscles"]
         assert (tmp_path / "out" / "fidelity.json").exists()

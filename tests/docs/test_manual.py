@@ -31,7 +31,7 @@ PAGES = sorted(
     - {"docs/gallery.md"}
 )
 QUICK = (
-    "adoption", "addbiomechanics", "animation", "biorbd", "compiled", "constraints", "converting", "errors",
+    "adoption", "biorbd", "compiled", "constraints", "errors",
     "format-and-diff", "from-mujoco", "from-urdf", "integrators", "lint-in-ci", "modifying", "plugin-classes", "rules",
     "urdf", "yaml",
 )  # fmt: skip

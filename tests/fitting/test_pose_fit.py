@@ -26,6 +26,7 @@ from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from tests.fitting.support import cost_of, places_at
 from tests.mechanics.multibody.strategies import Case, cases, constraint_of
 from tests.simple_models import make_marked_body
+from tests.suite import choose
 
 ROUND = "ConstantCurvatureJoint"
 """Its functions of several coordinates are bent, which Newton's matrix leaves out."""
@@ -152,7 +153,7 @@ def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, 
     st.integers(0, 99),
     st.sampled_from(["", "coupler", "point", "distance", "line", "weld"]),
 )
-@settings(max_examples=40)
+@settings(max_examples=choose(20, 40))
 def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, kind: str) -> None:
     """No direction that the constraints leave free leads down."""
     mechanism, rng = case.mechanism, np.random.default_rng(seed)

@@ -14,6 +14,7 @@ from osimlite.schema.patterns import MAX_STATES, Pattern, PatternError, Unsuppor
 from osimlite.tools import patterns as file_patterns
 from osimlite.tools.named_files import find_named_files
 from osimlite.tools.patterns import find_files
+from tests.suite import choose
 
 SLOW = [
     "(.*)*(.*)*(.*)*(.*)*(.*)*!",
@@ -63,7 +64,8 @@ def test_random_patterns_match_as_with_another_engine() -> None:
             parts.append(atom if atom in ASSERTIONS else atom + rng.choice(QUANTIFIERS))
         return "".join(parts) + (f"|{rng.choice(ATOMS)}" if rng.random() < 0.2 else "")
 
-    for _ in range(3000):
+    count = choose(700, 3000)
+    for _ in range(count):
         text = make(2)
         try:
             other = re.compile(text)
@@ -74,7 +76,7 @@ def test_random_patterns_match_as_with_another_engine() -> None:
             name = "".join(rng.choice("ab/c.1") for _ in range(rng.randint(0, 5)))
             assert pattern.fullmatch(name) == bool(other.fullmatch(name)), (text, name)
             compared += 1
-    assert compared > 8000
+    assert compared > 2.6 * count
 
 
 def test_assertions_within_assertions_take_no_time() -> None:

@@ -31,7 +31,7 @@ from osimlite.simulation import read_sto
 from tests.suite import choose
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
-WANTED = int(os.environ.get("OSIMLITE_DAMAGE", choose("100", "3000")))
+WANTED = int(os.environ.get("OSIMLITE_DAMAGE", choose("50", "3000")))
 FIRST = int(os.environ.get("OSIMLITE_SEED", "0"))
 MORE = os.environ.get("OSIMLITE_DAMAGE_FOLDER")
 GROUPS = 20

@@ -17,7 +17,7 @@ from tests.lint.projects import FIXTURES, Fault, pendulum, walking
 from tests.lint.support import Folder, in_place
 from tests.suite import choose
 
-WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("60", "300")))
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("30", "300")))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
 
 

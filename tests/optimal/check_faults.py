@@ -20,7 +20,7 @@ from osimlite.tools.running import run as run_setup
 from tests.optimal.study_faults import faults, project
 from tests.suite import choose
 
-WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("15", "102")))
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("9", "102")))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
 STUDIES = "followed", "placed", "pushed"
 

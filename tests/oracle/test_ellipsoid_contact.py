@@ -16,6 +16,7 @@ opensim = pytest.importorskip("opensim", reason="needs the opensim package (extr
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402
+from tests.suite import choose  # noqa: E402
 
 MATERIAL = {
     "Stiffness": 1e6,
@@ -92,7 +93,7 @@ def by_opensim(radii, angles, center, velocity):
 def test_random_pairs(round_one):
     rng = np.random.default_rng(5)
     k, a, *rest = combine_materials(*MATERIAL.values(), *MATERIAL.values())
-    for _ in range(60):
+    for _ in range(choose(15, 60)):
         radii, angles, center = touching_pair(rng, round_one)
         velocity = rng.normal(size=3)
         (force, torque), _ = by_opensim(radii, angles, center, velocity)

@@ -23,6 +23,7 @@ pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402
 from tests.oracle.opensim_paths import compare_paths  # noqa: E402
+from tests.suite import choose  # noqa: E402
 
 GROUND, B0, B1, B2, F1, F2, STUCK = (
     *(
@@ -284,7 +285,7 @@ def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
     compare_paths(tmp_path / "model.osim", poses=1)
 
 
-@settings(max_examples=40)
+@settings(max_examples=choose(20, 40))
 @given(wrapped())
 def test_around_surfaces(tmp_path_factory, model):
     file = tmp_path_factory.mktemp("wrapped") / "model.osim"

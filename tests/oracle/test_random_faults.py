@@ -29,7 +29,7 @@ from tests.suite import choose
 
 pytestmark = pytest.mark.oracle
 
-WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("8", "40")))
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("6", "40")))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
 VERDICTS = ("hangs", "crashes", "raises", "false", "changes", "tells", "nothing")
 """What OpenSim may do, the worst first."""

@@ -231,7 +231,7 @@ def test_limit_of_an_angle_of_a_ball_joint_acts_on_its_speed(route):
     assert within(ours, mechanism.acceleration(q, u, {"q0_1": row["limit"]}))
 
 
-@settings(max_examples=choose(20, 100))
+@settings(max_examples=choose(10, 100))
 @given(
     seed=st.integers(0, 10**6),
     lengths=st.lists(st.sampled_from(["PinJoint", "UniversalJoint"]), min_size=1, max_size=12),

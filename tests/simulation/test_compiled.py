@@ -370,12 +370,12 @@ def test_without_machine_code_the_kernels_run_as_python(fixtures, fast):
     program = (
         "import osimlite; "
         f"model = osimlite.read({str(fixtures / 'walker' / 'DynamicWalkerModel.osim')!r}); "
-        "found = osimlite.simulate(model, 0.02, 'compiled', accuracy=1e-5); "
+        "found = osimlite.simulate(model, 0.005, 'compiled', accuracy=1e-5); "
         "print(found.values[-1].tolist()); print(found.summary['versions'])"
     )
     only = {**os.environ, "OSIMLITE_KERNELS": "python"}
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=only)
     assert done.returncode == 0, done.stderr
     end, versions = done.stdout.splitlines()
-    assert json.loads(end) == fast.run(0.02, accuracy=1e-5).values[-1].tolist()
+    assert json.loads(end) == fast.run(0.005, accuracy=1e-5).values[-1].tolist()
     assert f"'engine': 'Python {platform.python_version()}'" in versions

@@ -38,7 +38,7 @@ def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0, route: s
 
 
 # ------------------------------------------------------------------------------------ random trees and constraints
-@settings(max_examples=choose(30, 60))
+@settings(max_examples=choose(20, 60))
 @given(
     cases(max_bodies=4),
     st.sampled_from([*KINDS, "none"]),

@@ -11,6 +11,7 @@ import osimlite
 from osimlite.errors import SettingError
 from tests.simulation.checked import Checked
 from tests.simulation.support import PATH, SETUPS, wrapped
+from tests.suite import choose
 
 integrate = pytest.importorskip("scipy.integrate")
 
@@ -156,7 +157,7 @@ def test_lengths_around_two_surfaces_do_not_jump(kinds):
         one, {**two, "translation": (0.09, 0.01, 0.02), "xyz_body_rotation": (0.4, -0.3, 0.2)}
     )
     rng, steps = np.random.default_rng(6), np.linspace(0.0, 1.0, 61)[:, None]
-    for _ in range(30):
+    for _ in range(choose(8, 30)):
         begin, end = rng.uniform(
             (-0.2, -0.06, -0.06, 0.15, -0.06, -0.06), (-0.08, 0.06, 0.06, 0.3, 0.06, 0.06), (2, 6)
         )

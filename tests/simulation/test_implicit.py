@@ -39,6 +39,7 @@ from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle
 from tests.simulation.equations import Equations, last, oscillator
 from tests.simulation.support import MODELS
+from tests.suite import choose
 
 METHODS = "adams", "bdf", "rosenbrock"
 
@@ -151,7 +152,7 @@ def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
     """
     power = order if method == "rosenbrock" else order + 1
     # Rosenbrock's method takes 30 times as many steps at 1e-8 as at 1e-5.
-    accuracies = (1e-5, 1e-8) if order > 2 else (1e-5, 1e-7)
+    accuracies = (1e-5, 1e-8) if order > 2 else choose((1e-4, 1e-6), (1e-5, 1e-7))
     loose, tight = (
         steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in accuracies
     )
@@ -174,7 +175,7 @@ def test_rosenbrock_has_order_3():
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, pytest.param(1e-7, marks=pytest.mark.full)])
 def test_error_follows_the_accuracy(method, accuracy):
     y, stepper = steps_of(oscillator, [1.0, 0.0], accuracy, method)
     error = max(abs(y[0] - math.cos(3.0)), abs(y[1] + math.sin(3.0)))

@@ -72,7 +72,7 @@ def motion(model):
     return trajectory.paths, trajectory.values, trajectory.speeds
 
 
-@settings(max_examples=choose(8, 25), deadline=None)
+@settings(max_examples=choose(5, 25), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(EDITS), st.floats(0.0, 1.0)), min_size=1, max_size=5))
 def test_after_any_edit_a_motion_is_that_of_a_model_just_read(repo, edits):
     model = osimlite.read(repo / WALKER)

@@ -17,6 +17,7 @@ from osimlite.errors import (
 )
 from osimlite.io.tables.storage import read_sto
 from tests.simple_models import make_slide
+from tests.suite import choose
 
 TIMES = np.linspace(0.0, 1.0, 51)
 UP = 0.5 * TIMES**2
@@ -139,7 +140,8 @@ def test_random_bounds_never_end_in_a_traceback() -> None:
     """Either all equations hold within the bounds, or nothing is said; massless bodies and useless actuators too."""
     rng = np.random.default_rng(7)
     solved = 0
-    for number in range(300):
+    count = choose(60, 300)
+    for number in range(count):
         strengths = rng.choice([0.0, 1e-6, 1.0, 30.0, -5.0], size=rng.integers(1, 4)).tolist()
         model = lift(*strengths)
         for item in model.force_set.objects:
@@ -163,7 +165,7 @@ def test_random_bounds_never_end_in_a_traceback() -> None:
             ), number
         else:
             assert np.isnan(found.rows[0]).all() and "at y" in found.describe_unsolved(), number
-    assert 50 < solved < 250
+    assert count / 6 < solved < 5 * count / 6
 
 
 def test_a_locked_coordinate_stays_where_it_is() -> None:

@@ -48,7 +48,7 @@ def compare(
     assert np.abs(result - known).max() < accuracy
 
 
-@settings(max_examples=choose(12, 80))
+@settings(max_examples=choose(8, 80))
 @given(
     cases(max_bodies=4),
     st.sampled_from(KINDS),
@@ -71,7 +71,7 @@ def test_any_mechanism(case: Case, kind: str, seed: int, what: str, off: float) 
     rows = constraint.velocity_equations(mechanism.at(near, time=0.7))[0]
     strengths = np.linalg.svd(rows, compute_uv=False)
     assume(strengths.min(initial=1.0) > 1e-2 * strengths.max(initial=1.0))
-    wanted = near + off * rng.normal(size=(4, len(near)))
+    wanted = near + off * rng.normal(size=(choose(2, 4), len(near)))
     changes: dict[str, dict[str, Any]] = {
         "free": {},
         "locked": {"locked": True},
@@ -84,7 +84,7 @@ def test_any_mechanism(case: Case, kind: str, seed: int, what: str, off: float) 
         [mechanism.assemble(q, 0.7) for q in wanted]
     except SimulationError:
         with pytest.raises(SimulationError):
-            assemble_motion(mechanism, np.full(4, 0.7), wanted, MACHINE_CODE)
+            assemble_motion(mechanism, np.full(len(wanted), 0.7), wanted, MACHINE_CODE)
         return
     compare(mechanism, wanted, accuracy=1e-7)
 
@@ -114,7 +114,8 @@ def test_couplers_prescribed_and_clamped_coordinates(
     rng = np.random.default_rng(1)
     compare(
         mechanism,
-        mechanism.values({}) + 0.3 * rng.normal(size=(3, len(mechanism.coordinates))),
+        mechanism.values({})
+        + 0.3 * rng.normal(size=(3 if code is MACHINE_CODE else 1, len(mechanism.coordinates))),
         code,
     )
 
@@ -140,7 +141,7 @@ def test_loops(fixtures) -> None:
     rng = np.random.default_rng(2)
     wanted = np.array((0.3, 0.6, 0.4, 0.3)) + 0.2 * rng.normal(size=(20, 4))
     compare(mechanism, wanted, accuracy=1e-8)
-    compare(mechanism, wanted[:2], Checked("Python"), accuracy=1e-8)
+    compare(mechanism, wanted[: choose(1, 2)], Checked("Python"), accuracy=1e-8)
     motion = RecordedMotion(mechanism, np.linspace(0.0, 1.0, 20), wanted).assembled()
     assert np.abs(motion.values - [mechanism.assemble(q) for q in wanted]).max() < 1e-8
     model["/constraintset/end"].location_body_1 = (9.0, 0.0, 0.0)

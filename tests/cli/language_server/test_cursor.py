@@ -22,6 +22,7 @@ from osimlite.cli.language_server.text import Text
 from osimlite.errors import OsimliteError
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
+from tests.suite import choose
 
 SETUPS = Path(__file__).resolve().parents[3] / "fixtures" / "setups"
 WALKER = Path(__file__).resolve().parents[3] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -64,7 +65,7 @@ def test_a_part_is_told_by_the_name_of_its_property() -> None:
     assert inner is not None and inner.spec is not None and inner.spec.tag == "rotation2"
 
 
-@settings(max_examples=40)
+@settings(max_examples=choose(15, 40))
 @given(
     st.integers(0, len(TEXT)),
     st.integers(0, 60),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from osimlite.io.b3d.wire import DamagedMessageError, Field, decode_message, split_message
 from tests.io.b3d_files import encode_bytes, encode_message, encode_varint
+from tests.suite import choose
 
 SCHEMA = {
     1: Field("count", "int"),
@@ -34,6 +35,7 @@ MESSAGES = st.fixed_dictionaries(
 )
 
 
+@settings(max_examples=choose(15, 100))
 @given(MESSAGES)
 def test_what_is_encoded_is_decoded(values: dict[str, object]) -> None:
     assert decode_message(memoryview(encode_message(values, SCHEMA)), SCHEMA) == values

@@ -58,7 +58,7 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     assert rows @ udot - wanted == pytest.approx(drifts, abs=1e-6 * scale)
 
 
-@settings(max_examples=choose(25, 50))
+@settings(max_examples=choose(15, 50))
 @given(
     cases(),
     st.sampled_from(["point", "distance", "line", "coupler", "prescribed"]),

@@ -28,6 +28,7 @@ from osimlite.studies.gait.cycle_search import CycleSearch, ModelCycle
 from osimlite.studies.gait.gaits import find_gait
 from osimlite.studies.gait.stability import StabilityOptimization
 from osimlite.studies.gait.stepmap import StepMap
+from tests.suite import choose
 
 INERTIA, AHEAD = "/bodyset/*Shank/inertia/2", "/contactgeometryset/*FootContact/location/0"
 JOINTS = [name for name in STEADY_START if not name.startswith("Pelvis")]
@@ -40,7 +41,7 @@ NEAR = {
         for name in JOINTS
     },
 }
-FEW = {"samples": 256, "tries": 3, "enough": 1, "budget": 4}
+FEW = {"samples": choose(128, 256), "tries": 3, "enough": 1, "budget": 4}
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +197,7 @@ def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
         made = plan(
             lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given
         )
-        found.append(CycleSearch(made).find_candidates(512, 0))
+        found.append(CycleSearch(made).find_candidates(choose(256, 512), 0))
     assert len(found[0]) > 3
     assert [each.miss for each in found[0]] == [each.miss for each in found[1]]
     for one, other in zip(*found, strict=True):
@@ -264,7 +265,7 @@ def test_walkers_that_only_fall_are_told_of(tmp_path):
 def test_the_command_writes_a_walker(tmp_path):
     words = [f"--vary={name}={low!r}:{high!r}" for name, (low, high) in NEAR.items()]
     options = [
-        "--samples=256",
+        f"--samples={choose(64, 256)}",
         "--tries=3",
         "--enough=1",
         "--budget=0",

@@ -15,6 +15,7 @@ from osimlite import (
     CoordinateActuator,
 )
 from osimlite.errors import UnsupportedError
+from tests.suite import choose
 from tests.translate.mjcf.support import HOSTILE, hostile
 
 NAMES = st.one_of(
@@ -35,7 +36,7 @@ def named(text: str) -> list[tuple[str, str]]:
     ]
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=choose(6, 15), suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(NAMES, min_size=50, max_size=50))
 def test_mujoco_takes_models_with_any_names(names: list[str]) -> None:
     try:

@@ -12,8 +12,11 @@ from osimlite.errors import OsimliteError
 
 pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
 
+from tests.suite import choose
 from tests.translate.mjcf_import import models
 
+WANTED = choose(5, 10)
+"""Damaged files of each batch."""
 TEXTS = (models.MECHANISM, models.LOOPS, models.SIDES)
 NUMBERS = ("0", "-1", "1e300", "-1e-300", "nan", "inf", "", "abc", "1 2 3 4 5 6 7 8", "99999999999")
 NUMBER = re.compile(r"(?<=[\" ])-?\d*\.?\d+(?=[\" ])")
@@ -52,11 +55,11 @@ def _replace(text, pattern, choose, make):
 
 @pytest.mark.parametrize("batch", range(50))
 def test_a_damaged_file_gives_a_clear_error(batch, tmp_path):
-    for number in range(10):
-        choose = random.Random(10 * batch + number)
-        text = choose.choice(TEXTS)
-        for _ in range(choose.randrange(1, 4)):
-            text = damage(text, choose)
+    for number in range(WANTED):
+        draw = random.Random(10 * batch + number)
+        text = draw.choice(TEXTS)
+        for _ in range(draw.randrange(1, 4)):
+            text = damage(text, draw)
         path = tmp_path / f"{number}.xml"
         path.write_text(text, encoding="utf-8")
         try:

@@ -12,6 +12,7 @@ from osimlite.models.jumper import jumper
 mujoco = pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
 
 from osimlite.translate.mjcf.poses import draw_values  # noqa: E402
+from tests.suite import choose  # noqa: E402
 
 LENGTHS = {"gait10dof18musc": 4e-3, "jumper": 1e-3}
 """Largest root mean square error (m) of a path after both translations."""
@@ -38,7 +39,7 @@ def check(model, folder, allowed):
     before, after = osimlite.mechanism(model), osimlite.mechanism(made.model)
     paths = [osimlite.paths(item) for item in (model, made.model)]
     errors = {}
-    for q in draw_values(before, 20, 3):
+    for q in draw_values(before, choose(8, 20), 3):
         poses = before.body_transforms(q), after.body_transforms(values(q))
         for name in poses[0].keys() & poses[1].keys():
             assert np.abs(poses[0][name] - poses[1][name]).max() < 1e-9
