@@ -105,15 +105,20 @@ class _Task:
             )
         elapsed = now - self.started
         details = []
-        if self.total and self.done:
+        # A total of 1 is a part of the work, of which the beginning says nothing.
+        if self.total and (self.done or self.total != 1.0):
             fraction = min(1.0, self.done / self.total)
             amount = f" ({_format(self.done)} of {_format(self.total)}{self.unit})"
             # A total of 1 is a part of the work, which has no unit.
             details += [f"{100.0 * fraction:.0f} %{amount if self.total != 1.0 else ''}"]
             if self.details:
                 details.append(self.details)
-            if elapsed > ESTIMATE_S and 0.0 < fraction < 1.0:
-                details.append(f"{_format_duration(elapsed * (1.0 - fraction) / fraction)} left")
+            if elapsed > ESTIMATE_S and fraction < 1.0:
+                details.append(
+                    f"{_format_duration(elapsed * (1.0 - fraction) / fraction)} left"
+                    if fraction
+                    else _format_duration(elapsed)
+                )
         else:
             details += [description for description in (self.details,) if description]
             if elapsed > ESTIMATE_S:

@@ -16,7 +16,7 @@ from osimlite.base.text import join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command
 from osimlite.cli._console import say, show
-from osimlite.cli._progress import motion_bar
+from osimlite.cli._progress import motion_bar, progress_bar
 
 if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
@@ -119,7 +119,9 @@ class _Tour:
                 )
             say()
 
-        yield tell
+        # The heading above the line of progress says what the step does.
+        with progress_bar(f"   step {self.steps}", None):
+            yield tell
 
 
 def _build_and_check(tour: _Tour) -> None:

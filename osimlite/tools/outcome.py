@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.progress import watch_items
 from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
 from osimlite.base.result_writing import ResultWriter
@@ -206,7 +207,8 @@ class Outcome:
                 writer.resolve(path)
             # Files are moved to their paths on exit from the stack, in reverse order. Of two results
             # with one path the later one is therefore moved last.
-            for path, lines in reversed(self._texts.items()):
+            texts = list(reversed(self._texts.items()))
+            for path, lines in watch_items("writing results", texts, " files"):
                 all_or_none.enter_context(writer.written(path, lines))
         self.files += self._texts
         self._texts.clear()

@@ -75,6 +75,14 @@ def test_the_time_left_is_told(monkeypatch, clock):
         assert shown(sys.stderr).endswith("20 min left")
 
 
+def test_the_amount_is_told_before_the_first_part_is_done(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with progress_bar("sweeping", 40.0):
+        clock.now = 3.0
+        _progress._line.draw()
+        assert shown(sys.stderr) == "sweeping: 0 % (0 of 40), 3 s"
+
+
 def test_a_narrow_terminal_has_one_line(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setenv("COLUMNS", "20")
@@ -156,6 +164,21 @@ def test_the_line_comes_back_at_once_after_another_task(monkeypatch, clock):
     clock.now = 2.2
     _progress._line.draw()
     assert shown(sys.stderr) == "simulating: 2 s"
+
+
+def test_steps_of_the_tour_have_their_own_line(monkeypatch, clock, tmp_path):
+    from osimlite.cli.demo import _Tour
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    _progress.watch_command("demo")
+    tour = _Tour(tmp_path)
+    for _ in range(2):
+        with tour.step("Translate it") as report_result:
+            clock.now += 3.0
+            _progress._line.draw()
+            assert shown(sys.stderr) == f"   step {tour.steps}: 3 s"
+            report_result("done")
+    _progress.finish_command()
 
 
 def test_commands_that_wait_for_people_have_no_line(monkeypatch, clock):
