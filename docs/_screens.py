@@ -1,12 +1,14 @@
 """Show what is on a terminal of 80 columns while each command works on something slow.
 
     python docs/_screens.py [WORD ...]               all commands, or those whose names contain a WORD
+    python docs/_screens.py --page                   all commands, into the manual's page screens.md
     python docs/_screens.py --picture FILE NAME ...  draw the screens of the commands of these rows
 
 Each command runs at a terminal that this program emulates. The screen is read after 0.5, 2 and 5
-seconds, then Ctrl-C is sent. The table that is printed has one row for each command: the last line
-on the screen at these times, and the seconds until the command ended after Ctrl-C. A command that
-ended before has "finished" there. Run it after a change of what commands print while they work.
+seconds, then Ctrl-C is sent; the command runs again to be stopped after 0.5 s, and after 2 s. The
+table has one row for each command: the time of the first sign of life, the last line on the screen
+at the three times, and the longest time between Ctrl-C and the end. A command that ended before has
+"finished" there. Run it after a change of what commands print while they work.
 
 On a machine that is busy with other work, set SCREENS_CLOCK=processor (on Linux): the times are then
 the seconds of processor time that the command has used, nearly those of a quiet machine.
@@ -26,7 +28,7 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,6 +37,8 @@ import pyte
 from osimlite.base.records import dataclass, field
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "screens.md"
+"""Page of the manual with the table."""
 COLUMNS = 80
 LINES = 24
 MOMENTS_S = (0.5, 2.0, 5.0)
@@ -101,6 +105,7 @@ class Recording:
     """What a terminal showed while a command worked.
 
     Attributes:
+        first: time at which the first character was on the screen, s; None without any.
         screens: lines of the screen by the time at which it was read, s.
         ended: time after the start at which the command ended by itself, s; None if it did not.
         stopping: time between Ctrl-C and the end, s.
@@ -108,6 +113,7 @@ class Recording:
         last: lines of the screen at the end.
     """
 
+    first: float | None = None
     screens: dict[float, list[str]] = field(default_factory=dict)
     ended: float | None = None
     stopping: float = 0.0
@@ -116,15 +122,20 @@ class Recording:
 
 
 def record_command(
-    arguments: list[str], folder: Path, columns: int = COLUMNS, clone: Path = ROOT
+    arguments: list[str],
+    folder: Path,
+    columns: int = COLUMNS,
+    clone: Path = ROOT,
+    moments: Sequence[float] = MOMENTS_S,
 ) -> Recording:
-    """Run osimlite at an emulated terminal, and read its screen at `MOMENTS_S`.
+    """Run osimlite at an emulated terminal, read its screen at some times, and send Ctrl-C.
 
     Args:
         arguments: arguments of osimlite.
         folder: current folder of the command.
         columns: width of the terminal.
         clone: clone of the repository whose osimlite runs.
+        moments: times at which the screen is read, s; the last one is that of Ctrl-C.
     """
     started = time.monotonic()
     child, terminal = pty.fork()
@@ -139,8 +150,14 @@ def record_command(
     screen = pyte.Screen(columns, LINES)
     stream = pyte.ByteStream(screen)
     recording = Recording()
-    for moment in MOMENTS_S:
-        is_open = _feed_until(terminal, stream, moment, _make_clock(child, started))
+    clock = _make_clock(child, started)
+
+    def notice_output() -> None:
+        if recording.first is None:
+            recording.first = clock()
+
+    for moment in moments:
+        is_open = _feed_until(terminal, stream, moment, clock, notice_output)
         if not is_open:
             recording.ended = time.monotonic() - started
             break
@@ -177,7 +194,11 @@ def _make_clock(process: int, started: float) -> Callable[[], float]:
 
 
 def _feed_until(
-    terminal: int, stream: pyte.ByteStream, end: float, clock: Callable[[], float]
+    terminal: int,
+    stream: pyte.ByteStream,
+    end: float,
+    clock: Callable[[], float],
+    notice_output: Callable[[], None] = lambda: None,
 ) -> bool:
     """Feed the output of a command to a screen; return whether it still runs at the end time."""
     while (left := end - clock()) > 0.0:
@@ -189,6 +210,7 @@ def _feed_until(
                 return False
             if not output:
                 return False
+            notice_output()
             stream.feed(output)
     return True
 
@@ -263,28 +285,62 @@ def _is_number(word: str) -> bool:
     return True
 
 
+def measure_command(arguments: list[str], inputs: Path) -> Recording:
+    """Run a command and stop it after each of `MOMENTS_S`; return the last recording.
+
+    Args:
+        arguments: arguments of osimlite.
+        inputs: folder of models, setups and recordings, which stays as it is.
+
+    Returns:
+        The recording of the longest run, with the longest time between Ctrl-C and the end.
+    """
+    longest = 0.0
+    for count in range(1, len(MOMENTS_S) + 1):
+        with TemporaryDirectory() as name:
+            # Each run starts without results of the one before. Commands replace files as a whole,
+            # so that links are as good as copies.
+            folder = shutil.copytree(inputs, Path(name) / "work", copy_function=os.link)
+            recording = record_command(arguments, folder, moments=MOMENTS_S[:count])
+        if recording.ended is not None:
+            break
+        longest = max(longest, recording.stopping)
+    recording.stopping = longest
+    return recording
+
+
 def describe_row(name: str, recording: Recording) -> list[str]:
     """Return the cells of the table for a command."""
-    cells = [name]
+    cells = [name, "" if recording.first is None else f"{recording.first:.2f}"]
     for moment in MOMENTS_S:
         lines = recording.screens.get(moment)
-        cells.append("(finished)" if lines is None else lines[-1].strip() or "(nothing)")
-    cells.append("" if recording.ended is not None else f"{recording.stopping:.2f}")
-    cells.append(recording.last[-1].strip())
+        line = "" if lines is None else lines[-1].strip().replace("|", "\\|")
+        cells.append("finished" if lines is None else f"`{line}`" if line else "(nothing)")
+    cells.append(f"{recording.stopping:.1f}" if recording.stopping else "")
     return cells
 
 
-def print_table(words: list[str]) -> None:
-    """Print the table for the commands whose names contain one of the words, or for all."""
-    print("| command | after 0.5 s | after 2 s | after 5 s | end after Ctrl-C, s | last line |")
-    print("|---|---|---|---|---|---|")
+def make_table(words: list[str]) -> Iterator[str]:
+    """Yield the lines of the table for the commands whose names contain one of the words, or for all."""
+    yield "| command | first sign, s | after 0.5 s | after 2 s | after 5 s | end after Ctrl-C, s |"
+    yield "|---|---|---|---|---|---|"
     with TemporaryDirectory() as name:
-        folder = Path(name)
-        make_inputs(folder)
+        inputs = Path(name)
+        make_inputs(inputs)
         for row, arguments in COMMANDS.items():
             if not words or any(word in row for word in words):
-                recording = record_command(arguments.split(), folder)
-                print(f"| {' | '.join(describe_row(row, recording))} |", flush=True)
+                cells = describe_row(row, measure_command(arguments.split(), inputs))
+                yield f"| {' | '.join(cells)} |"
+
+
+def write_page() -> None:
+    """Write the table of all commands into the page of the manual."""
+    head = PAGE.read_text(encoding="utf-8").partition("| command |")[0]
+    lines = []
+    for line in make_table([]):
+        print(line, flush=True)
+        lines.append(line)
+    PAGE.write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
 
 
 def draw_screens(recordings: dict[str, Recording], path: str | Path) -> None:
@@ -334,5 +390,8 @@ def draw_picture(path: str, rows: list[str]) -> None:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--picture"]:
         draw_picture(sys.argv[2], sys.argv[3:])
+    elif sys.argv[1:] == ["--page"]:
+        write_page()
     else:
-        print_table(sys.argv[1:])
+        for table_line in make_table(sys.argv[1:]):
+            print(table_line, flush=True)
