@@ -333,13 +333,11 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
     """
     recalled = remembered.get(parts.rest)
     if recalled is None and folder is not None:
-        from pydantic import TypeAdapter, ValidationError
+        from osimlite.base.json_records import parse_record
 
         try:
-            recalled = TypeAdapter(RememberedMeasures).validate_json(
-                read_file(_cache_file(folder, parts)), strict=True
-            )
-        except (OsimliteError, ValidationError):
+            recalled = parse_record(RememberedMeasures, read_file(_cache_file(folder, parts)))
+        except (OsimliteError, ValueError, RecursionError):
             return None
         mark_used(_cache_file(folder, parts))
         remembered[parts.rest] = recalled
@@ -359,10 +357,10 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
     while len(remembered) > MAX_REMEMBERED_MODELS:
         remembered.popitem(last=False)
     if folder is not None:
-        from pydantic import ConfigDict, TypeAdapter
+        import json
 
-        adapter = TypeAdapter(RememberedMeasures, config=ConfigDict(ser_json_inf_nan="constants"))
-        write_cached(_cache_file(folder, parts), adapter.dump_json(entry))
+        text = json.dumps(entry, separators=(",", ":"))
+        write_cached(_cache_file(folder, parts), text.encode())
 
 
 def _cache_file(folder: Path, parts: TextParts) -> Path:
