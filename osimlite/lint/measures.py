@@ -333,11 +333,13 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
     """
     recalled = remembered.get(parts.rest)
     if recalled is None and folder is not None:
-        from osimlite.base.json_records import parse_record
+        from pydantic import TypeAdapter, ValidationError
 
         try:
-            recalled = parse_record(RememberedMeasures, read_file(_cache_file(folder, parts)))
-        except (OsimliteError, ValueError, RecursionError):
+            recalled = TypeAdapter(RememberedMeasures).validate_json(
+                read_file(_cache_file(folder, parts)), strict=True
+            )
+        except (OsimliteError, ValidationError):
             return None
         mark_used(_cache_file(folder, parts))
         remembered[parts.rest] = recalled
@@ -357,10 +359,10 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
     while len(remembered) > MAX_REMEMBERED_MODELS:
         remembered.popitem(last=False)
     if folder is not None:
-        import json
+        from pydantic import ConfigDict, TypeAdapter
 
-        text = json.dumps(entry, separators=(",", ":"))
-        write_cached(_cache_file(folder, parts), text.encode())
+        adapter = TypeAdapter(RememberedMeasures, config=ConfigDict(ser_json_inf_nan="constants"))
+        write_cached(_cache_file(folder, parts), adapter.dump_json(entry))
 
 
 def _cache_file(folder: Path, parts: TextParts) -> Path:

@@ -14,15 +14,17 @@ from typing import (
     TypeVar,
     cast,
     dataclass_transform,
+    get_type_hints,
 )
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.complaints import (
-    describe_invalid_value,
     describe_unknown_property,
     describe_unnamed_value,
+    describe_validation_error,
 )
-from osimlite.schema.declarations import DeclaredType, make_default_with
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
@@ -66,19 +68,21 @@ def are_equal(left: Any, right: Any) -> bool:
 
 
 if TYPE_CHECKING:
-    from inspect import Signature
+    from pydantic._internal._model_construction import ModelMetaclass
 
     from osimlite.schema.model import Model
+else:
+    ModelMetaclass = type(BaseModel)
 
 
-_SLOTS = ("_present", "_model", "_index", "_layout")
+_SLOTS = ("_model", "_index", "_layout")
 
 T = TypeVar("T", bound="Object")
 
 
 def make_empty_list() -> Any:
     """Return the default of a property that holds a list of objects: an empty list."""
-    return make_default_with(ObjectList)
+    return Field(default_factory=ObjectList)
 
 
 def make_default(cls: type[Object], **values: Any) -> Any:
@@ -89,8 +93,8 @@ def make_default(cls: type[Object], **values: Any) -> Any:
         values: its properties. A function is called for every new object, so that no two defaults
             share a part.
     """
-    return make_default_with(
-        lambda: cls.build(
+    return Field(
+        default_factory=lambda: cls.build(
             {name: value() if callable(value) else value for name, value in values.items()}, set()
         )
     )
@@ -98,8 +102,8 @@ def make_default(cls: type[Object], **values: Any) -> Any:
 
 # A docstring here would hide the property `__doc__`. Type checkers see the arguments of
 # constructors only if this metaclass itself is decorated, not one of its bases.
-@dataclass_transform(kw_only_default=True)
-class ObjectType(DeclaredType):  # noqa: D101
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
+class ObjectType(ModelMetaclass):  # noqa: D101
     @property
     def __doc__(cls) -> str | None:  # type: ignore[override]
         """Docstring of a class, followed by descriptions of its properties."""
@@ -110,15 +114,8 @@ class ObjectType(DeclaredType):  # noqa: D101
 
         return add_properties(cls, docstring)
 
-    @property
-    def __signature__(cls) -> Signature:
-        """Arguments of the constructor, for `inspect.signature` and editors."""
-        from osimlite.schema.descriptions import make_signature
 
-        return make_signature(cast("type[Object]", cls))
-
-
-class Object(metaclass=ObjectType):
+class Object(BaseModel, metaclass=ObjectType):
     """Named object with properties that an OpenSim document can hold.
 
     A subclass is declared with its properties in the order OpenSim prints them. ``tag`` gives the
@@ -127,7 +124,15 @@ class Object(metaclass=ObjectType):
     in a file.
     """
 
-    __slots__ = ("__dict__", *_SLOTS)
+    __slots__ = _SLOTS
+
+    model_config = ConfigDict(
+        extra="forbid",
+        defer_build=True,
+        validate_assignment=True,
+        validate_default=False,
+        protected_namespaces=(),
+    )
 
     tag: ClassVar[str] = ""
     abstract: ClassVar[bool] = True
@@ -157,12 +162,21 @@ class Object(metaclass=ObjectType):
             if spec is None or spec.name in properties:
                 raise MissingNameError(partial(describe_unknown_property, type(self), unknown))
             properties[spec.name] = properties.pop(unknown)
-        built = self.build(_check_values(type(self), properties), set(properties))
-        _put_state(self, built.__dict__)
-        _put_present(self, built.model_fields_set)
-        put_model(self, None)
-        put_index(self, None)
-        _put_layout(self, None)
+        values = _check_values(type(self), properties)
+        if values is not None:
+            built = self.build(values, set(properties))
+            _put_state(self, built.__dict__)
+            _put_present(self, built.model_fields_set)
+            _put_extra(self, None)
+            _put_private(self, None)
+        else:
+            try:
+                super().__init__(**properties)
+            except ValidationError as error:
+                raise ModelError(describe_validation_error(type(self), error)) from None
+        _set(self, "_model", None)
+        _set(self, "_index", None)
+        _set(self, "_layout", None)
 
     @classmethod
     def build(
@@ -193,6 +207,8 @@ class Object(metaclass=ObjectType):
         self = _new(cls)
         _put_state(self, state)
         _put_present(self, present)
+        _put_extra(self, None)
+        _put_private(self, None)
         put_model(self, home)
         put_index(self, index)
         _put_layout(self, None)
@@ -200,7 +216,7 @@ class Object(metaclass=ObjectType):
 
     @classmethod
     def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:
-        """Make an instance without validation, as :meth:`build`.
+        """Make an instance without validation; pydantic's name for :meth:`build`.
 
         Args:
             _fields_set: properties that count as set; all of `values` by default.
@@ -219,12 +235,6 @@ class Object(metaclass=ObjectType):
             Properties by XML tag.
         """
         return get_field_specs(cls)
-
-    @property
-    def model_fields_set(self) -> set[str]:
-        """Attributes that the text or Python code has set; the others have their defaults."""
-        present: set[str] = self._present
-        return present
 
     @property
     def source_index(self) -> Any:
@@ -290,11 +300,21 @@ class Object(metaclass=ObjectType):
                 raise MissingNameError(partial(describe_unknown_property, type(self), name))
             name = spec.name
         note_change(self._model, numbers_only=name in get_numeric_names(type(self)))
-        self.__dict__.update(_check_values(type(self), {name: value}))
-        self.model_fields_set.add(name)
+        values = _check_values(type(self), {name: value})
+        if values is not None:
+            self.__dict__.update(values)
+            self.model_fields_set.add(name)
+            return
+        try:
+            super().__setattr__(name, value)
+        except ValidationError as error:
+            raise ModelError(describe_validation_error(type(self), error)) from None
 
     def assign(self, name: str, value: Any) -> None:
         """Set a property to a value in its stored form, without validation.
+
+        Pydantic compiles the validation of a class when a property is set for the first time, which
+        takes milliseconds.
 
         Args:
             name: name of the property in Python.
@@ -314,23 +334,8 @@ class Object(metaclass=ObjectType):
 
     __hash__ = None  # type: ignore[assignment]
 
-    def model_copy(self, *, update: dict[str, Any] | None = None, deep: bool = False) -> Self:
-        """Return a copy, with other values of some properties.
-
-        Args:
-            update: values in their stored form, by attribute; they are not validated.
-            deep: whether the copy shares nothing with the original.
-        """
-        clone = copy.deepcopy(self) if deep else copy.copy(self)
-        if update:
-            clone.__dict__.update(update)
-            clone.model_fields_set.update(update)
-        return clone
-
     def __copy__(self) -> Self:
-        clone = _new(type(self))
-        _put_state(clone, self.__dict__.copy())
-        _put_present(clone, self.model_fields_set.copy())
+        clone = super().__copy__()
         put_model(clone, None)
         put_index(clone, self._index)
         _put_layout(clone, self._layout)
@@ -356,25 +361,15 @@ class Object(metaclass=ObjectType):
         return clone
 
     def __getstate__(self) -> dict[Any, Any]:
-        return {
-            "values": self.__dict__,
-            "present": self.model_fields_set,
-            "layout": self._layout,
-            "index": self._index,
-        }
+        return {**super().__getstate__(), "layout": self._layout, "index": self._index}
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
-        _put_state(self, state["values"])
-        _put_present(self, state["present"])
-        put_model(self, None)
-        put_index(self, state["index"])
-        _put_layout(self, state["layout"])
+        _set(self, "_model", None)
+        _set(self, "_index", state.pop("index"))
+        _set(self, "_layout", state.pop("layout"))
+        super().__setstate__(state)
 
-    def __iter__(self) -> Iterator[tuple[str, Any]]:
-        """Yield the names and values of attributes, without defaults that were never accessed."""
-        yield from self.__dict__.items()
-
-    def __rich_repr__(self) -> Iterator[tuple[str, Any]]:
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         if self.name:
             yield "name", self.name
         for spec in get_field_specs(type(self)).values():
@@ -382,16 +377,21 @@ class Object(metaclass=ObjectType):
             if spec.name in self.model_fields_set and not isinstance(value, (list, Object)):
                 yield spec.name, value
 
-    def __repr__(self) -> str:
-        values = (f"{name}={value!r}" for name, value in self.__rich_repr__())
-        return f"{type(self).__name__}({', '.join(values)})"
+    __str__ = BaseModel.__repr__
 
 
 # The setters of the slots are a third faster than setattr.
 _new = object.__new__
-_put_state, _put_present, put_model, put_index, _put_layout = (
-    vars(Object)[name].__set__ for name in ("__dict__", *_SLOTS)
+_put_state, _put_present, _put_extra, _put_private = (
+    BaseModel.__dict__[name].__set__
+    for name in (
+        "__dict__",
+        "__pydantic_fields_set__",
+        "__pydantic_extra__",
+        "__pydantic_private__",
+    )
 )
+put_model, put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
 
 
 class Component(Object, abstract=True):
@@ -459,20 +459,26 @@ class Unknown(ModelComponent, abstract=True):
         )
 
 
-def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, Any]:
-    """Return properties in their stored form.
+# For every class pydantic evaluates all annotations of its bases again, unless they are evaluated
+# already. Annotations that are not fields it remembers, so they can be dropped.
+for _base in (Object, Component):
+    _hints = get_type_hints(_base, include_extras=True)
+    _base.__annotations__ = {
+        name: _hints[name] for name in _base.__annotations__ if name in _base.model_fields
+    }
 
-    Raises:
-        ModelError: a value does not fit its property.
-    """
+_set = object.__setattr__
+
+
+def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, Any] | None:
+    """Return properties in their stored form; None if pydantic has to validate or to report an error."""
     checks = make_checks(cls)
-    values = {}
-    for name, value in properties.items():
-        try:
-            values[name] = checks[name](value)
-        except ValueError as error:
-            raise ModelError(describe_invalid_value(cls, name, value, str(error))) from None
-    return values
+    if checks is None or not properties.keys() <= checks.keys():
+        return None
+    try:
+        return {name: checks[name](value) for name, value in properties.items()}
+    except ValueError:
+        return None
 
 
 _NAMING = -1
@@ -507,6 +513,8 @@ def _copy_object(
     clone = memo[id(item)] = _new(type(item))
     _put_state(clone, state)
     _put_present(clone, item.model_fields_set.copy())
+    _put_extra(clone, None)
+    _put_private(clone, None)
     put_model(clone, home)
     put_index(clone, item._index)
     _put_layout(clone, None if item.layout is None else copy.deepcopy(item.layout, memo))

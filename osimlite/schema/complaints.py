@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
 
@@ -29,20 +31,22 @@ def describe_unknown_property(cls: type[Object], name: str) -> str:
     return f"{cls.__name__} has no property '{name}'{better}"
 
 
-def describe_invalid_value(cls: type[Object], name: str, value: object, reason: str) -> str:
-    """Return the message for a value that does not fit a property, in one line.
+def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
+    """Return the message for a value that pydantic rejects, in one line.
 
     Args:
         cls: the class.
-        name: the property.
-        value: the value.
-        reason: what is wrong with it.
+        error: pydantic's error.
     """
+    first_error = error.errors()[0]
+    location = ".".join(str(part) for part in first_error["loc"]) or "?"
+    reason = first_error["msg"].removeprefix("Value error, ")
+    value = first_error.get("input")
     angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", value) if isinstance(value, str) else None
     hint = (
         f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
     )
-    return f"{cls.__name__}.{name}: {reason}{hint}"
+    return f"{cls.__name__}.{location}: {reason}{hint}"
 
 
 def describe_unnamed_value(cls: type[Object], value: object) -> str:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from typing import Any
 
 from osimlite.base.syntax_trees import parse_module
 from osimlite.schema.base import Object
@@ -76,35 +74,6 @@ def add_properties(cls: type[Object], docstring: str) -> str:
         )
         rows.append(textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="        "))
     return "\n".join(rows)
-
-
-def make_signature(cls: type[Object]) -> inspect.Signature:
-    """Return the signature of the constructor of a class: all attributes, by name only."""
-    return inspect.Signature(
-        [
-            inspect.Parameter(
-                name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=(
-                    declaration.default
-                    if declaration.default_factory is None
-                    else _Made(declaration.default_factory)
-                ),
-                annotation=declaration.annotation,
-            )
-            for name, declaration in cls.model_fields.items()
-        ]
-    )
-
-
-class _Made:
-    """Stands in a signature for a default that is made for every object anew."""
-
-    def __init__(self, make: Callable[[], Any]) -> None:
-        self.make = make
-
-    def __repr__(self) -> str:
-        return "..."
 
 
 def _format_property(value: object) -> str:

@@ -11,6 +11,8 @@ import re
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
+from pydantic_core import core_schema
+
 from osimlite.base.records import dataclass
 
 if TYPE_CHECKING:
@@ -29,7 +31,10 @@ _FIXED_SIZE: Final = {"Vec2": 2, "Vec3": 3, "Vec6": 6, "Transform": 6}
 
 
 class FieldType:
-    """Base class of all markers."""
+    """Base class of all markers.
+
+    It gives pydantic a validator that does not build those of other component classes.
+    """
 
     __slots__ = ()
 
@@ -44,6 +49,12 @@ class FieldType:
             ValueError: the value does not fit the property.
         """
         raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        accepts = find_class(source)
+        return core_schema.no_info_plain_validator_function(
+            lambda value: self.check(value, accepts)
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,11 @@ coordinates are.
 import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+from pydantic import Field
+
 from osimlite.errors import ModelError
 from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.declarations import make_default_with
 from osimlite.schema.facts import FLAT, NAN, Facts
 from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
@@ -110,8 +111,10 @@ def _make_coordinates_field(count: int) -> Any:
     Returns:
         A field whose default is a new list for each joint.
     """
-    return make_default_with(
-        lambda: ObjectList(Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count))
+    return Field(
+        default_factory=lambda: ObjectList(
+            Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count)
+        )
     )
 
 

@@ -9,9 +9,10 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, Any
 
+from pydantic import Field
+
 from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.base import ModelComponent, make_default
-from osimlite.schema.declarations import make_default_with
 from osimlite.schema.default_curves import (
     make_active_force_length,
     make_force_velocity,
@@ -552,15 +553,15 @@ class RigidTendonMuscle(Muscle):
         scales={"optimal_fiber_length": "", "tendon_slack_length": ""},
     )
 
-    active_force_length_curve: Single[Function] = make_default_with(
-        partial(make_active_force_length, "active_force_length_curve")
+    active_force_length_curve: Single[Function] = Field(
+        default_factory=partial(make_active_force_length, "active_force_length_curve")
     )
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: Single[Function] = make_default_with(
-        partial(make_passive_force_length, "passive_force_length_curve")
+    passive_force_length_curve: Single[Function] = Field(
+        default_factory=partial(make_passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised; kept between 0 and 10."""
-    force_velocity_curve: Single[Function] = make_default_with(
-        partial(make_force_velocity, "force_velocity_curve")
+    force_velocity_curve: Single[Function] = Field(
+        default_factory=partial(make_force_velocity, "force_velocity_curve")
     )
     """Factor of the active force over fiber velocity, normalised."""

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated
 
-from osimlite.schema.declarations import make_default_with
+from pydantic import Field
+
 from osimlite.schema.default_curves import (
     make_active_force_length,
     make_force_velocity,
@@ -78,16 +79,16 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """Rate of falling activation, per time scale; also part of the rise."""
     damping: Annotated[float, real(domain=">= 0")] = 0.1
     """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
-    tendon_force_length_curve: Single[Function] = make_default_with(
-        partial(make_tendon_force_length, "tendon_force_length_curve")
+    tendon_force_length_curve: Single[Function] = Field(
+        default_factory=partial(make_tendon_force_length, "tendon_force_length_curve")
     )
     """Force of the tendon over its strain."""
-    active_force_length_curve: Single[Function] = make_default_with(
-        partial(make_active_force_length, "active_force_length_curve")
+    active_force_length_curve: Single[Function] = Field(
+        default_factory=partial(make_active_force_length, "active_force_length_curve")
     )
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: Single[Function] = make_default_with(
-        partial(make_passive_force_length, "passive_force_length_curve")
+    passive_force_length_curve: Single[Function] = Field(
+        default_factory=partial(make_passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised."""
 
@@ -110,17 +111,17 @@ class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """Rate of falling activation, per time scale; also part of the rise."""
     mass: Annotated[float, real(domain="> 0", legacy=True)] = 0.00287
     """Mass between fiber and tendon, normalised by force, time scale and optimal fiber length."""
-    tendon_force_length_curve: LegacyOptional[Function] = make_default_with(
-        make_tendon_force_length
+    tendon_force_length_curve: LegacyOptional[Function] = Field(
+        default_factory=make_tendon_force_length
     )
     """Force of the tendon over its strain."""
-    active_force_length_curve: LegacyOptional[Function] = make_default_with(
-        make_active_force_length
+    active_force_length_curve: LegacyOptional[Function] = Field(
+        default_factory=make_active_force_length
     )
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: LegacyOptional[Function] = make_default_with(
-        make_passive_force_length
+    passive_force_length_curve: LegacyOptional[Function] = Field(
+        default_factory=make_passive_force_length
     )
     """Passive force over fiber length, both normalised."""
-    force_velocity_curve: LegacyOptional[Function] = make_default_with(make_force_velocity)
+    force_velocity_curve: LegacyOptional[Function] = Field(default_factory=make_force_velocity)
     """Factor of the active force over fiber velocity, normalised."""

@@ -4,8 +4,9 @@ import math
 from functools import partial
 from typing import Annotated
 
+from pydantic import Field
+
 from osimlite.schema.base import make_default
-from osimlite.schema.declarations import make_default_with
 from osimlite.schema.default_curves import make_passive_force_length
 from osimlite.schema.facts import NAN, PATH, Facts
 from osimlite.schema.fields import Flag, Single, Tag, Text, real
@@ -76,8 +77,8 @@ class Ligament(ForceProducer):
     """Length of the path up to which the ligament is slack."""
     pcsa_force: Annotated[float, real("N", ">= 0")] = 0.0
     """Factor of the curve, from the cross-section of the ligament."""
-    force_length_curve: Single[Function] = make_default_with(
-        partial(make_passive_force_length, "force_length_curve")
+    force_length_curve: Single[Function] = Field(
+        default_factory=partial(make_passive_force_length, "force_length_curve")
     )
     """Tension over `pcsa_force`, as a function of length over resting length."""
 

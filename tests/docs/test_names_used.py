@@ -116,7 +116,7 @@ def check_keywords(call: ast.Call, function: Any) -> None:
     if not inspect.isfunction(function) and not inspect.isclass(function):
         return
     if inspect.isclass(function) and issubclass(function, Object):
-        # Its signature lacks the tags.
+        # Its signature is complete only after pydantic has built a validator, and lacks the tags.
         accepted = {"name", *function.model_fields, *function.field_specs()}
         assert {keyword.arg for keyword in call.keywords} - {None} <= accepted, ast.unparse(call)
         return
