@@ -10,8 +10,8 @@ this one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the m
 NaN accelerations, and the linter has no new error; it is *false* if OpenSim loads and initialises
 the model and an error says that it does not. The models are those of `shared/corpus`.
 
-OpenSim and the linters look at a model at the same time, in child processes. A model that it does not finish within the limit of
-seconds counts for neither side.
+OpenSim and the linters look at a model at the same time, in child processes. A model that OpenSim
+does not finish within the limit of seconds counts for neither side.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ import json, sys
 from osimlite.lint import validate
 from osimlite.simulation.elements.geometries.paths import scholz2015_geometry_path as paths
 
-# The search for a cable takes seconds, and most edits do not change its input.
+# The linter searches for the cable of a Scholz2015GeometryPath in Python, which takes seconds. Most
+# edits do not change the input of the search, so results are kept by their exact input.
 search, results = paths.cable_path, {}
 
 def search_once(ints, numbers, work, *others):
@@ -192,14 +193,6 @@ class Judge:
         self._requests, self._answers = os.fdopen(requests, "w"), os.fdopen(answers)
 
 
-def ask_opensim(path: Path) -> str:
-    """Return what OpenSim does with one file, in a process of its own."""
-    judge = Judge()
-    verdict = judge.ask(path)
-    judge.close()
-    return verdict
-
-
 def read_models(shared: Path, folder: Path, names: Sequence[str] = ()) -> list[Path]:
     """Return copies of the models of the corpus that OpenSim runs, each in a folder with its files.
 
@@ -211,6 +204,7 @@ def read_models(shared: Path, folder: Path, names: Sequence[str] = ()) -> list[P
     import shutil
 
     result = []
+    judge = Judge()
     for source in sorted((shared / "corpus" / "models").glob("*/*.osim")):
         if source.stat().st_size > LARGEST_BYTES or b"<Model" not in source.read_bytes():
             continue
@@ -219,8 +213,9 @@ def read_models(shared: Path, folder: Path, names: Sequence[str] = ()) -> list[P
         home = folder / source.parent.name
         shutil.copytree(source.parent, home)
         path = home / source.name
-        if ask_opensim(path) == "runs":
+        if judge.ask(path) == "runs":
             result.append(path)
+    judge.close()
     return result
 
 

@@ -105,12 +105,13 @@ class _Task:
             )
         elapsed = now - self.started
         details = []
-        # A total of 1 is a part of the work, of which the beginning says nothing.
-        if self.total and (self.done or self.total != 1.0):
+        # With a total of 1, `done` is a fraction of the work. It has no unit, and a fraction of 0
+        # would not show how much work there is.
+        counts_items = self.total != 1.0
+        if self.total and (self.done or counts_items):
             fraction = min(1.0, self.done / self.total)
             amount = f" ({_format(self.done)} of {_format(self.total)}{self.unit})"
-            # A total of 1 is a part of the work, which has no unit.
-            details += [f"{100.0 * fraction:.0f} %{amount if self.total != 1.0 else ''}"]
+            details += [f"{100.0 * fraction:.0f} %{amount if counts_items else ''}"]
             if self.details:
                 details.append(self.details)
             if elapsed > ESTIMATE_S and fraction < 1.0:

@@ -11,12 +11,12 @@ from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_for
 from osimlite.mechanics.laws.vectors import ZERO
 from osimlite.mechanics.multibody.spatial import rotation_xyz
 from osimlite.schema.contact import ContactEllipsoid
+from tests.suite import choose
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402
-from tests.suite import choose  # noqa: E402
 
 MATERIAL = {
     "Stiffness": 1e6,

@@ -17,13 +17,13 @@ from osimlite.schema.paths import (
     PathPoint,
     PathWrap,
 )
+from tests.suite import choose
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402
 from tests.oracle.opensim_paths import compare_paths  # noqa: E402
-from tests.suite import choose  # noqa: E402
 
 GROUND, B0, B1, B2, F1, F2, STUCK = (
     *(

@@ -158,7 +158,7 @@ def test_report_times(to, interval, times):
 def test_progress_needs_no_recorded_row(pendulum, engine, fixed_step):
     seen = []
     choices = {} if fixed_step is None else {"fixed_step": fixed_step}
-    # PyBullet's steps are in Python, each of which reports its progress.
+    # The steps of PyBullet are taken in Python and are slow, and each one reports progress.
     duration = 30.0 if engine == "compiled" or fixed_step is None else 1.0
     motion = osimlite.simulate(
         pendulum,

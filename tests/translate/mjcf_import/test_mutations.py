@@ -24,32 +24,32 @@ ATTRIBUTE = re.compile(r" [a-z0-9]+=\"[^\"]*\"")
 ELEMENT = re.compile(r"<[a-z][^<>]*/>")
 
 
-def damage(text: str, choose: random.Random) -> str:
+def damage(text: str, draw: random.Random) -> str:
     """Return the text with one change of a random kind."""
-    kind = choose.randrange(7)
+    kind = draw.randrange(7)
     if kind == 0:
-        return _replace(text, NUMBER, choose, lambda _: choose.choice(NUMBERS))
+        return _replace(text, NUMBER, draw, lambda _: draw.choice(NUMBERS))
     if kind == 1:
-        return _replace(text, ATTRIBUTE, choose, lambda _: "")
+        return _replace(text, ATTRIBUTE, draw, lambda _: "")
     if kind == 2:
-        return _replace(text, ELEMENT, choose, lambda _: "")
+        return _replace(text, ELEMENT, draw, lambda _: "")
     if kind == 3:
-        return _replace(text, ELEMENT, choose, lambda found: found * 2)
+        return _replace(text, ELEMENT, draw, lambda found: found * 2)
     if kind == 4 or not text:
-        return text[: choose.randrange(len(text) + 1)]
+        return text[: draw.randrange(len(text) + 1)]
     if kind == 5:
-        place = choose.randrange(len(text))
-        return text[:place] + chr(choose.randrange(32, 0x250)) + text[place + 1 :]
+        place = draw.randrange(len(text))
+        return text[:place] + chr(draw.randrange(32, 0x250)) + text[place + 1 :]
     # An attribute of another element.
-    other = choose.choice(ATTRIBUTE.findall(text) or [""])
-    return _replace(text, ATTRIBUTE, choose, lambda _: other)
+    other = draw.choice(ATTRIBUTE.findall(text) or [""])
+    return _replace(text, ATTRIBUTE, draw, lambda _: other)
 
 
-def _replace(text, pattern, choose, make):
+def _replace(text, pattern, draw, make):
     places = list(pattern.finditer(text))
     if not places:
         return text
-    found = choose.choice(places)
+    found = draw.choice(places)
     return text[: found.start()] + make(found[0]) + text[found.end() :]
 
 

@@ -8,11 +8,11 @@ import pytest
 import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.jumper import jumper
+from tests.suite import choose
 
 mujoco = pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
 
 from osimlite.translate.mjcf.poses import draw_values  # noqa: E402
-from tests.suite import choose  # noqa: E402
 
 LENGTHS = {"gait10dof18musc": 4e-3, "jumper": 1e-3}
 """Largest root mean square error (m) of a path after both translations."""
