@@ -27,7 +27,9 @@ from rich.table import Table
 from _corpus import CORPUS
 
 REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"
-WALKER = Path(__file__).resolve().parent.parent / "fixtures/walker/DynamicWalkerModel.osim"
+FIXTURES = Path(__file__).resolve().parent.parent / "fixtures"
+WALKER = FIXTURES / "walker/DynamicWalkerModel.osim"
+STEPS = FIXTURES / "pipelines/walking"
 TOOL = (
     "import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}('{setup}').run()"
 )
@@ -64,18 +66,48 @@ def unpack(folder: Path, source: str) -> Path:
     return target
 
 
+def unpack_model(name: str, target: Path) -> None:
+    """Write a model of the reference data, uncompressed."""
+    target.write_bytes(gzip.decompress((REFERENCE / "models" / f"{name}.osim.gz").read_bytes()))
+
+
+def unpack_steps(folder: Path) -> Path:
+    """Put the files of the tools that track steps of gait10 into a folder; return where it is."""
+    target = unpack(folder, "analyses_gait10")
+    for setup in STEPS.iterdir():
+        shutil.copy(setup, target)
+    # The setups have names of their own for the same files.
+    for name, source in (("loads.xml", "grf.xml"), ("reserves.xml", "reserve.xml")):
+        shutil.copy(target / source, target / name)
+    unpack_model("gait10_subject01", target / "model.osim")
+    return target
+
+
 def list_cases(folder: Path) -> list[Case]:
     """Return what is timed, with its files put below a folder."""
     osimlite = [sys.executable, "-m", "osimlite"]
     cases = []
+    gait2354 = unpack(folder, "ik_id_gait2354")
+    unpack_model("gait2354_subject01_simbody", gait2354 / "subject01_simbody.osim")
+    # Inverse dynamics reads what inverse kinematics writes; either may be chosen alone.
+    shutil.copy(gait2354 / "ik_accuracy_1e-5.mot", gait2354 / "subject01_walk1_ik.mot")
+    steps = unpack_steps(folder)
     for name, source, setup in (
-        ("ForwardTool", "forward_arm26", "fwd.xml"),
-        ("ScaleTool", "scale_gait2354", "scale.xml"),
+        ("ForwardTool", unpack(folder, "forward_arm26"), "fwd.xml"),
+        ("ScaleTool", unpack(folder, "scale_gait2354"), "scale.xml"),
+        ("InverseKinematicsTool", gait2354, "subject01_Setup_IK.xml"),
+        ("InverseDynamicsTool", gait2354, "subject01_Setup_InverseDynamics.xml"),
+        # Static optimization
+        (
+            "AnalyzeTool",
+            unpack(folder, "so_arm26_bounds"),
+            "arm26_bounds_Setup_StaticOptimization.xml",
+        ),
+        ("RRATool", steps, "rra.xml"),
+        ("CMCTool", steps, "cmc.xml"),
     ):
         theirs = [sys.executable, "-c", TOOL.format(tool=name, setup=setup)]
-        cases.append(
-            Case(name, unpack(folder, source), [*osimlite, "run", setup, "--overwrite"], theirs)
-        )
+        cases.append(Case(name, source, [*osimlite, "run", setup, "--overwrite"], theirs))
     walker = folder / "walker"
     walker.mkdir()
     shutil.copy(WALKER, walker)
