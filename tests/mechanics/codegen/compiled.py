@@ -30,7 +30,18 @@ SIZE = 40
 
 
 def compile_text(folder, text, *flags, compiler=COMPILER, name="kernels"):
-    """Compile C++ text without a warning, and return the library.
+    """Compile C++ text without a warning, and return the loaded library.
+
+    The arguments are those of `build_library`.
+    """
+    library = build_library(folder, text, *flags, compiler=compiler, name=name)
+    return ctypes.CDLL(str(library))
+
+
+def build_library(folder, text, *flags, compiler=COMPILER, name="kernels"):
+    """Compile C++ text without a warning, and return the path of the library.
+
+    A library with a sanitizer must not be loaded here: it ends a process that did not start with it.
 
     Args:
         folder: for the files.
@@ -47,7 +58,7 @@ def compile_text(folder, text, *flags, compiler=COMPILER, name="kernels"):
         [*command, source.name, "-o", library.name], cwd=folder, capture_output=True, text=True
     )
     assert result.returncode == 0, result.stderr[:5000]
-    return ctypes.CDLL(str(library))
+    return library
 
 
 def call_library(library, symbol, ints, floats, count):
