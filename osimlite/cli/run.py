@@ -323,12 +323,12 @@ def _show_trials(trials: list[RunRecord]) -> None:
     for trial in visible_trials:
         result_text = trial.message or "; ".join(f"{name} {fact}" for name, fact in trial.told[:2])
         if trial.warnings:
-            more = (
+            remark = (
                 f"; and {format_count(len(trial.warnings) - 1, 'warning')} more"
                 if len(trial.warnings) > 1
                 else ""
             )
-            result_text = f"{result_text}; {trial.warnings[0]}{more}"
+            result_text = f"{result_text}; {trial.warnings[0]}{remark}"
         # A setup that a former run did has no time of this run.
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
         status = trial.status + (", before" if trial.was_done else "")
@@ -338,9 +338,9 @@ def _show_trials(trials: list[RunRecord]) -> None:
     status_text = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):
         status_text += f", {warned} with warnings"
-    more = (
+    remark = (
         f" ({len(visible_trials)} shown: those that failed or whose markers are farthest off)"
         if visible_trials is not trials
         else ""
     )
-    show(f"{format_count(len(trials), 'setup')}: {status_text}{more}\n")
+    show(f"{format_count(len(trials), 'setup')}: {status_text}{remark}\n")

@@ -120,16 +120,18 @@ class CasadiModel(SymbolicModel):
         f = workspace.f.cells
         # Rows of values and auxiliary states: given rate less computed rate. Those of speeds are
         # forces, which replace them below.
-        rows = [given - computed_rate for given, computed_rate in zip(xdot, f, strict=True)]
+        rows = [
+            given_rate - computed_rate for given_rate, computed_rate in zip(xdot, f, strict=True)
+        ]
         rows[size : 2 * size] = f[size : 2 * size]
         if self.constraint_count:
             constraint_forces = self._constraint_errors["jacobian"].T @ self._symbols["multipliers"]
             rows[size : 2 * size] = [
                 rows[size + k] + constraint_forces[self._find_coordinate(k)] for k in range(size)
             ]
-        given = "t", "x", "xdot", "u", "p", "multipliers"
+        inputs = "t", "x", "xdot", "u", "p", "multipliers"
         return self._make_function(
-            "residual", given, {"residual": workspace.mask_failures(self._sort_by_model(rows))}
+            "residual", inputs, {"residual": workspace.mask_failures(self._sort_by_model(rows))}
         )
 
     def _find_coordinate(self, k: int) -> int:

@@ -30,7 +30,7 @@ from osimlite.mechanics.codegen.reader import (
 from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.functions import evaluate_piecewise
 from osimlite.mechanics.laws.bezier import curve_value
-from osimlite.mechanics.laws.dual_numbers import is_nothing
+from osimlite.mechanics.laws.dual_numbers import is_exact_zero
 from osimlite.mechanics.laws.millard2012_equilibrium import damped_velocity
 from osimlite.mechanics.laws.rotations import sine_cosine
 
@@ -97,7 +97,7 @@ _counterparts: dict[Any, Any] = {
     pointers.at: _slice_vector,
     pointers.call: _call_law,
     sine_cosine: symbols.sine_cosine,
-    is_nothing: symbols.is_zero,
+    is_exact_zero: symbols.is_zero,
     curve_value: evaluate_curve,
     damped_velocity: solve_damped_velocity,
     evaluate_piecewise: evaluate_pieces,

@@ -184,7 +184,7 @@ class FitLayout:
             FIT.TURNED: 9 * links,
             FIT.ROWS: equations * size,
             FIT.ERRORS: equations,
-            FIT.ROOM: max(
+            FIT.WORKSPACE: max(
                 scratch_size,
                 2 * size
                 + max(

@@ -250,14 +250,16 @@ class ControllerRuns:
         plan, senses = first_controller.plan.copy(), first_controller.senses
         # All runs use the memory of the longest delay.
         plan[REFLEXES.KEPT] = max(controller.plan[REFLEXES.KEPT] for controller in controllers)
-        plan[REFLEXES.ROOM] = max(controller.plan[REFLEXES.ROOM] for controller in controllers)
+        plan[REFLEXES.MEMORY_SIZE] = max(
+            controller.plan[REFLEXES.MEMORY_SIZE] for controller in controllers
+        )
         control_offsets = find_constant_offsets(engine, controls)[
             [controls.names.index(path) for path in first_controller.paths]
         ]
-        self._room = np.zeros((count, plan[REFLEXES.ROOM]))
+        self._memory = np.zeros((count, plan[REFLEXES.MEMORY_SIZE]))
         rows = np.zeros((count, senses[SENSES.SIZE]))
         # UNKNOWN lets the first sensors decide the state of a leg; legs without states keep 0.
-        self._room[:, :LEGS] = (
+        self._memory[:, :LEGS] = (
             LEG_STATE.UNKNOWN if plan[REFLEXES.HAS_STATES] else LEG_STATE.EARLY_STANCE
         )
         self._excitations = np.zeros((count, len(first_controller.paths)))
@@ -272,7 +274,7 @@ class ControllerRuns:
         numbers = np.concatenate([controller.numbers for controller in controllers])
         self.parts = (
             *(senses, known, control_offsets, plan, numbers),
-            *(self._room, rows, self._excitations, self._record, self._progress),
+            *(self._memory, rows, self._excitations, self._record, self._progress),
         )
 
     def _restore_memory(self, plan: Ints, earlier_record: StoTable) -> None:
@@ -285,7 +287,7 @@ class ControllerRuns:
         frame_count = self.controller.count_steps(earlier_record.times[-1]) + 1
         history_size = int(plan[REFLEXES.KEPT])
         sensor_count = len(self.controller.sensors)
-        history = self._room[0, LEGS : LEGS + history_size * sensor_count].reshape(
+        history = self._memory[0, LEGS : LEGS + history_size * sensor_count].reshape(
             history_size, sensor_count
         )
         for age, row in enumerate(earlier_record.rows[: -1 - history_size : -1]):
@@ -293,7 +295,7 @@ class ControllerRuns:
             # the frame.
             history[(frame_count - 1 - age) % history_size] = row[:sensor_count]
         last_row = earlier_record.rows[-1, sensor_count:]
-        self._room[0, :LEGS], self._excitations[0], self.next_step = (
+        self._memory[0, :LEGS], self._excitations[0], self.next_step = (
             last_row[:LEGS],
             last_row[LEGS:-1],
             float(last_row[-1]),

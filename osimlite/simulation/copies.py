@@ -71,11 +71,13 @@ class Copies:
             for first in range(0, count, COPIES_PER_TASK)
         ]
         # Each core has its own copy of the model's numbers, which fits into its cache.
-        self._rooms = [
+        self._workspaces = [
             (self.batch.make_workspace(), engine.numbers.copy())
             for _ in range(min(count_cores(), count))
         ]
-        self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
+        self._pool = (
+            ThreadPoolExecutor(len(self._workspaces) - 1) if len(self._workspaces) > 1 else None
+        )
 
     @property
     def states(self) -> Array:
@@ -153,10 +155,10 @@ class Copies:
         futures = (
             []
             if self._pool is None
-            else [self._pool.submit(run_ranges, *workspace) for workspace in self._rooms[1:]]
+            else [self._pool.submit(run_ranges, *workspace) for workspace in self._workspaces[1:]]
         )
         try:
-            run_ranges(*self._rooms[0])
+            run_ranges(*self._workspaces[0])
         finally:
             # Wait also after Ctrl-C, so that no other thread still uses the workspaces.
             for future in futures:

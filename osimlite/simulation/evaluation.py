@@ -484,7 +484,7 @@ class StateEvaluator:
             raise self.state.make_length_error(moments.shape[1] - 1)
         law = "evaluate" if udot is None else "inverse"
         code = self.program.code
-        code.make_ready(("look", law))
+        code.make_ready(("evaluate_states", law))
         accelerations = np.empty((len(moments), 0)) if udot is None else udot
         inputs = np.ascontiguousarray(np.hstack([moments, accelerations]))
         result = np.empty((len(moments), len(offsets)))
@@ -493,7 +493,7 @@ class StateEvaluator:
             dtype=np.int64,
         )
         arguments = self.program.ints, self.numbers, self._w, self._y, self._f, stage
-        entry = code.get_entry("look")
+        entry = code.get_entry("evaluate_states")
         title = "evaluating the motion" if udot is None else "computing generalized forces"
         for rows in divide_rows(title, len(inputs)):
             order[0] = rows.stop - rows.start

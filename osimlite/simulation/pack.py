@@ -209,7 +209,7 @@ class Packer(LinkPacker):
             # Runs that are too short get no kernel, and their items are evaluated singly.
             if end - first >= MIN_BATCHED_ITEMS and kernel:
                 self.runs[len(self.ints)] = kernel
-            self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=curve_work)
+            self.ints += RUN.record(LAW=0, FIRST=first, END=end, WORKSPACE=curve_work)
         return result
 
     def make_item_head(self, record_offset: int, first_contact: int) -> list[int]:

@@ -77,7 +77,7 @@ class _OnSurface(NamedTuple):
 class PathSystem(System):
     """Paths with the mechanism on which they lie, all of whose coordinates are free."""
 
-    entries = ("evaluate", "watch")
+    entries = ("evaluate", "evaluate_items")
 
     def measure_paths(self, q: Array, u: Array, quantity_offset: int) -> Array:
         """Return the length or speed of each path.
@@ -308,7 +308,7 @@ class PathSystem(System):
         arguments = self.program.ints, self.numbers, self._w, self._y, self._f, len(states)
         try:
             self._run_kernel(
-                self.program.code.get_entry("watch"),
+                self.program.code.get_entry("evaluate_items"),
                 *arguments,
                 states,
                 np.concatenate((request, path_indices)),

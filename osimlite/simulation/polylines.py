@@ -80,7 +80,7 @@ class Polylines:
         numbers: numbers of the mechanism and of the paths.
         items: offsets of the paths in the structure.
         traces: indices of the laws that trace them.
-        room: largest number of corners of a path.
+        most_corners: largest number of corners of a path.
         work: length of the work vector.
     """
 
@@ -92,7 +92,7 @@ class Polylines:
         ints = [*program.model]
         numbers = [*program.reals]
         self.work = program.model[MODEL.WORK_SIZE]
-        self.room = 0
+        self.most_corners = 0
         self.bound = bool(routes) and not all(
             isinstance(item, Lock) for item in mechanism.constraints
         )
@@ -125,12 +125,12 @@ class Polylines:
             self.traces.append(self._number_law(route.trace))
             for curve in route.curves:
                 ints.append(self._number_law(curve, len(ints)))
-            self.room = max(self.room, route.corners)
+            self.most_corners = max(self.most_corners, route.corners)
         self.structure = np.array(ints, dtype=np.int64)
         self.numbers = np.array(numbers)
         self._w = np.zeros(self.work)
         self._y = np.zeros(2 * len(program.order))
-        self._f = np.zeros(3 * self.room)
+        self._f = np.zeros(3 * self.most_corners)
         # The first body of each link.
         links, bodies = np.unique(program.links[:-1], return_index=True)
         self._bodies = bodies[links >= 0]

@@ -313,7 +313,7 @@ class System(StateEvaluator):
             actuators.
         """
         code, size = self.program.code, len(self.order)
-        code.make_ready(("push_each", "inverse"))
+        code.make_ready(("push_each_actuator", "inverse"))
         item_offsets = {
             self.forces.elements[owner].path: offset for offset, owner in self._owners.items()
         }
@@ -339,7 +339,7 @@ class System(StateEvaluator):
             self._f,
             code.get_address("inverse"),
         )
-        entry, plan = code.get_entry("push_each"), np.array(order, dtype=np.int64)
+        entry, plan = code.get_entry("push_each_actuator"), np.array(order, dtype=np.int64)
         for rows in divide_rows("computing the force of each muscle", len(moments)):
             plan[0] = rows.stop - rows.start
             status = self._run_kernel(entry, *arguments, inputs[rows], plan, result[rows])

@@ -60,7 +60,7 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
         "laws": paths.laws[1:],
         "items": paths.items,
         "traces": paths.traces,
-        "room": paths.room,
+        "most_corners": paths.most_corners,
         "work": paths.work,
         "order": program.order,
         "couplers": [list(map(int, record)) for record in coupled],

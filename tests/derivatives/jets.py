@@ -15,7 +15,7 @@ import numpy as np
 
 from osimlite.mechanics.kernels.dynamics import evaluate
 from osimlite.mechanics.kernels.layout import MODEL, STAGE, WORK
-from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
+from osimlite.mechanics.laws.dual_numbers import differentiate_root, is_exact_zero
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.engines.linking import PYTHON_CODE, Program
 
@@ -181,18 +181,18 @@ MATHEMATICS: dict[str, Callable[..., Any]] = {name: _of_one(name) for name in SL
 }
 
 
-def _settled(root: Any, error: Any, slope: Any) -> Any:
+def _differentiate_root(root: Any, error: Any, slope: Any) -> Any:
     if not isinstance(error, Jet):
         return root
     by, own = 1.0 / float(slope), root if isinstance(root, Jet) else Jet(root, 0.0, 0.0, 0.0)
     return Jet(own.v, own.g - by * error.g, own.a - by * error.a, own.h)
 
 
-def _is_nothing(number: Any) -> bool:
+def _is_exact_zero(number: Any) -> bool:
     return number == 0.0 and not (isinstance(number, Jet) and (np.any(number.g) or number.a))
 
 
-SAID = {settled: _settled, is_nothing: _is_nothing}
+SAID = {differentiate_root: _differentiate_root, is_exact_zero: _is_exact_zero}
 """What laws say of derivatives."""
 OURS = "osimlite.mechanics.laws", "osimlite.mechanics.kernels", "osimlite.simulation.elements"
 """Where kernels and laws are."""
@@ -212,7 +212,7 @@ def _carried(functions: list[Any]) -> Iterator[None]:
             if getattr(value, "__module__", "") == "math":
                 changed.append((scope, name, value))
                 scope[name] = MATHEMATICS[value.__name__]
-            elif value is settled or value is is_nothing:
+            elif value is differentiate_root or value is is_exact_zero:
                 changed.append((scope, name, value))
                 scope[name] = SAID[value]
             elif getattr(value, "__module__", "").startswith(OURS) and hasattr(

@@ -38,7 +38,7 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.codegen.toolchain import CompilationError
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.table import LAW_MODULES
-from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
+from osimlite.mechanics.laws.dual_numbers import differentiate_root, is_exact_zero
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
 from osimlite.simulation.elements.force_type import ForceType
@@ -98,8 +98,8 @@ def searched(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) ->
     root = x[0]
     for _ in range(count):
         root -= (root * root - y[0]) / (2.0 * root)
-    f[0], f[1] = root, settled(root, root * root - y[0], 2.0 * root)
-    f[2] = 0.0 if is_nothing(y[1]) else 5.0 * y[1]
+    f[0], f[1] = root, differentiate_root(root, root * root - y[0], 2.0 * root)
+    f[2] = 0.0 if is_exact_zero(y[1]) else 5.0 * y[1]
     f[3] = 0.0 if y[1] == 0.0 else 5.0 * y[1]
     return count
 

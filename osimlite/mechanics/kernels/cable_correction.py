@@ -21,7 +21,7 @@ from osimlite.mechanics.kernels.cable_records import (
 from osimlite.mechanics.kernels.cable_surfaces import (
     END_NUMBERS,
     GEODESIC,
-    GEODESIC_ROOM,
+    GEODESIC_WORK_SIZE,
     shoot_geodesic,
 )
 from osimlite.mechanics.kernels.linear_algebra import (
@@ -55,7 +55,7 @@ SIGNIFICANT = 2.0**-45.5
 def solver_size(obstacles: int) -> int:
     """Return the length of the workspace of a search with `obstacles` obstacles between two points."""
     count, size = EQUATIONS * obstacles, UNKNOWNS * obstacles
-    return GEODESIC_ROOM + 4 * (obstacles + 1) + factor_size(count, size) + 2 * count + size
+    return GEODESIC_WORK_SIZE + 4 * (obstacles + 1) + factor_size(count, size) + 2 * count + size
 
 
 def correct_geodesics(
@@ -84,7 +84,7 @@ def correct_geodesics(
         Whether all geodesics exist afterwards.
     """
     size, equations = UNKNOWNS * count, EQUATIONS * count
-    lines = at(work, GEODESIC_ROOM)
+    lines = at(work, GEODESIC_WORK_SIZE)
     values = at(lines, 4 * (count + 1))
     corrections = at(values, 2 * equations)
     a = at(corrections, size)

@@ -30,7 +30,7 @@ from osimlite.mechanics.kernels.cable_records import (
 from osimlite.mechanics.kernels.cable_surfaces import (
     END_NUMBERS,
     GEODESIC,
-    GEODESIC_ROOM,
+    GEODESIC_WORK_SIZE,
     nearest_on_line,
     shoot_geodesic,
     surface_value,
@@ -147,7 +147,7 @@ def find_cable(
     Returns:
         The length (m), NaN if there is no such cable.
     """
-    lines = at(work, GEODESIC_ROOM)
+    lines = at(work, GEODESIC_WORK_SIZE)
     count = 0
     for round_number in range(ROUNDS + 1):
         # Contacts change while the search runs, as in Simbody, because lines move with the

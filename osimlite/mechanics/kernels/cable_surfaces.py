@@ -111,7 +111,7 @@ SIZE = 10
 """Length of the state that is integrated along a geodesic: position, R, A, and their derivatives."""
 COLUMNS = 7
 """Largest number of columns of an extrapolation."""
-GEODESIC_ROOM = (3 + COLUMNS) * SIZE
+GEODESIC_WORK_SIZE = (3 + COLUMNS) * SIZE
 """Length of the workspace of an integration: the extrapolation, or a step of Merson's method."""
 ACCURACY = 1e-10
 """Accuracy of a step of Merson's method."""
@@ -262,7 +262,7 @@ def shoot_geodesic(
         direction: direction; projected onto the tangent plane.
         length: length of the geodesic (m).
         geodesic: filled.
-        work: workspace of GEODESIC_ROOM numbers.
+        work: workspace of GEODESIC_WORK_SIZE numbers.
 
     Returns:
         Whether the geodesic exists.
@@ -347,7 +347,7 @@ def integrate_by_merson(
         direction: direction; projected onto the tangent plane.
         length: length of the geodesic (m).
         geodesic: filled; its first step is adapted for the next call.
-        work: workspace of GEODESIC_ROOM numbers.
+        work: workspace of GEODESIC_WORK_SIZE numbers.
 
     Returns:
         Whether the geodesic exists.
@@ -421,7 +421,7 @@ def integrate_by_extrapolation(
         direction: direction; projected onto the tangent plane.
         length: length of the geodesic (m).
         geodesic: filled.
-        work: workspace of GEODESIC_ROOM numbers.
+        work: workspace of GEODESIC_WORK_SIZE numbers.
 
     Returns:
         Whether the geodesic exists.

@@ -11,7 +11,7 @@ from math import sqrt
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.laws.dual_numbers import settled
+from osimlite.mechanics.laws.dual_numbers import differentiate_root
 from osimlite.mechanics.laws.vectors import Vector, add_scaled, component, minus, norm, plus, unit
 
 FLAT = 2e-13
@@ -73,7 +73,7 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
         if abs(value) < SMALL:
             # The root carries derivatives by the implicit function theorem, although OpenSim's
             # steps end early.
-            t = settled(t, value, slope)
+            t = differentiate_root(t, value, slope)
             break
         t -= value / slope
     return aa * u / (t + aa), bb * v / (t + bb), cc * w / (t + cc)
@@ -157,7 +157,7 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
         value = P * P * (Q * Q) - aauu * (Q * Q) - bbvv * (P * P)
         slope = 2.0 * (P * Q * (P + Q) - aauu * Q - bbvv * P)
         if abs(value) < SMALL:
-            t = settled(t, value, slope)
+            t = differentiate_root(t, value, slope)
             break
         t -= value / slope
     return aa * u / (t + aa), bb * v / (t + bb)

@@ -343,24 +343,32 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
             )
             # Each pair of an operation and a rotation on its path to ground is visited once, so both
             # entries of the symmetric matrix are changed.
-            load_change, inner, within = (
+            load_change, inner_operation, inner_link = (
                 plus(load_change, rotate(at(load, 3), turn)),
                 operation,
                 link,
             )
-            while within >= 0:
-                inner_ints = operation_ints(model, inner)
+            while inner_link >= 0:
+                inner_ints = operation_ints(model, inner_operation)
                 if inner_ints[OPERATION.DOF] >= 0 and inner_ints[OPERATION.MOTION] == MOTION.TURN:
                     change = dot(
-                        load_change, vector(operation_work(model, data, inner), OPERATION_WORK.AXIS)
+                        load_change,
+                        vector(operation_work(model, data, inner_operation), OPERATION_WORK.AXIS),
                     )
                     levers[size * j[OPERATION.DOF] + inner_ints[OPERATION.DOF]] += change
-                    if inner != operation:
+                    if inner_operation != operation:
                         levers[size * inner_ints[OPERATION.DOF] + j[OPERATION.DOF]] += change
-                inner -= 1
-                while within >= 0 and inner < link_ints(model, within)[LINK.FIRST_OPERATION]:
-                    within = link_ints(model, within)[LINK.PARENT]
-                    inner = link_ints(model, within)[LINK.END_OPERATION] - 1 if within >= 0 else -1
+                inner_operation -= 1
+                while (
+                    inner_link >= 0
+                    and inner_operation < link_ints(model, inner_link)[LINK.FIRST_OPERATION]
+                ):
+                    inner_link = link_ints(model, inner_link)[LINK.PARENT]
+                    inner_operation = (
+                        link_ints(model, inner_link)[LINK.END_OPERATION] - 1
+                        if inner_link >= 0
+                        else -1
+                    )
         if i[LINK.PARENT] >= 0:
             parent_load = at(link_work(model, data, i[LINK.PARENT]), LINK_WORK.INERTIA)
             for n in range(LOAD):

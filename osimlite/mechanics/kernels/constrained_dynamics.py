@@ -22,7 +22,7 @@ from osimlite.mechanics.kernels.linear_algebra import (
     solve_cholesky,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.laws.dual_numbers import is_nothing
+from osimlite.mechanics.laws.dual_numbers import is_exact_zero
 
 SAFE_MASS = 1e-10
 """Smallest pivot of M relative to its diagonal with which M is inverted."""
@@ -169,7 +169,7 @@ def solve_transposed_factor(model: Ints, data: Floats, right: Floats) -> None:
     for k in range(model[MODEL.DOFS] - 1, -1, -1):
         # Skip zeros: rows of G touch few degrees of freedom.
         j, load = at(freedoms, DOF.SIZE * k), right[k]
-        if is_nothing(load):
+        if is_exact_zero(load):
             continue
         row, i = at(data, j[DOF.ROW]), j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):

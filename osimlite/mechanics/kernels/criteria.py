@@ -63,10 +63,10 @@ class CRITERION(metaclass=Record):
     Attributes:
         KIND: kind, such as CRITERION_TYPE.GAIT.
         PLACE: index in the sensor row, or a power.
-        NUMBERS, ROOM: offsets of its numbers and its workspace.
+        NUMBERS, WORKSPACE: offsets of its numbers and its workspace.
     """
 
-    KIND, PLACE, NUMBERS, ROOM, SIZE = range(5)
+    KIND, PLACE, NUMBERS, WORKSPACE, SIZE = range(5)
 
 
 class CRITERION_NUMBERS(metaclass=Record):
@@ -139,7 +139,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
     """
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        noted, centre = at(work, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
+        noted, centre = at(work, criterion[CRITERION.WORKSPACE]), senses[SENSES.CENTRE]
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
             noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = walked_distance(senses, row)
             noted[GAIT_WORK.HEIGHT] = row[centre + 1]
@@ -185,7 +185,10 @@ def update_criteria(
     has_fallen = False
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        numbers, noted = at(p, criterion[CRITERION.NUMBERS]), at(work, criterion[CRITERION.ROOM])
+        numbers, noted = (
+            at(p, criterion[CRITERION.NUMBERS]),
+            at(work, criterion[CRITERION.WORKSPACE]),
+        )
         # SCONE's measures see only what happens within their times.
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue

@@ -346,12 +346,12 @@ def fill_slots(
                         node_in_surface(pose, work, first_node),
                         node_in_surface(pose, work, second_node),
                     )
-                    ways = min(
+                    way_count = min(
                         count_ways(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near_count == 1), step
                     )
-                    if ways > 1:
-                        step //= ways
-                        which = combination // step % ways
+                    if way_count > 1:
+                        step //= way_count
+                        which = combination // step % way_count
                         # Directions 2 and 3 are perpendicular to 0 and 1; odd ones are opposite to
                         # even ones.
                         if which > 1:

@@ -20,7 +20,12 @@ from math import inf
 from osimlite.mechanics.kernels.cable_correction import UNKNOWNS, differentiate_end, shoot_again
 from osimlite.mechanics.kernels.cable_paths import end_to_ground
 from osimlite.mechanics.kernels.cable_records import OBSTACLE_WORK
-from osimlite.mechanics.kernels.cable_surfaces import END_NUMBERS, GEODESIC, GEODESIC_ROOM, SURFACE
+from osimlite.mechanics.kernels.cable_surfaces import (
+    END_NUMBERS,
+    GEODESIC,
+    GEODESIC_WORK_SIZE,
+    SURFACE,
+)
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.linear_algebra import (
     factor_size,
@@ -66,7 +71,7 @@ SHORT = 1e-6
 def search_size(count: int) -> int:
     """Return the length of the workspace of a search with `count` geodesics."""
     size = UNKNOWNS * count
-    return GEODESIC_ROOM + 3 * size + factor_size(size, size)
+    return GEODESIC_WORK_SIZE + 3 * size + factor_size(size, size)
 
 
 def ends_to_ground(slot: Floats) -> None:
@@ -123,7 +128,7 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
         Whether the search converged, or a geodesic vanished.
     """
     size = UNKNOWNS * count
-    values = at(work, GEODESIC_ROOM)
+    values = at(work, GEODESIC_WORK_SIZE)
     corrections = at(values, 2 * size)
     a = at(corrections, size)
     previous_kink, stiff = inf, 0.0

@@ -91,7 +91,7 @@ PULLS = 8
 
 
 def start_on_surface(
-    p: Floats, first: Vector, second: Vector, how: float, about: Vector, work: Floats
+    p: Floats, first: Vector, second: Vector, bending: float, about: Vector, work: Floats
 ) -> Start:
     """Find where a straight segment between two points begins to bend around a surface.
 
@@ -99,7 +99,7 @@ def start_on_surface(
         p: numbers of the wrap.
         first: start of the segment.
         second: end of the segment.
-        how: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
+        bending: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
         about: axis about which the segment turns around a surface without a side, by the right-hand
             rule; zeros for either direction.
         work: workspace of a string.
@@ -111,10 +111,10 @@ def start_on_surface(
     )
     if surface[SURFACE.KIND] == SURFACE_TYPE.TORUS:
         return start_on_torus(
-            surface[SURFACE.RADIUS], surface[SURFACE.TUBE], first, second, axis, side, how
+            surface[SURFACE.RADIUS], surface[SURFACE.TUBE], first, second, axis, side, bending
         )
     if surface[SURFACE.KIND] == SURFACE_TYPE.CYLINDER:
-        is_held = how != BENDING.ANY_SIDE and axis < 2
+        is_held = bending != BENDING.ANY_SIDE and axis < 2
         side_out = replace_component((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
         return start_on_cylinder(
             surface[SURFACE.RADIUS],
@@ -124,7 +124,7 @@ def start_on_surface(
             side_out,
             component(about, 2),
         )
-    return start_on_ellipsoid(surface, first, second, axis, side, how, about, work)
+    return start_on_ellipsoid(surface, first, second, axis, side, bending, about, work)
 
 
 def start_on_cylinder(
@@ -257,7 +257,7 @@ def start_on_ellipsoid(
     second: Vector,
     axis: int,
     side: float,
-    how: float,
+    bending: float,
     about: Vector,
     work: Floats,
 ) -> Start:
@@ -271,7 +271,7 @@ def start_on_ellipsoid(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        how: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
+        bending: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
         about: axis about which the segment turns, zeros for either direction.
         work: workspace of a string; filled with beads.
     """
@@ -330,7 +330,7 @@ def start_on_ellipsoid(
     is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
         side == 0.0 or dot(outwards, middle) > 0.0
     )
-    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or how == BENDING.PULLED):
+    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or bending == BENDING.PULLED):
         result = start_on_string(p, turn, first, second, work)
     return result
 
@@ -453,7 +453,7 @@ def find_tangent(point: Vector, radius: float, normal: Vector, rotation_sense: f
 
 
 def start_on_torus(
-    ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float
+    ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, bending: float
 ) -> Start:
     """Return the start on a torus about z, as on a cylinder at the nearest point of its ring.
 
@@ -464,7 +464,7 @@ def start_on_torus(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        how: AS_MEANT or ANY_SIDE of `BENDING`.
+        bending: AS_MEANT or ANY_SIDE of `BENDING`.
     """
     x, y, _ = ring_point = nearest_to_ring(ring, first, second)
     if side != 0.0 and not is_on_side(ring_point, axis, side):
@@ -482,7 +482,7 @@ def start_on_torus(
         inf,
         local_first,
         local_second,
-        (0.0 if how == BENDING.ANY_SIDE else 1.0, 0.0, 0.0),
+        (0.0 if bending == BENDING.ANY_SIDE else 1.0, 0.0, 0.0),
         0.0,
     )
     return (

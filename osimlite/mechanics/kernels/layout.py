@@ -208,10 +208,10 @@ class RUN(metaclass=Record):
     Attributes:
         LAW: address of the kernel that computes all of them at once, 0 if each has its own.
         FIRST, END: range of the items.
-        ROOM: offset in data of workspace for curves, see `batched_curves`.
+        WORKSPACE: offset in data of workspace for curves, see `batched_curves`.
     """
 
-    LAW, FIRST, END, ROOM, SIZE = range(5)
+    LAW, FIRST, END, WORKSPACE, SIZE = range(5)
 
 
 class CONSTRAINED(metaclass=Record):

@@ -67,7 +67,7 @@ class SURFACE_WORK(metaclass=Record):
     """Pose in ground: rotation by rows, then origin."""
     BEST = WRAP_WORK.END + 12
     """Results of its law for the segment that is bent, from WRAP_WORK.FIRST_TANGENT on."""
-    SIZE = BEST + WRAP_WORK.ROOM - WRAP_WORK.FIRST_TANGENT
+    SIZE = BEST + WRAP_WORK.WORKSPACE - WRAP_WORK.FIRST_TANGENT
     """Length of the record of a surface."""
 
 
@@ -285,7 +285,7 @@ def wrap_surface(
                 e[WRAP_WORK.SURFACE_LENGTH],
             )
             # Keep the results of the chosen segment, which the next trial overwrites.
-            for j in range(WRAP_WORK.ROOM - WRAP_WORK.FIRST_TANGENT):
+            for j in range(WRAP_WORK.WORKSPACE - WRAP_WORK.FIRST_TANGENT):
                 e[SURFACE_WORK.BEST + j] = e[WRAP_WORK.FIRST_TANGENT + j]
         if code == WRAPPING.MANDATORY:
             break

@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.pose_cost import (
     evaluate_pose,
 )
 from osimlite.mechanics.kernels.pose_record import COUPLER, FIT, FREEDOM, Fit
-from osimlite.mechanics.kernels.pose_step import free_equations, list_free
+from osimlite.mechanics.kernels.pose_step import gather_free_equations, list_free_coordinates
 from osimlite.mechanics.kernels.projection import REDUNDANT
 
 EXACT = 1e-13
@@ -62,7 +62,7 @@ def set_dependents(m: Fit, y: Floats) -> None:
     for number in range(p[FIT.COUPLERS]):
         i = at(p, p[p[FIT.COUPLER_AT] + number])
         y[i[COUPLER.DEPENDENT]], _ = evaluate_coupler(
-            m, i, y, at(m.v, p[FIT.ROOM]), at(m.v, p[FIT.ROOM] + size)
+            m, i, y, at(m.v, p[FIT.WORKSPACE]), at(m.v, p[FIT.WORKSPACE] + size)
         )
 
 
@@ -91,8 +91,8 @@ def restore_equations(m: Fit, y: Floats) -> bool:
         if largest_error <= 1e-9 and largest_error >= 0.5 * previous_error:
             return True
         previous_error = largest_error
-        free = list_free(m)
-        factor, right, work = free_equations(m, free, 0)
+        free = list_free_coordinates(m)
+        factor, right, work = gather_free_equations(m, free, 0)
         rank = factorise_equations(count, free, factor, REDUNDANT * count)
         solve_minimum_norm(count, free, factor, rank, right, work, step)
         furthest = 0.0
@@ -130,7 +130,7 @@ def compute_curvature(m: Fit, y: Floats) -> None:
     p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], count_equations(m)
     rows, slope, curves = at(v, p[FIT.ROWS]), at(v, p[FIT.SLOPE]), at(v, p[FIT.CURVES])
     pulls, trial = at(curves, size * size), at(v, p[FIT.TRIAL])
-    free, normal = list_free(m), at(v, p[FIT.ROOM] + 2 * size)
+    free, normal = list_free_coordinates(m), at(v, p[FIT.WORKSPACE] + 2 * size)
     for i in range(count):
         pulls[i] = 0.0
         for k in range(free):

@@ -243,7 +243,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
         at(v, p[FIT.BEND]),
         at(v, p[FIT.ROWS]),
     )
-    gradient, rates = at(v, p[FIT.ROOM]), at(v, p[FIT.ROOM] + size)
+    gradient, rates = at(v, p[FIT.WORKSPACE]), at(v, p[FIT.WORKSPACE] + size)
     for k in range(size):
         rates[k] = 1.0
     # Backwards, so that a dependent coordinate may itself be an argument of another coupler.

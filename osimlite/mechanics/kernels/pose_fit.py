@@ -29,17 +29,17 @@ from osimlite.mechanics.kernels.pose_starts import (
     INWARDS,
     ROUND,
     remove_full_turns,
+    start_away_from_ends,
     start_full_turn,
-    start_inwards,
-    start_off_ends,
-    start_turned,
+    start_inside_ranges,
+    start_turned_subtree,
     start_upside_down,
 )
 from osimlite.mechanics.kernels.pose_step import (
-    find_ends,
+    find_active_range_ends,
     find_step,
-    free_ends,
-    list_free,
+    list_free_coordinates,
+    release_range_ends,
     solve_free,
 )
 from osimlite.mechanics.laws.vectors import store_vector
@@ -149,7 +149,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     if not has_measurements:
         evaluate_pose(m, y)
         return 0.0, 0, UNSEEN
-    note_pattern(m, y)
+    update_measured_pattern(m, y)
     value, is_vague = inf, v[p[FIT.PATTERN] + p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]] > 0.0
     # Two previous poses allow linear extrapolation of the motion, unless poses fit alike.
     if previous_count > 1 and not is_vague:
@@ -176,38 +176,44 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     if previous_count == 0:
         # From far away a descent may end in several minima. Small steps find others than large
         # ones, and starts inside the ranges keep coordinates from being held at their ends early.
-        value, added_steps, status = descend_again(
+        value, added_steps, status = descend_from_start(
             m, start, y, value, status, FIRST_DAMPING, lightest
         )
         steps += added_steps
         for inwards in range(2):
-            start_inwards(m, last_pose, start, 2.0 * INWARDS * (1 + inwards))
-            value, added_steps, status = descend_again(
+            start_away_from_ends(m, last_pose, start, 2.0 * INWARDS * (1 + inwards))
+            value, added_steps, status = descend_from_start(
                 m, start, y, value, status, SMALL_STEPS, lightest
             )
             steps += added_steps
         for number in range(2 * size):
-            if start_turned(m, last_pose, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
-                value, added_steps, status = descend_again(
+            if start_turned_subtree(
+                m, last_pose, start, number // 2, ROUND if number % 2 == 0 else -ROUND
+            ):
+                value, added_steps, status = descend_from_start(
                     m, start, y, value, status, SMALL_STEPS, lightest
                 )
                 steps += added_steps
     # Coordinates held at ends of their ranges may have left the way to a better minimum.
-    if start_off_ends(m, y, start):
-        value, added_steps, status = descend_again(m, start, y, value, status, lightest, lightest)
+    if start_inside_ranges(m, y, start):
+        value, added_steps, status = descend_from_start(
+            m, start, y, value, status, lightest, lightest
+        )
         steps += added_steps
-    value, added_steps, status = try_other_ends(m, start, y, value, status, lightest)
+    value, added_steps, status = try_opposite_limits(m, start, y, value, status, lightest)
     steps += added_steps
     for number in range(size):
         if start_upside_down(m, y, start, number):
             upright = value
-            value, added_steps, status = descend_again(
+            value, added_steps, status = descend_from_start(
                 m, start, y, value, status, SMALL_STEPS, lightest
             )
             steps += added_steps
             # A pose that was better upside down may need other full turns, too.
             if value < upright:
-                value, added_steps, status = try_other_ends(m, start, y, value, status, lightest)
+                value, added_steps, status = try_opposite_limits(
+                    m, start, y, value, status, lightest
+                )
                 steps += added_steps
     # Of poses that fit alike, the first frame reports the one without full turns.
     if previous_count == 0 and remove_full_turns(m, y, last_pose, start, value):
@@ -215,7 +221,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             m, start, y, evaluate_cost(m, start), lightest, lightest
         )
         steps += added_steps
-    free_ends(m)
+    release_range_ends(m)
     earlier_pose = at(last_pose, size)
     for k in range(size):
         # A full turn, from one end of a range to the other, is no motion to extrapolate.
@@ -226,7 +232,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     return value, steps, status
 
 
-def note_pattern(m: Fit, y: Floats) -> None:
+def update_measured_pattern(m: Fit, y: Floats) -> None:
     """Find out whether poses fit alike and which coordinates are idle.
 
     This is done if other markers, sensors or goals are measured than in the frame before. A
@@ -259,10 +265,12 @@ def note_pattern(m: Fit, y: Floats) -> None:
     for k in range(size):
         v[p[FIT.STEP] + k] = 0.0
     # A Gauss-Newton matrix that is singular leaves some direction undetermined.
-    pattern[count] = 1.0 if solve_free(m, list_free(m), LIGHTEST, 0.0, ALIKE) < 0 else 0.0
+    pattern[count] = (
+        1.0 if solve_free(m, list_free_coordinates(m), LIGHTEST, 0.0, ALIKE) < 0 else 0.0
+    )
 
 
-def descend_again(
+def descend_from_start(
     m: Fit, start: Floats, y: Floats, value: float, status: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
     """Descend from another start, and keep the better pose.
@@ -283,7 +291,7 @@ def descend_again(
     best, trial = at(start, size), at(m.v, m.p[FIT.TRIAL])
     copy_numbers(size, y, best)
     copy_numbers(size, start, trial)
-    free_ends(m)
+    release_range_ends(m)
     if not fulfil_constraints(m, trial):
         return value, 0, status
     new, steps, result = descend_to_minimum(m, trial, y, evaluate_cost(m, trial), damping, lightest)
@@ -294,7 +302,7 @@ def descend_again(
     return value, steps, status
 
 
-def try_other_ends(
+def try_opposite_limits(
     m: Fit, start: Floats, y: Floats, value: float, status: float, lightest: float
 ) -> tuple[float, int, float]:
     """Try each angle at an end of its range at the other end, and keep the best pose.
@@ -313,7 +321,7 @@ def try_other_ends(
     steps = 0
     for number in range(m.model[MODEL.DOFS]):
         if start_full_turn(m, y, start, number):
-            value, added_steps, status = descend_again(
+            value, added_steps, status = descend_from_start(
                 m, start, y, value, status, lightest, lightest
             )
             steps += added_steps
@@ -395,7 +403,7 @@ def descend_to_minimum(
         if count_equations(m) > 0 and steps % RENEWED == 0:
             compute_curvature(m, y)
             evaluate_cost(m, y)
-        find_ends(m, y)
+        find_active_range_ends(m, y)
         # Without a convex model, add damping; the Gauss-Newton model needs little.
         if not find_step(m, y, damping, bends) and not find_step(m, y, damping, False):
             damping = max(10.0 * damping, FIRST_DAMPING)

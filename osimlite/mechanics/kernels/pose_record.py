@@ -63,7 +63,7 @@ class FIT(metaclass=Record):
     """Offset of the derivatives of the equations by the coordinates (m, n)."""
     ERRORS = 22
     """Offset of the errors of the equations (m,)."""
-    ROOM = 23
+    WORKSPACE = 23
     """Offset of workspace for couplers and linear systems."""
     HISTORY = 24
     """Offset of the number of previous poses, and these poses, the last one first."""

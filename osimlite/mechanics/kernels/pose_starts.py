@@ -23,7 +23,7 @@ SAME = 1e-9
 """Distance from an end of a range below which a coordinate counts as at the end (rad or m)."""
 
 
-def start_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
+def start_away_from_ends(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
     """Write a start in which no coordinate with a range is near an end of it.
 
     Args:
@@ -41,7 +41,9 @@ def start_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> N
             start[k] = min(max(start[k], low + inner), high - inner)
 
 
-def start_turned(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float) -> bool:
+def start_turned_subtree(
+    m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float
+) -> bool:
     """Write a start in which the subtree of a joint to ground is turned about the vertical.
 
     Subjects walk in both directions, and a descent from half a turn away may end elsewhere.
@@ -57,7 +59,7 @@ def start_turned(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: 
         Whether the degree of freedom is such a coordinate.
     """
     model, p, ranges = m.model, m.p, at(m.c, m.p[FIT.RANGES_AT])
-    start_inwards(m, from_pose, start, 2.0 * INWARDS)
+    start_away_from_ends(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
     if not (
@@ -183,7 +185,7 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     return other_angles == 2 and is_angle(m, freedom)
 
 
-def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
+def start_inside_ranges(m: Fit, y: Floats, start: Floats) -> bool:
     """Write a start in which coordinates at ends of their ranges are inside.
 
     Args:

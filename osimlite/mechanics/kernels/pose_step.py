@@ -25,7 +25,7 @@ SOFTEST = 0.01
 """Stiffness (m²/rad²) that is added to that of a coordinate where a step is damped."""
 
 
-def list_free(m: Fit) -> int:
+def list_free_coordinates(m: Fit) -> int:
     """List the coordinates that are free and not at an end of their range.
 
     Args:
@@ -42,7 +42,7 @@ def list_free(m: Fit) -> int:
     return count
 
 
-def free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Floats]:
+def gather_free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Floats]:
     """Return the equations for the free coordinates.
 
     Args:
@@ -60,7 +60,7 @@ def free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Fl
         at(v, p[FIT.ERRORS]),
         at(v, p[FIT.STEP]),
     )
-    factor = at(v, p[FIT.ROOM] + 2 * size)
+    factor = at(v, p[FIT.WORKSPACE] + 2 * size)
     right = at(factor, count * size + count * count + 3 * count + 1)
     for k in range(count):
         right[k] = -errors[k]
@@ -73,7 +73,7 @@ def free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Fl
     return factor, right, at(right, count)
 
 
-def find_ends(m: Fit, y: Floats) -> None:
+def find_active_range_ends(m: Fit, y: Floats) -> None:
     """Mark the coordinates that stay at an end of their range.
 
     These are the ones that the gradient pulls outwards, and those whose range is a single value.
@@ -96,7 +96,7 @@ def find_ends(m: Fit, y: Floats) -> None:
             p[p[FIT.RESOLVED_AT] + k] = FREEDOM.AT_END if is_at_end_of_range else FREEDOM.VARIABLE
 
 
-def free_ends(m: Fit) -> None:
+def release_range_ends(m: Fit) -> None:
     """Mark all coordinates at an end of their range as free."""
     p = m.p
     for k in range(m.model[MODEL.DOFS]):
@@ -123,7 +123,7 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     # Active-set method: coordinates that would leave their ranges stop at the ends, and the others
     # are solved again.
     while True:
-        free = list_free(m)
+        free = list_free_coordinates(m)
         solution = solve_free(m, free, damping, 1.0 if bends else 0.0, SMALLEST)
         if solution < 0:
             return False
@@ -170,7 +170,9 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
         at(v, p[FIT.STEP]),
     )
     count = count_equations(m)
-    offset = p[FIT.ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
+    offset = (
+        p[FIT.WORKSPACE] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
+    )
     solution, matrix = at(v, offset), at(v, offset + size)
     for k in range(free):
         freedom = p[p[FIT.FREE_AT] + k]
@@ -219,7 +221,7 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     directions = at(across, size)
     reduced = at(directions, size * size)
     # The shortest step that restores the equations; the rest moves in their null space.
-    factor, right, work = free_equations(m, free, 1)
+    factor, right, work = gather_free_equations(m, free, 1)
     rank = factorise_equations(count, free, factor, REDUNDANT * count)
     solve_minimum_norm(count, free, factor, rank, right, work, across)
     dimension = free - rank

@@ -10,7 +10,7 @@ from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 
 
-def look(
+def evaluate_states(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -67,7 +67,7 @@ def look(
     return OUTCOME.OK
 
 
-def push_each(
+def push_each_actuator(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -149,7 +149,7 @@ def push_each(
     return OUTCOME.OK
 
 
-def watch(
+def evaluate_items(
     model: Ints,
     reals: Floats,
     data: Floats,

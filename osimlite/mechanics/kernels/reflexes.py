@@ -77,7 +77,7 @@ class REFLEXES(metaclass=Record):
         KEPT, SENSORS: number of control steps that are remembered, and of sensors.
         HAS_STATES: whether legs have states.
         SWINGS_FROM_STANCE: whether a leg may go from stance to swing directly.
-        NUMBERS, ROOM: lengths of the numbers and of the memory of a candidate.
+        NUMBERS, WORKSPACE: lengths of the numbers and of the memory of a candidate.
         FIRST, ROWS: number of the first control step that is recorded, and of rows of the record.
         IS_NOISY: whether there is noise.
     """
@@ -90,7 +90,7 @@ class REFLEXES(metaclass=Record):
         HAS_STATES,
         SWINGS_FROM_STANCE,
         NUMBERS,
-        ROOM,
+        MEMORY_SIZE,
         FIRST,
         ROWS,
         IS_NOISY,

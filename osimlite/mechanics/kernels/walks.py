@@ -74,7 +74,7 @@ class Walk(NamedTuple):
     numbers: Floats  # numbers of the reflexes
     criteria: Ints  # integers of the criteria, see `criteria`
     bounds: Floats  # numbers of the criteria
-    room: Floats  # memory of reflexes and criteria, see LEGS
+    memory: Floats  # memory of reflexes and criteria, see LEGS
     row: Floats  # sensor row
     excitations: Floats  # excitations during the control step (c,)
     record: Floats  # record of control steps
@@ -250,7 +250,7 @@ def walk_several(
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             criteria,
             bounds,
-            at(work, plan[REFLEXES.ROOM] * k),
+            at(work, plan[REFLEXES.MEMORY_SIZE] * k),
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
             record,
@@ -285,7 +285,7 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
     fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
     if order == ORDER.BEGIN:
         for k in range(LEGS):
-            a.room[k] = (
+            a.memory[k] = (
                 LEG_STATE.UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else LEG_STATE.EARLY_STANCE
             )
         (
@@ -294,7 +294,7 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
             a.progress[PROGRESS.GOING],
             a.progress[PROGRESS.FORCES],
         ) = 0, 1, 1, 0
-        record_sensors(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
+        record_sensors(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.memory, LEGS))
         update_excitations(a)
     elif order == ORDER.START:
         begin_criteria(a.senses, a.criteria, a.row, criteria_work(a))
@@ -352,7 +352,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
             evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
         fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
         record_sensors(
-            m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.room, LEGS)
+            m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.memory, LEGS)
         )
         progress[PROGRESS.FRAMES] += 1
         # Time in control steps, which has no accumulated rounding.
@@ -371,21 +371,21 @@ def apply_excitations(a: Walk) -> None:
 
 def criteria_work(a: Walk) -> Floats:
     """Return the workspace of the criteria."""
-    return at(a.room, LEGS + a.plan[REFLEXES.KEPT] * a.plan[REFLEXES.SENSORS])
+    return at(a.memory, LEGS + a.plan[REFLEXES.KEPT] * a.plan[REFLEXES.SENSORS])
 
 
 def update_excitations(a: Walk) -> None:
     """Advance the states of the legs, and compute the excitations by reflexes, within their bounds."""
     history, frames, count = (
-        at(a.room, LEGS),
+        at(a.memory, LEGS),
         a.progress[PROGRESS.FRAMES],
         a.senses[SENSES.CONTROLS],
     )
     if a.plan[REFLEXES.HAS_STATES] > 0:
-        update_leg_states(a.senses, a.plan, a.numbers, frames, a.row, history, a.room)
+        update_leg_states(a.senses, a.plan, a.numbers, frames, a.row, history, a.memory)
     for k in range(count):
         a.excitations[k] = 0.0
-    add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
+    add_reflexes(a.plan, a.numbers, frames, history, a.memory, a.excitations)
     # Noise is added before bounds apply, as in SCONE.
     add_noise(a.plan, a.numbers, a.progress[PROGRESS.STEPS], count, a.excitations)
     lower_bounds = at(a.known, SENSOR_NUMBERS.HEAD + 2 * a.senses[SENSES.MUSCLES])
@@ -488,7 +488,7 @@ def run_by_reflexes(
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             plan,
             numbers,
-            at(work, plan[REFLEXES.ROOM] * k),
+            at(work, plan[REFLEXES.MEMORY_SIZE] * k),
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
             at(record, plan[REFLEXES.ROWS] * k * control_record_size(senses, plan)),
@@ -568,7 +568,7 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
         return False
     fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
     record_sensors(
-        m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.room, LEGS)
+        m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.memory, LEGS)
     )
     progress[PROGRESS.FRAMES] += 1
     update_excitations(a)
@@ -576,8 +576,8 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     if row < a.plan[REFLEXES.ROWS]:
         record = at(a.record, row * control_record_size(a.senses, a.plan))
         history_offset = sensors * ((progress[PROGRESS.FRAMES] - 1) % a.plan[REFLEXES.KEPT])
-        copy_numbers(sensors, at(a.room, LEGS + history_offset), record)
-        copy_numbers(LEGS, a.room, at(record, sensors))
+        copy_numbers(sensors, at(a.memory, LEGS + history_offset), record)
+        copy_numbers(LEGS, a.memory, at(record, sensors))
         copy_numbers(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
         record[control_record_size(a.senses, a.plan) - 1] = m.clock[1]
     progress[PROGRESS.STEPS] += 1

@@ -110,7 +110,7 @@ def wrap_ellipsoid(
         first_tangent,
         minus(second_tangent, first_tangent),
         chord,
-        at(e, WRAP_WORK.ROOM),
+        at(e, WRAP_WORK.WORKSPACE),
     )
     if starts:
         first_tangent = second_tangent = support

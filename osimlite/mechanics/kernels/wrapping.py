@@ -79,7 +79,7 @@ class WRAP_WORK(metaclass=Record):
     """Length on the surface between the tangent points (m)."""
     CURVE = 13
     """Numbers that trace the curve between the tangent points."""
-    ROOM = 18
+    WORKSPACE = 18
     """Workspace of the law."""
     END = 98
     """End of the record of the law."""

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from math import hypot
 
-from osimlite.mechanics.laws.dual_numbers import plain, settled
+from osimlite.mechanics.laws.dual_numbers import differentiate_root, strip_derivatives
 
 Point = tuple[float, float, float]
 """A point of a curve: x, y, and the slope there."""
@@ -193,10 +193,10 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
     # Search without derivatives, then add them once by the implicit function theorem.
-    plain_x = plain(x)
+    plain_x = strip_derivatives(x)
     k, remainder, u = find_section(c, plain_x)
     _, _, y, slope = search_section(c, k + X, 1, u, remainder, ROUNDS)
-    return settled(y, slope * (plain_x - x), 1.0), slope
+    return differentiate_root(y, slope * (plain_x - x), 1.0), slope
 
 
 def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:

@@ -123,7 +123,9 @@ def schutte_passive_force(length: float) -> float:
     return exp(8.0 * (length - 1.0)) / exp(4.0)
 
 
-def schutte_velocity(activation: float, active: float, borne: float, damping: float) -> float:
+def schutte_velocity(
+    activation: float, active: float, velocity_force: float, damping: float
+) -> float:
     """Return the fiber velocity v, in optimal fiber lengths per time scale, from the force balance.
 
     The balance is active f(v) + damping v = borne, with Hill's curves f = 0.15 (1 + v) / (0.15 - v)
@@ -133,20 +135,20 @@ def schutte_velocity(activation: float, active: float, borne: float, damping: fl
     Args:
         activation: activation.
         active: isometric force, fully activated.
-        borne: force that depends on the velocity: that of the tendon without the passive one.
+        velocity_force: force that depends on the velocity: that of the tendon without the passive one.
         damping: damping force at a velocity of 1.
     """
     isometric = activation * active
-    if borne < -damping:
-        return borne / damping
-    if borne < isometric:
-        b = -(borne + 0.15 * (isometric + damping)) / damping
-        c = 0.15 * (borne - isometric) / damping
+    if velocity_force < -damping:
+        return velocity_force / damping
+    if velocity_force < isometric:
+        b = -(velocity_force + 0.15 * (isometric + damping)) / damping
+        c = 0.15 * (velocity_force - isometric) / damping
         # The smaller root: v must be between -1 and 0.
         return 0.5 * (-b - sqrt(b * b - 4.0 * c))
     slope = 0.13 * 0.15 / 1.15
-    b = slope - (borne - 1.4 * isometric) / damping
-    c = slope * (isometric - borne) / damping
+    b = slope - (velocity_force - 1.4 * isometric) / damping
+    c = slope * (isometric - velocity_force) / damping
     # The larger root: v must not be negative.
     return 0.5 * (-b + sqrt(b * b - 4.0 * c))
 
@@ -208,7 +210,7 @@ def thelen_active_force(length: float, width: float) -> float:
 def thelen_velocity(
     activation: float,
     active: float,
-    borne: float,
+    velocity_force: float,
     damping: float,
     shape: float,
     eccentric_limit: float,
@@ -218,64 +220,68 @@ def thelen_velocity(
     Args:
         activation: activation.
         active: isometric force, fully activated.
-        borne: force f that depends on the velocity.
+        velocity_force: force f that depends on the velocity.
         damping: constant c that is added to the denominator.
         shape: Af.
         eccentric_limit: Flen.
     """
     # Without activation the isometric force would be 0 and the curve degenerate.
     isometric, small_force = max(activation, 1e-6) * active, 1e-6
-    if borne < isometric:
-        if borne >= 0.0:
-            return thelen_shortening(borne, isometric, damping, shape)
+    if velocity_force < isometric:
+        if velocity_force >= 0.0:
+            return thelen_shortening(velocity_force, isometric, damping, shape)
         # Continue below zero force with the slope of a secant over `small_force` at the end, as OpenSim
         # does.
         at_end = thelen_shortening(0.0, isometric, damping, shape)
-        return at_end + borne / (
+        return at_end + velocity_force / (
             small_force / (thelen_shortening(small_force, isometric, damping, shape) - at_end)
         )
     # The hyperbola has its asymptote at `eccentric_limit`; beyond 95 % of it the curve continues as a line.
     end = 0.95 * isometric * eccentric_limit
-    if borne < end:
-        return thelen_lengthening(borne, isometric, damping, shape, eccentric_limit)
+    if velocity_force < end:
+        return thelen_lengthening(velocity_force, isometric, damping, shape, eccentric_limit)
     next_force = (0.95 + small_force) * isometric * eccentric_limit
     at_end = thelen_lengthening(end, isometric, damping, shape, eccentric_limit)
     slope = (
         thelen_lengthening(next_force, isometric, damping, shape, eccentric_limit) - at_end
     ) / (next_force - end)
-    return at_end + slope * (borne - end)
+    return at_end + slope * (velocity_force - end)
 
 
-def thelen_shortening(borne: float, isometric: float, damping: float, shape: float) -> float:
+def thelen_shortening(
+    velocity_force: float, isometric: float, damping: float, shape: float
+) -> float:
     """Return the fiber velocity (f - i) / (i + f / Af + c) below the isometric force i.
 
     See `thelen_velocity`.
 
     Args:
-        borne: force f that depends on the velocity.
+        velocity_force: force f that depends on the velocity.
         isometric: isometric force at the present activation.
         damping: constant c that is added to the denominator.
         shape: Af.
     """
-    return (borne - isometric) / (isometric + borne / shape + damping)
+    return (velocity_force - isometric) / (isometric + velocity_force / shape + damping)
 
 
 def thelen_lengthening(
-    borne: float, isometric: float, damping: float, shape: float, eccentric_limit: float
+    velocity_force: float, isometric: float, damping: float, shape: float, eccentric_limit: float
 ) -> float:
     """Return the fiber velocity above the isometric force i, see `thelen_velocity`.
 
     It is (f - i) / ((2 + 2 / Af) (i Flen - f) / (Flen - 1) + c), where c is the damping.
 
     Args:
-        borne: force f that depends on the velocity.
+        velocity_force: force f that depends on the velocity.
         isometric: isometric force at the present activation.
         damping: constant c that is added to the denominator.
         shape: Af.
         eccentric_limit: Flen, the largest force of lengthening fibers over the isometric one.
     """
-    return (borne - isometric) / (
-        (2.0 + 2.0 / shape) * (isometric * eccentric_limit - borne) / (eccentric_limit - 1.0)
+    return (velocity_force - isometric) / (
+        (2.0 + 2.0 / shape)
+        * (isometric * eccentric_limit - velocity_force)
+        / (eccentric_limit - 1.0)
         + damping
     )
 

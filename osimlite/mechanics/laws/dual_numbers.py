@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 
-def settled(root: float, error: float, slope: float) -> float:
+def differentiate_root(root: float, error: float, slope: float) -> float:
     """Return a root that a search found, with the derivatives of the implicit function theorem.
 
     A search ends when the value is good; its own derivatives may lag a step behind, or be those of the
@@ -25,7 +25,7 @@ def settled(root: float, error: float, slope: float) -> float:
     return root
 
 
-def is_nothing(number: float) -> bool:
+def is_exact_zero(number: float) -> bool:
     """Return whether a number and all its derivatives are 0.
 
     Multiplication by such a number can be skipped.
@@ -34,12 +34,12 @@ def is_nothing(number: float) -> bool:
     return number == 0.0
 
 
-def plain(number: float) -> float:
+def strip_derivatives(number: float) -> float:
     """Return a number without its derivatives."""
     return number
 
 
-def carrying(number: float, direction: int, directions: int) -> float:
+def seed_derivative(number: float, direction: int, directions: int) -> float:
     """Return a number that carries derivatives: 1 along `direction`, 0 along the others.
 
     Args:
@@ -50,7 +50,7 @@ def carrying(number: float, direction: int, directions: int) -> float:
     return number
 
 
-def carrying_room(vector: Any, directions: int) -> Any:
+def make_dual_workspace(vector: Any, directions: int) -> Any:
     """Return workspace of floats as workspace of dual numbers, each of 1 + `directions` floats.
 
     Args:
@@ -60,7 +60,7 @@ def carrying_room(vector: Any, directions: int) -> Any:
     return vector
 
 
-def slope_of(number: float, direction: int) -> float:
+def get_derivative(number: float, direction: int) -> float:
     """Return the derivative of a number along a direction.
 
     Args:

@@ -11,7 +11,7 @@ With an elastic tendon, the fiber velocity v follows from the equilibrium
 (a fl(l) fv(v) + fp(l) + beta v) cos(phi) = ft
 
 where a is the activation, fl, fv, fp, ft are the curves, beta is the damping, and phi the pennation
-angle. The computation is divided into `fibers_at`, `fibers_loaded` and `fibers_moved`, between
+angle. The computation is divided into `fibers_at`, `combine_length_curves` and `combine_velocity_curve`, between
 which curves are evaluated, so that machine code can evaluate the curves of several muscles
 together.
 """
@@ -23,7 +23,7 @@ from math import isnan, nan
 from typing import NamedTuple
 
 from osimlite.mechanics.laws.bezier import curve_integral, curve_value, solve_sum
-from osimlite.mechanics.laws.dual_numbers import plain, settled
+from osimlite.mechanics.laws.dual_numbers import differentiate_root, strip_derivatives
 from osimlite.mechanics.laws.muscles import (
     SIGNIFICANT,
     MuscleInputs,
@@ -86,7 +86,7 @@ class MillardFibers(NamedTuple):
     Before a curve is evaluated, its argument is in place of its value.
     """
 
-    told_by: float  # what determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
+    velocity_source: float  # what determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
     velocity: float  # normalized, or what determines it
     by_velocity: float  # factor of the active force
     active: float  # activation
@@ -118,23 +118,27 @@ def millard2012_equilibrium(
         length and by velocity, active and passive fiber force (N), whether a fiber velocity exists,
         rate of activation (1/s), fiber velocity (m/s), elastic part of the passive force (N).
     """
-    fibers = fibers_resting(inputs, m, curves)
-    is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
+    fibers = evaluate_length_curves(inputs, m, curves)
+    is_found, velocity, by_velocity = (
+        fibers.velocity_source != NONE,
+        fibers.velocity,
+        fibers.by_velocity,
+    )
     # Only the branch that applies evaluates a curve over velocity.
-    if fibers.told_by == RIGID:
+    if fibers.velocity_source == RIGID:
         by_velocity, _ = curve_value(curves.velocity, velocity)
-    elif fibers.told_by == DAMPED:
+    elif fibers.velocity_source == DAMPED:
         is_found, velocity, by_velocity = damped_velocity(
             m, fibers.active, fibers.by_length, fibers.elastic, fibers.tendon, fibers.cos, curves
         )
-    elif fibers.told_by == INVERSE:
+    elif fibers.velocity_source == INVERSE:
         velocity, _ = curve_value(curves.inverse, velocity)
-    return muscle_with(
+    return compute_muscle_results(
         fibers, m, is_found, velocity, by_velocity, fibers.by_length, fibers.elastic, fibers.tendon
     )
 
 
-def millard2012_again(
+def millard2012_at_velocity(
     inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Compute the muscle with a known velocity of damped fibers, to obtain all derivatives.
@@ -151,28 +155,30 @@ def millard2012_again(
     Returns:
         The results of `millard2012_equilibrium`.
     """
-    fibers = fibers_resting(inputs, m, curves)
+    fibers = evaluate_length_curves(inputs, m, curves)
     velocity = (
-        plain(fiber_velocity) / (m.fastest * m.optimal)
-        if fibers.told_by == DAMPED
+        strip_derivatives(fiber_velocity) / (m.fastest * m.optimal)
+        if fibers.velocity_source == DAMPED
         else fibers.velocity
     )
     by_velocity, slope = 1.0, 0.0
-    if fibers.told_by == INVERSE:
+    if fibers.velocity_source == INVERSE:
         velocity, _ = curve_value(curves.inverse, velocity)
     else:
         by_velocity, slope = curve_value(curves.velocity, velocity)
-    if fibers.told_by == DAMPED:
+    if fibers.velocity_source == DAMPED:
         # Residual of the equilibrium; its derivative by the velocity gives the derivatives of the
         # root.
         active_factor = fibers.active * fibers.by_length
         residual = active_factor * by_velocity + m.damping * velocity - fibers.velocity
-        velocity = settled(velocity, residual, active_factor * slope + m.damping)
+        velocity = differentiate_root(velocity, residual, active_factor * slope + m.damping)
     by_length, elastic, tendon = fibers.by_length, fibers.elastic, fibers.tendon
-    return muscle_with(fibers, m, True, velocity, by_velocity, by_length, elastic, tendon)
+    return compute_muscle_results(
+        fibers, m, True, velocity, by_velocity, by_length, elastic, tendon
+    )
 
 
-def fibers_resting(
+def evaluate_length_curves(
     inputs: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> MillardFibers:
     """Evaluate the curves over length, but not those over velocity.
@@ -190,18 +196,27 @@ def fibers_resting(
     elastic, _ = curve_value(curves.passive, fibers.by_length)
     if not m.is_rigid:
         tendon, _ = curve_value(curves.tendon, fibers.tendon)
-    velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(
+    velocity, by_velocity, by_length, elastic, tendon = combine_length_curves(
         fibers, m, by_length, elastic, tendon
     )
-    told_by, active, length, cos, change = (
-        fibers.told_by,
+    velocity_source, active, length, cos, change = (
+        fibers.velocity_source,
         fibers.active,
         fibers.length,
         fibers.cos,
         fibers.change,
     )
     return MillardFibers(
-        told_by, velocity, by_velocity, active, length, cos, by_length, elastic, tendon, change
+        velocity_source,
+        velocity,
+        by_velocity,
+        active,
+        length,
+        cos,
+        by_length,
+        elastic,
+        tendon,
+        change,
     )
 
 
@@ -224,24 +239,24 @@ def fibers_at(inputs: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     fiber = max(fiber, m.smallest)
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     along_tendon = inputs.length - fiber * cos
-    told_by, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
+    velocity_source, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
     if m.is_rigid:
-        told_by = SLACK
+        velocity_source = SLACK
         # A rigid tendon is slack where the path is too short for it; SIGNIFICANT allows for
         # rounding.
         if along_tendon >= m.slack - SIGNIFICANT:
-            told_by, velocity = RIGID, inputs.rate * cos / (m.optimal * m.fastest)
+            velocity_source, velocity = RIGID, inputs.rate * cos / (m.optimal * m.fastest)
     else:
         tendon = along_tendon / m.slack
     # Perpendicular fibers cannot balance a tendon.
     if not cos > SIGNIFICANT:
-        told_by = NONE
+        velocity_source = NONE
     change = first_order_activation_rate(
         inputs.excitation, inputs.activation, m.rising, m.falling, m.least
     )
     normalized_length = fiber / m.optimal
     return MillardFibers(
-        told_by,
+        velocity_source,
         velocity,
         1.0,
         active,
@@ -254,7 +269,7 @@ def fibers_at(inputs: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     )
 
 
-def fibers_loaded(
+def combine_length_curves(
     fibers: MillardFibers,
     m: Millard2012Equilibrium,
     by_length: float,
@@ -275,7 +290,7 @@ def fibers_loaded(
         length, passive force and tendon force.
     """
     velocity, by_velocity = fibers.velocity, 1.0
-    if m.is_rigid or fibers.told_by == NONE:
+    if m.is_rigid or fibers.velocity_source == NONE:
         tendon = 0.0
     elif m.damping > 0.0:
         # The equation with damping needs the force that active fibers and dampers must bear.
@@ -287,7 +302,7 @@ def fibers_loaded(
     return velocity, by_velocity, by_length, elastic, tendon
 
 
-def fibers_asking(
+def request_velocity_curve(
     fibers: MillardFibers, m: Millard2012Equilibrium
 ) -> tuple[int, float, float, float]:
     """Return which curve over velocity must be evaluated, and for what sum.
@@ -296,25 +311,25 @@ def fibers_asking(
     and the curve is evaluated.
 
     Args:
-        fibers: fibers after `fibers_loaded`.
+        fibers: fibers after `combine_length_curves`.
         m: muscle.
 
     Returns:
         Number of the curve (0 for the factor by velocity, 1 for its inverse), factors of its value
         and of its argument, and the value of their sum.
     """
-    if fibers.told_by == DAMPED:
+    if fibers.velocity_source == DAMPED:
         return 0, fibers.active * fibers.by_length, m.damping, fibers.velocity
-    return 1 if fibers.told_by == INVERSE else 0, 0.0, 1.0, fibers.velocity
+    return 1 if fibers.velocity_source == INVERSE else 0, 0.0, 1.0, fibers.velocity
 
 
-def fibers_moved(
+def combine_velocity_curve(
     fibers: MillardFibers, m: Millard2012Equilibrium, value: float, missed: float
 ) -> tuple[float, float, float]:
     """Combine the value of the requested curve.
 
     Args:
-        fibers: fibers after `fibers_loaded`.
+        fibers: fibers after `combine_length_curves`.
         m: muscle.
         value: value of the curve.
         missed: residual of the search.
@@ -322,17 +337,21 @@ def fibers_moved(
     Returns:
         What determines the velocity, the velocity, and the factor of the active force.
     """
-    if fibers.told_by == DAMPED:
-        is_found, velocity = damped_by(
+    if fibers.velocity_source == DAMPED:
+        is_found, velocity = check_damped_velocity(
             m, fibers.active * fibers.by_length, fibers.velocity, value, missed
         )
         return DAMPED if is_found else NONE, velocity, value
-    if fibers.told_by == INVERSE:
+    if fibers.velocity_source == INVERSE:
         return INVERSE, value, fibers.by_velocity
-    return fibers.told_by, fibers.velocity, value if fibers.told_by == RIGID else 1.0
+    return (
+        fibers.velocity_source,
+        fibers.velocity,
+        value if fibers.velocity_source == RIGID else 1.0,
+    )
 
 
-def muscle_of(
+def make_muscle_results(
     fibers: MillardFibers, m: Millard2012Equilibrium
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Return the results of `millard2012_equilibrium`, after all curves have been evaluated.
@@ -345,12 +364,12 @@ def muscle_of(
         The results of `millard2012_equilibrium`.
     """
     of_curves = fibers.by_length, fibers.elastic, fibers.tendon
-    return muscle_with(
-        fibers, m, fibers.told_by != NONE, fibers.velocity, fibers.by_velocity, *of_curves
+    return compute_muscle_results(
+        fibers, m, fibers.velocity_source != NONE, fibers.velocity, fibers.by_velocity, *of_curves
     )
 
 
-def muscle_with(
+def compute_muscle_results(
     fibers: MillardFibers,
     m: Millard2012Equilibrium,
     is_found: bool,
@@ -455,28 +474,32 @@ def damped_velocity(
     Returns:
         Whether there is one, the velocity, and the factor of the active force there.
     """
-    share, borne = active * by_length, tendon / cos - elastic
-    factor, missed = solve_sum(curves.velocity, share, m.damping, borne)
-    is_found, velocity = damped_by(m, share, borne, factor, missed)
+    isometric, velocity_force = active * by_length, tendon / cos - elastic
+    factor, residual = solve_sum(curves.velocity, isometric, m.damping, velocity_force)
+    is_found, velocity = check_damped_velocity(m, isometric, velocity_force, factor, residual)
     return is_found, velocity, factor
 
 
-def damped_by(
-    m: Millard2012Equilibrium, share: float, borne: float, factor: float, missed: float
+def check_damped_velocity(
+    m: Millard2012Equilibrium,
+    isometric: float,
+    velocity_force: float,
+    factor: float,
+    residual: float,
 ) -> tuple[bool, float]:
     """Return whether a search for the velocity converged, and the velocity.
 
     Args:
         m: muscle.
-        share: active isometric force.
-        borne: force of the fibers without their elastic passive force.
+        isometric: active isometric force.
+        velocity_force: force of the fibers without their elastic passive force.
         factor: factor of the active force by velocity.
-        missed: residual of the search.
+        residual: residual of the search.
 
     Returns:
         Whether it converged, and the velocity.
     """
-    return abs(missed) <= VELOCITY_TOLERANCE, (borne - share * factor) / m.damping
+    return abs(residual) <= VELOCITY_TOLERANCE, (velocity_force - isometric * factor) / m.damping
 
 
 def millard2012_energy(
@@ -568,15 +591,15 @@ def force_imbalance(
     by_length, active_slope = curve_value(curves.active, fiber / m.optimal)
     elastic, passive_slope = curve_value(curves.passive, fiber / m.optimal)
     tendon, tendon_slope = curve_value(curves.tendon, (length - fiber * cos) / m.slack)
-    borne = m.strength * (active * by_length) + m.strength * elastic
+    fiber_force = m.strength * (active * by_length) + m.strength * elastic
     sin = m.height / fiber
     # d(cos phi)/dl = sin^2(phi) / (l cos(phi)), because l sin(phi) is constant.
     turn = sin * sin / cos
     fiber_stiffness = (
         m.strength * (active * active_slope + passive_slope) / m.optimal * cos
-        + borne * turn / fiber
+        + fiber_force * turn / fiber
     )
     return (
-        borne * cos - tendon * m.strength,
+        fiber_force * cos - tendon * m.strength,
         fiber_stiffness + tendon_slope * m.strength / m.slack * (cos + turn),
     )

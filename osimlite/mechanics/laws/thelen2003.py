@@ -294,12 +294,12 @@ def thelen2003(
     active = min(max(inputs.activation, m.least), 1.0)
     fibers = fibers_at(m, inputs.length, max(inputs.fiber_length, m.shortest))
     # What the tendon bears and the passive force does not is the active force.
-    isometric, borne = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
-    velocity, _ = fiber_velocity(m, borne, active, isometric)
-    by_velocity = borne / isometric
+    isometric, active_force = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
+    velocity, _ = fiber_velocity(m, active_force, active, isometric)
+    by_velocity = active_force / isometric
     # OpenSim holds fibers at their smallest length and sets their active force to 0 there.
     if inputs.fiber_length <= m.shortest and velocity <= 0.0:
-        velocity, by_velocity, borne = 0.0, 1.0, 0.0
+        velocity, by_velocity, active_force = 0.0, 1.0, 0.0
     return (
         fibers.tendon * m.strength,
         active,
@@ -307,7 +307,7 @@ def thelen2003(
         fibers.cos,
         fibers.active,
         by_velocity,
-        borne * m.strength,
+        active_force * m.strength,
         fibers.passive * m.strength,
         first_order_activation_rate(
             inputs.excitation, inputs.activation, m.rising, m.falling, m.least
@@ -376,8 +376,8 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
     )
     stiffness, _ = force_stiffnesses(m, fibers, active, 0.0)
     by_velocity = shared_velocity_factor(m, fibers, active, inputs.rate, stiffness)
-    borne, error = fiber_balance(m, fibers, active * by_velocity)
-    stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
+    fiber_force, error = fiber_balance(m, fibers, active * by_velocity)
+    stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, fiber_force)
     for _ in range(ROUNDS):
         if not abs(error) > equilibrium_tolerance(m):
             break
@@ -389,11 +389,11 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
             if not abs(step) > SIGNIFICANT:
                 step, fraction = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
             fibers = fibers_at(m, length, max(previous_length + step, m.shortest))
-            borne, error = fiber_balance(m, fibers, active * by_velocity)
+            fiber_force, error = fiber_balance(m, fibers, active * by_velocity)
             if fraction <= SMALLEST:
                 break
             fraction *= 0.5
-        stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
+        stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, fiber_force)
         # Outside of the line search, as in OpenSim: the factor by velocity stays constant along a
         # step.
         by_velocity = shared_velocity_factor(m, fibers, active, inputs.rate, stiffness)
@@ -414,12 +414,12 @@ def fiber_balance(m: Thelen2003, fibers: ThelenFibers, active: float) -> tuple[f
     Returns:
         Force and residual.
     """
-    borne = (active * fibers.active + fibers.passive) * m.strength
-    return borne, borne * fibers.cos - fibers.tendon * m.strength
+    fiber_force = (active * fibers.active + fibers.passive) * m.strength
+    return fiber_force, fiber_force * fibers.cos - fibers.tendon * m.strength
 
 
 def force_stiffnesses(
-    m: Thelen2003, fibers: ThelenFibers, active: float, borne: float
+    m: Thelen2003, fibers: ThelenFibers, active: float, fiber_force: float
 ) -> tuple[float, float]:
     """Return the derivatives of both forces along the tendon by the fiber length (N/m).
 
@@ -427,7 +427,7 @@ def force_stiffnesses(
         m: muscle.
         fibers: its fibers.
         active: activation times the factor by velocity.
-        borne: force of the fibers (N).
+        fiber_force: force of the fibers (N).
 
     Returns:
         Derivatives of the fiber force and of the tendon force.
@@ -441,7 +441,7 @@ def force_stiffnesses(
     stiffness = (active * fibers.active_slope + fibers.passive_slope) * m.strength / m.optimal
     # d(l cos phi)/dl = cos(phi) + sin^2(phi) / cos(phi), because l sin(phi) is constant.
     of_tendon = fibers.tendon_slope * m.strength / m.slack * (-fibers.cos - sin * sin / cos)
-    return stiffness * fibers.cos + borne * sin * sin / (length * cos), of_tendon
+    return stiffness * fibers.cos + fiber_force * sin * sin / (length * cos), of_tendon
 
 
 def shared_velocity_factor(

@@ -39,8 +39,8 @@ class ConstraintRecord(NamedTuple):
     numbers: list[float]  # its own numbers
     equations: int = 1  # number of equations
     positions: int = 1  # number of these, from the first on, that constrain positions
-    room: int = 0  # length of its workspace
-    room_at: int = -1  # index among its integers of the offset of the workspace
+    work_size: int = 0  # length of its workspace
+    work_offset_index: int = -1  # index among its integers of the offset of the workspace
 
 
 class _Vector(NamedTuple):
@@ -114,7 +114,7 @@ def constraint_record(
     )
 
 
-def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
+def count_constraint_work(equations: int, size: int, entries: int) -> dict[str, int]:
     """Return the lengths of the workspaces of all constraints together.
 
     Args:
@@ -172,7 +172,11 @@ def _encode_coupler(constraint: Coupler, places: Places, balls: Balls) -> Constr
         ints += _encode_coordinate(index, places, balls)
     numbers = [places.locked_value(index) for index in (constraint.dependent, *independent)]
     return ConstraintRecord(
-        "couple", ints, [*numbers, *table], room=max(len(independent), 1), room_at=len(dependent)
+        "couple",
+        ints,
+        [*numbers, *table],
+        work_size=max(len(independent), 1),
+        work_offset_index=len(dependent),
     )
 
 

@@ -25,7 +25,7 @@ from osimlite.mechanics.kernels.layout import (
     WORK,
 )
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
-from osimlite.mechanics.multibody.constraint_records import constraint_record, room_for
+from osimlite.mechanics.multibody.constraint_records import constraint_record, count_constraint_work
 from osimlite.mechanics.multibody.constraints import ConstraintEquations
 from osimlite.mechanics.multibody.function_tables import function_table
 from osimlite.mechanics.multibody.functions import IDENTITY
@@ -520,7 +520,9 @@ class LinkPacker:
             end, end_position = equations + constraint.equations, equations + constraint.positions
             # Only here the offset of a constraint's workspace is known.
             ints = [
-                x + self.reserve_work(constraint.room) if k == constraint.room_at else x
+                x + self.reserve_work(constraint.work_size)
+                if k == constraint.work_offset_index
+                else x
                 for k, x in enumerate(constraint.ints)
             ]
             self.ints += CONSTRAINT.record(
@@ -550,7 +552,7 @@ class LinkPacker:
             ENTRIES=self.entries,
             **{
                 name: self.reserve_work(count)
-                for name, count in room_for(equations, size, self.entries).items()
+                for name, count in count_constraint_work(equations, size, self.entries).items()
             },
         )
 

@@ -48,7 +48,7 @@ def drive_as_prescribed(
 
 
 def _drive_from_file(
-    builder: ElementBuilder, controller: PrescribedController, taken: list[Any]
+    builder: ElementBuilder, controller: PrescribedController, driven_actuators: list[Any]
 ) -> Iterator[Drive]:
     """Yield the columns of the file, whose labels are names or paths of actuators.
 
@@ -58,7 +58,7 @@ def _drive_from_file(
     Args:
         builder: builder of the model's elements.
         controller: the controller.
-        taken: actuators that the controller drives already.
+        driven_actuators: actuators that the controller drives already.
     """
     path = builder.path(controller)
     actuators = map_actuators(builder)
@@ -69,8 +69,8 @@ def _drive_from_file(
         for word in controller.socket_actuators
     }
     if builder.model.document_version < LISTS_OF_PATHS:
-        known |= {item.name for item in taken}
-    taken = list(taken)
+        known |= {item.name for item in driven_actuators}
+    driven_actuators = list(driven_actuators)
     for index, label in enumerate(table.columns):
         if label in known:
             continue
@@ -81,13 +81,13 @@ def _drive_from_file(
                 file=table.file,
             )
         actuator = actuators[label]
-        if any(item is actuator for item in taken):
+        if any(item is actuator for item in driven_actuators):
             raise ModelError(
                 f"'{path}' sets '{builder.path(actuator)}' by the column '{label}' and by another entry; remove one of them",
                 file=table.file,
             )
         known.add(label)
-        taken.append(actuator)
+        driven_actuators.append(actuator)
         degree = 1 if controller.interpolation_method is None else controller.interpolation_method
         yield Drive(
             actuator,

@@ -42,17 +42,17 @@ class Controls:
     names: tuple[str, ...] = ()
     functions: tuple[tuple[SmoothFunction, ...], ...] = ()
 
-    def add_functions(self, more: Mapping[str, SmoothFunction]) -> Controls:
+    def add_functions(self, functions: Mapping[str, SmoothFunction]) -> Controls:
         """Return these controls with one more term for some of them.
 
         Args:
-            more: functions of time by the names of the controls.
+            functions: functions of time by the names of the controls.
         """
         pairs = zip(self.names, self.functions, strict=True)
         return replace(
             self,
             functions=tuple(
-                (*terms, more[name]) if name in more else terms for name, terms in pairs
+                (*terms, functions[name]) if name in functions else terms for name, terms in pairs
             ),
         )
 

@@ -206,12 +206,12 @@ class ForceType:
         values = tuple(term.read(builder, force) for term in self.terms)
         # A force that is off may still have states that change, as the activation of a muscle in
         # OpenSim does.
-        made = DeclaredForce if force.appliesForce else ForceOff
+        element_class = DeclaredForce if force.appliesForce else ForceOff
         if builder.rigid_tendons and is_a(force, "Muscle"):
             if self.rigid_law is None:
                 raise builder.unsupported_error(force, " with a rigid tendon")
-            made = RigidTendon
-        return made(
+            element_class = RigidTendon
+        return element_class(
             self.component, path, force.name, self.geometry.read(builder, force), values, states
         )
 
@@ -272,16 +272,16 @@ class ForceType:
         offsets: list[int] = []
         parameters: list[float] = []
         for term, value in zip(self.terms, force.values, strict=True):
-            more, plain = term.pack(value, tail, f"'{force.path}'")
-            offsets += more
-            parameters += plain
+            term_offsets, term_parameters = term.pack(value, tail, f"'{force.path}'")
+            offsets += term_offsets
+            parameters += term_parameters
         at_states = tuple(
             len(offsets) + k for k, state in enumerate(force.optional_states) if state is not None
         )
         # -1 stands for a state that the component lacks; the packer writes the offsets of the
         # others.
         all_ints = (*offsets, *[-1] * len(self.states), *ints, *tail.ints)
-        there = {
+        state_names = {
             state.name
             for state, variable in zip(self.states, force.optional_states, strict=True)
             if variable is not None
@@ -295,7 +295,7 @@ class ForceType:
             record_size=tail.record_size,
             states=at_states,
             equilibrium=self.name + EQUILIBRIUM
-            if there & set(self.solved_states) and not force.form
+            if state_names & set(self.solved_states) and not force.form
             else "",
             batched=self.name + BATCHED if self.batched is not None and not force.form else "",
             response=Response(self.name + RESPONSE, len(offsets), len(self.states), sense)

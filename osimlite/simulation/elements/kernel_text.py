@@ -19,7 +19,11 @@ from osimlite.mechanics.kernels.batched_curves import (
 from osimlite.mechanics.kernels.condensation import WIDTH
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.table import PARAMETERS, compile_text
-from osimlite.mechanics.laws.dual_numbers import carrying, carrying_room, slope_of
+from osimlite.mechanics.laws.dual_numbers import (
+    get_derivative,
+    make_dual_workspace,
+    seed_derivative,
+)
 from osimlite.simulation.elements.laws import BATCHED, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
@@ -132,13 +136,13 @@ class KernelText:
         law = force_type.law_from_record or force_type.law
         count = len(changed)
         for column, place in changed.items():
-            arguments[place] = f"carrying({arguments[place]}, {directions[column]}, {count})"
+            arguments[place] = f"seed_derivative({arguments[place]}, {directions[column]}, {count})"
         # Expressions compute in the record. The stored control already includes the reflex (rate 0).
         arguments = [
-            f"carrying_room({each}, {count})"
-            if each.startswith("at(record")
-            else each.replace(", rate)", ", 0.0)")
-            for each in arguments
+            f"make_dual_workspace({argument}, {count})"
+            if argument.startswith("at(record")
+            else argument.replace(", rate)", ", 0.0)")
+            for argument in arguments
         ]
         if force_type.law_from_record is not None and force_type.law is not None:
             known_parameters = signature(force_type.law).parameters
@@ -161,14 +165,19 @@ class KernelText:
         for row, name in enumerate(rows):
             for column in range(WIDTH):
                 value = (
-                    f"slope_of({name}_0, {directions[column]})" if column in directions else "0.0"
+                    f"get_derivative({name}_0, {directions[column]})"
+                    if column in directions
+                    else "0.0"
                 )
                 lines.append(f"change[{WIDTH * row + column}] = {value}")
         lines[:0] = (
             *self._pointer_lines,
             *(force_type.geometry.recorded_setup_code or force_type.geometry.setup_code),
         )
-        carried = {function.__name__: function for function in (carrying, carrying_room, slope_of)}
+        carried = {
+            function.__name__: function
+            for function in (seed_derivative, make_dual_workspace, get_derivative)
+        }
         return self._compile_kernel(RESPONSE, "item", lines, law=law, **carried)
 
     @cached_property
@@ -178,15 +187,15 @@ class KernelText:
         Raises:
             TypeError: the force type has no batched law.
         """
-        force_type, made = self.force_type, self.force_type.batched
-        if made is None:
+        force_type, stages = self.force_type, self.force_type.batched
+        if stages is None:
             raise TypeError(f"the law of {force_type.name} has no parts")
         inputs = force_type.geometry.inputs
         recorded = force_type.record_offsets
         arguments = self._arguments
         # The record stores the quantities between the stages.
         offsets = (f"record[{place}]" for name, place in recorded.items() if name not in inputs)
-        known = dict(zip(made.known._fields, offsets, strict=False))
+        known = dict(zip(stages.known._fields, offsets, strict=False))
         of_moment = (
             len(self.input_names) + 1 + sum(state.is_argument for state in force_type.states)
         )
@@ -196,7 +205,7 @@ class KernelText:
         )
         # Forces of one kind are computed in lanes: first all requests of a stage, then their curves
         # together, then the law.
-        first, second = made.asked, made.sought
+        first, second = stages.asked, stages.sought
         *_, curves = force_type.terms
         places, number = {}, self.size - curves.size
         for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
@@ -253,16 +262,21 @@ class KernelText:
             BATCHED,
             "run",
             [
-                "lanes, first = at(data, model[run + RUN.ROOM]), model[run + RUN.FIRST]",
+                "lanes, first = at(data, model[run + RUN.WORKSPACE]), model[run + RUN.FIRST]",
                 "while first < model[run + RUN.END]:",
                 f"    end_of_part = min(first + {LANES // count}, model[run + RUN.END])",
                 *(f"    {line}" for line in lines),
                 "    first = end_of_part",
             ],
-            **{"known": made.known, "begin": made.begin, "law": first.law, "asking": second.asking},
+            **{
+                "known": stages.known,
+                "begin": stages.begin,
+                "law": first.law,
+                "asking": second.asking,
+            },
             **{
                 "search_law": second.law,
-                "end": made.end,
+                "end": stages.end,
                 "request_value": request_value,
                 "request_sum": request_sum,
                 "compute_requests": compute_requests,
@@ -447,8 +461,8 @@ class KernelText:
             arguments: arguments as expressions.
             law: name of the law in the kernel.
         """
-        made = self.force_type.inputs_type
-        if made is None:
+        inputs_type = self.force_type.inputs_type
+        if inputs_type is None:
             return f"{law}({', '.join(arguments)})"
         names = (
             *self.input_names,
@@ -456,7 +470,7 @@ class KernelText:
             *(state.name for state in self.force_type.states if state.is_argument),
         )
         arguments_by_name = dict(zip(names, arguments, strict=False))
-        first = f"{made.__name__}({', '.join(arguments_by_name.get(name, '0.0') for name in made._fields)})"
+        first = f"{inputs_type.__name__}({', '.join(arguments_by_name.get(name, '0.0') for name in inputs_type._fields)})"
         return f"{law}({', '.join((first, *arguments[len(names) :]))})"
 
     @property

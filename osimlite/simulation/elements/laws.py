@@ -36,7 +36,7 @@ WITHOUT_DERIVATIVES = frozenset(
         # Complete motions are differentiated step by step; these integrators are not differentiated.
         "run_several", "hold_several", "walk_several", "run_by_reflexes", "euler2", "adams", "bdf", "rosenbrock",
         # Searches, and evaluations of many poses.
-        "fit_frames", "least_effort", "watch", "look", "push_each", "assemble_poses",
+        "fit_frames", "least_effort", "evaluate_items", "evaluate_states", "push_each_actuator", "assemble_poses",
         # These compute initial states, which derivatives regard as constants.
         "equilibrate", "project",
         # Methods for stiff motions and pictures use these.

@@ -329,7 +329,7 @@ class Together(Parameter):
             Integers and numbers of fixed position.
         """
         packed = [
-            term.pack(each, tail, where) for term, each in zip(self.terms, value, strict=True)
+            term.pack(item, tail, where) for term, item in zip(self.terms, value, strict=True)
         ]
         return [place for ints, _ in packed for place in ints], [
             x for _, numbers in packed for x in numbers

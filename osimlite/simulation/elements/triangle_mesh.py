@@ -214,30 +214,30 @@ class TriangleMesh:
                 return len(np.unique(label[self.triangles])) == 1
             label = new
 
-    def find_nearest(self, places: Array) -> tuple[Array, Flags]:
+    def find_nearest(self, points: Array) -> tuple[Array, Flags]:
         """Return the nearest points of the surface to some points.
 
         Args:
-            places: the points (m, 3), m.
+            points: the points (m, 3), m.
 
         Returns:
             The nearest points (m, 3), and which of the given points are inside the surface (m,).
         """
-        apart = np.linalg.norm(places[:, None] - self.centroids, axis=2)
+        distances = np.linalg.norm(points[:, None] - self.centroids, axis=2)
         # A triangle whose nearest possible point is farther than the farthest of another one is
         # out.
-        least = (apart + self._reaches).min(axis=1)
-        which, triangles = np.nonzero(apart - self._reaches <= least[:, None])
-        result = _find_nearest_on_triangles(self.corners[triangles], places[which])
-        ways = result - places[which]
-        squares = np.einsum("ij,ij->i", ways, ways)
-        bound = np.full(len(places), np.inf)
-        np.minimum.at(bound, which, squares)
+        least = (distances + self._reaches).min(axis=1)
+        point_index, triangles = np.nonzero(distances - self._reaches <= least[:, None])
+        result = _find_nearest_on_triangles(self.corners[triangles], points[point_index])
+        offsets = result - points[point_index]
+        squares = np.einsum("ij,ij->i", offsets, offsets)
+        bound = np.full(len(points), np.inf)
+        np.minimum.at(bound, point_index, squares)
         # Where triangles meet, the one most perpendicular to the offset decides what is inside.
-        height = np.einsum("ij,ij->i", ways, self.normals[triangles])
-        near = np.flatnonzero(squares <= _AS_NEAR * bound[which])
-        order = near[np.lexsort((-np.abs(height[near]), which[near]))]
-        best = order[np.unique(which[order], return_index=True)[1]]
+        height = np.einsum("ij,ij->i", offsets, self.normals[triangles])
+        near = np.flatnonzero(squares <= _AS_NEAR * bound[point_index])
+        order = near[np.lexsort((-np.abs(height[near]), point_index[near]))]
+        best = order[np.unique(point_index[order], return_index=True)[1]]
         return result[best], height[best] > 0.0
 
     def crosses(self, other: TriangleMesh) -> bool:

@@ -89,11 +89,11 @@ class BatchWorkspace:
         # After the work vector follow the positions of contacts and watches, then the head and the
         # stages of the method.
         self._method_at = int(s[MODEL.WORK_SIZE]) + 3 * (pairs + len(kinds))
-        self._room = self._method_at + method.HEAD + method.STATES * size
+        self._workspace_size = self._method_at + method.HEAD + method.STATES * size
         # Implicit methods solve with a Jacobian, which needs the derivatives of the forces.
         if method.IS_IMPLICIT:
             program.link_responses(options.integrator)
-            self._room += condensation_size(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
+            self._workspace_size += condensation_size(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
         sizes = (
             options.most_tries,
             len(self._times),
@@ -129,47 +129,47 @@ class BatchWorkspace:
         A method of several steps keeps its history there, so a motion continues with the same
         workspace.
         """
-        return np.zeros(self._room)
+        return np.zeros(self._workspace_size)
 
-    def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
+    def run(self, workspace: Floats, first: int = 0, last: int | None = None) -> None:
         """Compute some of the runs.
 
         Other threads may compute others at the same time, in their own workspaces.
 
         Args:
-            room: the workspace.
+            workspace: the workspace.
             first: index of the first run.
             last: index after the last run; by default all that follow.
         """
         size = self.states.shape[1]
         first_error = int(self._engine.structure[MODEL.WORK_STATE]) + ERRORS * size
-        self.errors = room[first_error : first_error + size]
+        self.errors = workspace[first_error : first_error + size]
         vectors = self._vectors
         # A stride of 0 lets all runs share one row of numbers.
-        each = vectors.shape[1] if len(vectors) > 1 else 0
-        own = self._sizes, self.clocks, self.counts, self.states
+        vector_stride = vectors.shape[1] if len(vectors) > 1 else 0
+        run_arrays = self._sizes, self.clocks, self.counts, self.states
         records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
-        law, more = (
+        law, controller_parts = (
             ("run_several", ()) if self._held is None else ("run_by_reflexes", self._held.parts)
         )
-        parts = *records, self._kinds, self._levels, self.endings, *more
+        further_arrays = *records, self._kinds, self._levels, self.endings, *controller_parts
         self._call_law(
             law,
             vectors,
-            room,
-            each,
-            *own,
-            *parts,
+            workspace,
+            vector_stride,
+            *run_arrays,
+            *further_arrays,
             first,
             len(self.states) if last is None else last,
         )
 
-    def run_walk_law(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
+    def run_walk_law(self, law: str, workspace: Floats, numbers: Floats, *parts: Any) -> int:
         """Call a kernel of :mod:`osimlite.mechanics.kernels.walks`.
 
         Args:
             law: its name.
-            room: workspace, see :meth:`make_workspace`.
+            workspace: workspace, see :meth:`make_workspace`.
             numbers: numbers of the model (x,), which the kernel changes.
             parts: further arguments of the kernel.
 
@@ -179,7 +179,7 @@ class BatchWorkspace:
         return self._call_law(
             law,
             numbers,
-            room,
+            workspace,
             self._sizes,
             self.clocks,
             self.counts,
@@ -188,7 +188,7 @@ class BatchWorkspace:
             *parts,
         )
 
-    def _call_law(self, law: str, numbers: Floats, room: Floats, *parts: Any) -> int:
-        room[self._method_at :][: len(self._settings)] = self._settings
+    def _call_law(self, law: str, numbers: Floats, workspace: Floats, *parts: Any) -> int:
+        workspace[self._method_at :][: len(self._settings)] = self._settings
         program = self._engine.program
-        return program.run(program.code.get_entry(law), program.ints, numbers, room, *parts)
+        return program.run(program.code.get_entry(law), program.ints, numbers, workspace, *parts)

@@ -83,16 +83,16 @@ def run_many(
             f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
         )
     kinds, levels = _encode_watches(engine, options.watches)
-    held = None
+    controller_runs = None
     if options.held:
         if len(options.held) != count:
             raise OsimliteError(f"{len(options.held)} controllers are given for {count} runs")
         first, *others = options.held
-        held = first.make_runs(engine, engine.forces.controls, other_controllers=others)
+        controller_runs = first.make_runs(engine, engine.forces.controls, other_controllers=others)
         # Each run writes its held controls into its own numbers.
         vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
     batch = BatchWorkspace(
-        engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held
+        engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=controller_runs
     )
 
     def work(first: int) -> None:
@@ -103,15 +103,15 @@ def run_many(
     with ThreadPoolExecutor(options.threads or count_cores()) as pool:
         list(pool.map(work, range(0, count, RUNS_PER_TASK)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
-    kept = [
+    recorded_events = [
         rows[:total]
         for rows, total in zip(batch.events, batch.counts[:, record.COUNTS.EVENTS], strict=True)
     ]
     named = [
         [(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()]
-        for rows in kept
+        for rows in recorded_events
     ]
-    at_events = [rows[:, 3:] for rows in kept] if options.event_states else []
+    at_events = [rows[:, 3:] for rows in recorded_events] if options.event_states else []
     return Runs(
         batch.clocks[:, 0].copy(),
         batch.states,
@@ -141,13 +141,17 @@ def locate_contacts(
         rows: row of `numbers` for each state (k,); by default the first.
     """
     vectors = _to_number_rows(engine, numbers)
-    given = engine.state.to_table(states)
-    which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
-    places = np.zeros((len(given), len(engine.contacts), 9))
+    state_table = engine.state.to_table(states)
+    which = (
+        np.zeros(len(state_table), dtype=np.int64)
+        if rows is None
+        else np.array(rows, dtype=np.int64)
+    )
+    places = np.zeros((len(state_table), len(engine.contacts), 9))
     w = np.zeros(engine.structure[MODEL.WORK_SIZE])
     derivative = np.zeros(engine.state.size)
-    arrays = vectors, w, vectors.shape[1], which, given, derivative, places
-    engine.program.code.get_entry("contact_places")(engine.program.ints, *arrays, len(given))
+    arrays = vectors, w, vectors.shape[1], which, state_table, derivative, places
+    engine.program.code.get_entry("contact_places")(engine.program.ints, *arrays, len(state_table))
     return places
 
 

@@ -128,9 +128,9 @@ def compile_function(symbol: str, function: Function, directions: int) -> int:
         result = folder / _file_name(symbol, function, directions)
         compiler.compile(folder / "law.cpp", folder / "law.o", NATIVE)
         compiler.link([folder / "law.o"], result)
-        kept = _save_library(result)
-        if kept is not None:
-            return _load_library(kept, symbol)
+        saved_library = _save_library(result)
+        if saved_library is not None:
+            return _load_library(saved_library, symbol)
         # A loaded library can be deleted, except on Windows.
         if os.name != "nt":
             return _load_library(result, symbol)

@@ -91,7 +91,7 @@ class ControlledSteps(Stepper):
         # equal one run.
         resumed_step = held.next_step if held is not None else None
         self.next_step = options.initial_step if resumed_step is None else resumed_step
-        self._room: Floats | None = None
+        self._workspace: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (
             self.time,
@@ -208,13 +208,15 @@ class ControlledSteps(Stepper):
         ending = record.ENDING.FULL
         while ending == record.ENDING.FULL:
             started = perf_counter()
-            before = self.time
-            taken = self.taken
+            time_before = self.time
+            steps_before = self.taken
             ending = self._call_kernels(batch, steps)
             # The number of steps follows the allowed time, but grows at most eightfold.
-            more = min(8.0 * steps, (self.taken - taken) * MAX_CALL_S / (perf_counter() - started))
-            steps = _steps_per_call[self._engine] = min(max(1, int(more)), LOGGED_STEPS)
-            yield (self.time - before) / max(self.taken - taken, 1)
+            next_steps = min(
+                8.0 * steps, (self.taken - steps_before) * MAX_CALL_S / (perf_counter() - started)
+            )
+            steps = _steps_per_call[self._engine] = min(max(1, int(next_steps)), LOGGED_STEPS)
+            yield (self.time - time_before) / max(self.taken - steps_before, 1)
 
     def _call_kernels(self, batch: BatchWorkspace, steps: int) -> int:
         """Take some steps in one call of the kernels.
@@ -233,9 +235,9 @@ class ControlledSteps(Stepper):
         # The log of the last call was copied, so it starts anew.
         count[record.COUNTS.LOGGED] = 0
         batch.limit_steps(steps)
-        if self._room is None:
-            self._room = batch.make_workspace()
-        batch.run(self._room)
+        if self._workspace is None:
+            self._workspace = batch.make_workspace()
+        batch.run(self._workspace)
         (ending,), logged = batch.endings.tolist(), int(count[record.COUNTS.LOGGED])
         log = batch.log[:logged].copy(), batch.forces[:logged].copy()
         clock = batch.clocks[0].tolist()
@@ -271,18 +273,18 @@ class ControlledSteps(Stepper):
         ]
         index = max(range(len(off)), key=lambda k: off[k] if isfinite(off[k]) else inf)
         if not isfinite(off[index]):
-            what = f"leaves the range of numbers in {self._get_state_name(index)}"
+            fault = f"leaves the range of numbers in {self._get_state_name(index)}"
         elif off[index] > self._accuracy:
-            what = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._get_state_name(index)}"
+            fault = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._get_state_name(index)}"
         elif self._engine.structure[MODEL.CONSTRAINED]:
-            what = "ends too far from the constraints"
+            fault = "ends too far from the constraints"
         else:
-            what = "ends in a state that cannot be computed"
+            fault = "ends in a state that cannot be computed"
         # With loose accuracy, muscle fibers diverge; with a strict one, stiff forces are the usual
         # cause.
         other = "smaller" if self._accuracy > DEFAULT_ACCURACY else "larger"
         raise IntegrationError(
-            f"The integrator cannot continue at t = {t0:.9g} s: even its shortest step of {h:.3g} s {what}. "
+            f"The integrator cannot continue at t = {t0:.9g} s: even its shortest step of {h:.3g} s {fault}. "
             "Something changes too abruptly there, such as a very stiff contact or a sharp limit: soften it, or "
             f"use a {other} accuracy value.",
             t0,

@@ -14,12 +14,12 @@ from types import FunctionType
 from typing import Any
 
 from osimlite.mechanics.laws.dual_numbers import (
-    carrying,
-    carrying_room,
-    is_nothing,
-    plain,
-    settled,
-    slope_of,
+    differentiate_root,
+    get_derivative,
+    is_exact_zero,
+    make_dual_workspace,
+    seed_derivative,
+    strip_derivatives,
 )
 
 # At the edge of a function's domain, where the slope is infinite, it counts as 0.
@@ -136,15 +136,19 @@ def _apply_chain_rule(
         Function that returns a float if all arguments are floats.
     """
 
-    def differentiate(*given: Any) -> Any:
-        values = [float(x) for x in given]
+    def differentiate(*arguments: Any) -> Any:
+        values = [float(x) for x in arguments]
         result = function(*values)
         change: list[float] = []
-        for x, slope in zip(given, slopes, strict=True):
+        for x, slope in zip(arguments, slopes, strict=True):
             if isinstance(x, DualNumber):
-                by = slope(*values, result)
-                more = [by * own for own in x.slopes]
-                change = [a + b for a, b in zip(change, more, strict=True)] if change else more
+                partial_slope = slope(*values, result)
+                scaled_slopes = [partial_slope * component for component in x.slopes]
+                change = (
+                    [a + b for a, b in zip(change, scaled_slopes, strict=True)]
+                    if change
+                    else scaled_slopes
+                )
         return DualNumber(result, change) if change else result
 
     return differentiate
@@ -198,12 +202,12 @@ def _is_zero(number: Any) -> bool:
 
 DUAL_REPLACEMENTS: dict[Any, Any] = {
     **_RULES,
-    plain: float,
-    settled: _differentiate_root,
-    is_nothing: _is_zero,
-    carrying: _seed_direction,
-    carrying_room: lambda vector, directions: [0.0] * len(vector),
-    slope_of: lambda number, direction: (
+    strip_derivatives: float,
+    differentiate_root: _differentiate_root,
+    is_exact_zero: _is_zero,
+    seed_derivative: _seed_direction,
+    make_dual_workspace: lambda vector, directions: [0.0] * len(vector),
+    get_derivative: lambda number, direction: (
         number.slopes[direction] if isinstance(number, DualNumber) else 0.0
     ),
 }

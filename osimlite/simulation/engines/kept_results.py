@@ -60,9 +60,9 @@ class KeptResults:
             if content is None:
                 continue
             try:
-                kept = json.loads(content)
-                if kept["key"] == self._key:
-                    return dict(kept["results"])
+                document = json.loads(content)
+                if document["key"] == self._key:
+                    return dict(document["results"])
             except (ValueError, TypeError, LookupError):
                 continue
         return {}

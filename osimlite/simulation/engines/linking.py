@@ -367,9 +367,9 @@ class Program:
             return
         size = int(self.ints[MODEL.STATE_SIZE])
         sizes = len(self.ints), self._count, int(self.ints[MODEL.WORK_SIZE]), size, size
-        self.ints[place], kept = self.code.make_callback(self._catch_errors(kernel), sizes)
+        self.ints[place], callback = self.code.make_callback(self._catch_errors(kernel), sizes)
         # ctypes frees a callback that Python does not refer to, while the kernels still call it.
-        self._kept.append(kept)
+        self._kept.append(callback)
 
     def link_responses(self, method: str) -> None:
         """Prepare an implicit method and the derivatives that it needs.

@@ -80,7 +80,7 @@ class NumberUpdater:
         Returns:
             The changed model; None if more than numbers changed.
         """
-        made: dict[str, Any] = {}
+        new_elements: dict[str, Any] = {}
         owners, controls = list(owners), self._forces.controls
         controllers = [
             self._builder.path(owner) for owner in owners if isinstance(owner, Controller)
@@ -104,12 +104,12 @@ class NumberUpdater:
         }
         for force in (
             *owners,
-            *(other for each in sharing for other in self._model.components(each)),
+            *(other for force_class in sharing for other in self._model.components(force_class)),
         ):
             if isinstance(force, Force):
                 element = self._builder.make_element(force)
-                made[element.path] = element
-        if not made.keys() <= self._items.keys():
+                new_elements[element.path] = element
+        if not new_elements.keys() <= self._items.keys():
             return None
         only_forces = all(isinstance(owner, Force | Controller) for owner in owners)
         has_probes = any(isinstance(element, DeclaredProbe) for element in self._forces.elements)
@@ -117,33 +117,37 @@ class NumberUpdater:
             if not only_forces:
                 # Metabolic probes depend on the mass of the model.
                 return None
-            made |= {
+            new_elements |= {
                 probe.path: probe for probe in make_probes(self._builder, self._forces.elements)
             }
-        elements = tuple(made.get(element.path, element) for element in self._forces.elements)
+        elements = tuple(
+            new_elements.get(element.path, element) for element in self._forces.elements
+        )
         forces = replace(self._forces, elements=elements, controls=controls)
         mechanism = self._mechanism if only_forces else self._replace_masses()
         if mechanism is None:
             return None
         numbers = (
-            self._replace_force_numbers(made, forces.controls)
+            self._replace_force_numbers(new_elements, forces.controls)
             if only_forces
             else self._pack_numbers(mechanism, forces)
         )
         return None if numbers is None else UpdatedModel(mechanism, forces, numbers, self._engine)
 
-    def _replace_force_numbers(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
+    def _replace_force_numbers(
+        self, new_elements: Mapping[str, Any], controls: Controls
+    ) -> Floats | None:
         """Return the numbers of the model with those of some forces replaced.
 
         Args:
-            made: new force elements by path.
+            new_elements: new force elements by path.
             controls: the controls, new or as before.
 
         Returns:
             The numbers (m,); None if the structure of a force or of the controls changed.
         """
         numbers = self._engine.numbers.copy()
-        for path, element in made.items():
+        for path, element in new_elements.items():
             items = element.make_records(self._places)
             if [_describe_structure(item) for item in items] != [
                 _describe_structure(item) for item in self._items[path]
@@ -156,10 +160,10 @@ class NumberUpdater:
         if controls is not self._forces.controls:
             structure = self._engine.structure
             place = structure[MODEL.CONTROLS]
-            ints, own, _ = controls.make_record()
+            ints, control_numbers, _ = controls.make_record()
             if structure[place + ITEM.OWN :].tolist() != ints:
                 return None
-            numbers[structure[place + ITEM.NUMBERS] :] = own
+            numbers[structure[place + ITEM.NUMBERS] :] = control_numbers
         return numbers
 
     def _replace_masses(self) -> Mechanism | None:

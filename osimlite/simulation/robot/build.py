@@ -223,11 +223,11 @@ class _RobotBuilder:
         Returns:
             The m motions, and the m + 1 fixed transforms before, between and after them.
         """
-        own = list(mobilizer.coordinates)
+        coordinate_indices = list(mobilizer.coordinates)
         motions: list[AxisMotion] = []
         frames = [start]
         for part in mobilizer.elementary():
-            for factor in self._simplify_motion(part, own):
+            for factor in self._simplify_motion(part, coordinate_indices):
                 if isinstance(factor, FixedTransform):
                     frames[-1] = frames[-1] @ factor.matrix
                 else:
@@ -236,13 +236,13 @@ class _RobotBuilder:
         return motions, frames
 
     def _simplify_motion(
-        self, part: FixedTransform | AxisMotion, own: Sequence[int]
+        self, part: FixedTransform | AxisMotion, coordinate_indices: Sequence[int]
     ) -> Iterator[FixedTransform | AxisMotion]:
         """Yield a motion with its constant part as a fixed transform.
 
         Args:
             part: part of a mobilizer.
-            own: indices in the mechanism of the mobilizer's coordinates.
+            coordinate_indices: indices in the mechanism of the mobilizer's coordinates.
 
         Yields:
             Fixed transforms and at most one motion, whose product is the part.
@@ -250,9 +250,9 @@ class _RobotBuilder:
         if isinstance(part, FixedTransform):
             yield part
         elif _is_constant(part.function) or all(
-            own[place] in self.still for place in part.coordinates
+            coordinate_indices[place] in self.still for place in part.coordinates
         ):
-            yield FixedTransform(part.transform(self.values[own]))
+            yield FixedTransform(part.transform(self.values[coordinate_indices]))
         elif part.function == IDENTITY or (line := find_line(part.function)) is None:
             yield part
         else:

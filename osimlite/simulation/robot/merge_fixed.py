@@ -29,16 +29,16 @@ def merge_fixed(robot: Robot) -> Robot:
             joints.append(replace(joint, parent=base, origin=start @ joint.origin))
             home[joint.child] = (joint.child, np.eye(4))
             continue
-        placed = start @ joint.origin
-        home[joint.child] = (base, placed)
-        own, root = links[base], base == robot.links[0].name
-        if not own.bodies:
+        child_frame = start @ joint.origin
+        home[joint.child] = (base, child_frame)
+        base_link, is_root = links[base], base == robot.links[0].name
+        if not base_link.bodies:
             names[base] = joint.child
-        links[base] = _weld_links(own, links[joint.child], placed, massless=root)
-    kept = [link.name for link in robot.links if home[link.name][0] == link.name]
+        links[base] = _weld_links(base_link, links[joint.child], child_frame, massless=is_root)
+    remaining_names = [link.name for link in robot.links if home[link.name][0] == link.name]
     return replace(
         robot,
-        links=tuple(replace(links[name], name=names[name]) for name in kept),
+        links=tuple(replace(links[name], name=names[name]) for name in remaining_names),
         joints=tuple(
             replace(joint, parent=names[joint.parent], child=names[joint.child]) for joint in joints
         ),

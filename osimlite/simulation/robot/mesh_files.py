@@ -119,10 +119,10 @@ class MeshFiles:
         """
         if key not in self._made:
             # Names that differ by case only are one file on Windows and macOS.
-            taken = {name.casefold() for name in self.files}
+            used_names = {name.casefold() for name in self.files}
             base = f"{MESH_FOLDER}/{legal(stem)}"
             name, count = f"{base}{kind}", 1
-            while name.casefold() in taken:
+            while name.casefold() in used_names:
                 count += 1
                 name = f"{base}_{count}{kind}"
             self._made[key] = name

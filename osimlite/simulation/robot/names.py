@@ -83,11 +83,11 @@ def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
     Returns:
         One name for each, in the same order.
     """
-    result, taken = [*names], set[str]()
+    result, used_names = [*names], set[str]()
     # Names that keep their spelling come first, since False sorts before True.
-    for place in sorted(range(len(names)), key=lambda place: spell(names[place]) != names[place]):
-        result[place] = make_unique_name(spell(names[place]), taken)
-        taken.add(result[place])
+    for index in sorted(range(len(names)), key=lambda index: spell(names[index]) != names[index]):
+        result[index] = make_unique_name(spell(names[index]), used_names)
+        used_names.add(result[index])
     return result
 
 
@@ -110,15 +110,15 @@ def coordinate_names(robot: Robot) -> Robot:
         robot: the robot; see :func:`joint_names`.
     """
     names = joint_names(robot.mechanism)
-    own = {joint.name: names[place] for place, joint in robot.joint_of.items()}
-    others = [joint.name for joint in robot.joints if joint.name not in own]
+    new_names = {joint.name: names[index] for index, joint in robot.joint_of.items()}
+    others = [joint.name for joint in robot.joints if joint.name not in new_names]
     # Coordinates without a joint may get one.
-    taken = set(names)
+    used_names = set(names)
     for name in others:
-        own[name] = make_unique_name(xml_name(name), taken)
-        taken.add(own[name])
+        new_names[name] = make_unique_name(xml_name(name), used_names)
+        used_names.add(new_names[name])
     links = [link.name for link in robot.links]
-    return _make_unique(robot, dict(zip(links, distinct(links, xml_name), strict=True)), own)
+    return _make_unique(robot, dict(zip(links, distinct(links, xml_name), strict=True)), new_names)
 
 
 def legal_names(robot: Robot) -> Robot:

@@ -122,10 +122,10 @@ class _Collector:
         if not appearance.visible:
             note("hidden-visual", path, "a shape that is there but not shown", "left out")
             return
-        made = self._shape(geometry, path)
-        if made is None:
+        shape_and_frame = self._shape(geometry, path)
+        if shape_and_frame is None:
             return
-        shape, placed = made
+        shape, placed = shape_and_frame
         surface = appearance.surface_properties
         # 3 is OpenSim's number for filled surfaces.
         if surface.representation != 3 or surface.texture:
@@ -154,7 +154,7 @@ class _Collector:
         Returns:
             Shape and frame (4, 4); None if it cannot be drawn, which is noted.
         """
-        note, here = self.note, np.eye(4)
+        note, identity = self.note, np.eye(4)
         # The sign of a scale mirrors, which matters for meshes only.
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:
@@ -162,16 +162,16 @@ class _Collector:
                 x, y, z = sizes = tuple(
                     2.0 * half * by for half, by in zip(geometry.half_lengths, scale, strict=True)
                 )
-                return (Box((x, y, z)), here) if self._is_drawable(path, sizes) else None
+                return (Box((x, y, z)), identity) if self._is_drawable(path, sizes) else None
             case Sphere() | Ellipsoid():
-                own = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
+                radii = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
                 a, b, c = sizes = tuple(
-                    radius * factor for radius, factor in zip(own, scale, strict=True)
+                    radius * factor for radius, factor in zip(radii, scale, strict=True)
                 )
                 if not self._is_drawable(path, sizes):
                     return None
                 if a == b == c:
-                    return Ball(a), here
+                    return Ball(a), identity
                 file = self.mesh_files.name_of_stretched("ellipsoid", make_ball(), (a, b, c))
                 note(
                     "ellipsoid",
@@ -180,7 +180,7 @@ class _Collector:
                     "written as a mesh file",
                     f"{file}, half axes {sizes} m",
                 )
-                return MeshFile(file), here
+                return MeshFile(file), identity
             case Cylinder():
                 # OpenSim's X, Y, Z are the X, Z, -Y of a frame in which the cylinder lies along Z.
                 a, b, length = sizes = (
@@ -217,9 +217,13 @@ class _Collector:
         """
         if all(0.0 < size < GREATEST for size in sizes):
             return True
-        given = " ".join(f"{size:g}" for size in sizes)
+        size_text = " ".join(f"{size:g}" for size in sizes)
         self.note(
-            "visual", path, "a shape whose size is not a positive number", "left out", f"{given} m"
+            "visual",
+            path,
+            "a shape whose size is not a positive number",
+            "left out",
+            f"{size_text} m",
         )
         return False
 

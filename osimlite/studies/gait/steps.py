@@ -158,7 +158,9 @@ def walk_many(
         most_tries=most_tries,
         threads=threads,
     )
-    return extract_walks(engine, states, runs, feet, numbers=numbers, room=estimate_event_count(to))
+    return extract_walks(
+        engine, states, runs, feet, numbers=numbers, event_capacity=estimate_event_count(to)
+    )
 
 
 def extract_walks(
@@ -168,7 +170,7 @@ def extract_walks(
     footing: FootContacts,
     *,
     numbers: ArrayLike | None = None,
-    room: int | None = None,
+    event_capacity: int | None = None,
 ) -> list[WalkerSteps]:
     """Find the steps and the falls of runs that recorded the states at their events.
 
@@ -178,7 +180,7 @@ def extract_walks(
         runs: runs with the watches of `make_fall_watches`, and possibly others.
         footing: contacts of the feet.
         numbers: numbers of the models, as for `run_many`.
-        room: number of events for which the runs had memory; a walk with as many ends as "too many
+        event_capacity: number of events for which the runs had memory; a walk with as many ends as "too many
             events".
 
     Returns:
@@ -217,7 +219,7 @@ def extract_walks(
             walk.end = float(runs.times[k])
             walk.ending = "walking" if ending == "done" else ending
             # With a full memory of events, later steps would be missing.
-            if room is not None and counts[k] >= room:
+            if event_capacity is not None and counts[k] >= event_capacity:
                 walk.ending = "too many events"
         result.append(walk)
     return result

@@ -508,7 +508,7 @@ class Reflexes:
         numbers = np.column_stack([numbers, np.tile(sensor_numbers, (len(numbers), 1))])
         header = np.zeros(REFLEXES.HEAD, dtype=np.int64)
         sensors = len(self.sources)
-        header[: REFLEXES.ROOM + 1] = (
+        header[: REFLEXES.MEMORY_SIZE + 1] = (
             *(
                 len(self.terms),
                 len(self._gates),

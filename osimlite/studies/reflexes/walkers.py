@@ -342,16 +342,16 @@ class Walkers(SensedModel):
 
         Args:
             plan: integers of the reflexes, see :mod:`osimlite.mechanics.kernels.reflexes`; its
-                `ROOM` is increased by the workspace of the criteria.
+                `MEMORY_SIZE` is increased by the workspace of the criteria.
             numbers: numbers of the reflexes of each candidate (w, r).
             criteria: integers of the criteria, see :mod:`osimlite.mechanics.kernels.criteria`.
             bounds: numbers of the criteria.
             criteria_size: length of the workspace of the criteria.
         """
         # The memory of a candidate is that of its reflexes, followed by that of the criteria.
-        plan[REFLEXES.ROOM] += criteria_size
-        memory = np.zeros((self.count, plan[REFLEXES.ROOM]))
-        self.criteria_work = memory[:, plan[REFLEXES.ROOM] - criteria_size :]
+        plan[REFLEXES.MEMORY_SIZE] += criteria_size
+        memory = np.zeros((self.count, plan[REFLEXES.MEMORY_SIZE]))
+        self.criteria_work = memory[:, plan[REFLEXES.MEMORY_SIZE] - criteria_size :]
         self._walk_arguments = (
             self.sensor_plan,
             self.sensor_numbers,

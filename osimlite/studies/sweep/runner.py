@@ -131,8 +131,8 @@ class _Observers:
         if self.watches and plan.engine != "compiled":
             raise SettingError("what stops a run needs --engine compiled")
         # The engine detects no events unless it may record at least one.
-        rooms = [measure.event_count(plan.to) for measure in self.measures]
-        self.most_events = max([*rooms, 1 if self.watches else 0])
+        event_counts = [measure.event_count(plan.to) for measure in self.measures]
+        self.most_events = max([*event_counts, 1 if self.watches else 0])
 
 
 class Runner:

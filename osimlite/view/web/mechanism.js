@@ -17,7 +17,7 @@
       this.x = new Float64Array(bytes(program.numbers).buffer);
       this.w = new Float64Array(program.work);
       this.y = new Float64Array(2 * n);
-      this.f = new Float64Array(Math.max(3 * program.room, 2 * n));
+      this.f = new Float64Array(Math.max(3 * program.most_corners, 2 * n));
       this.given = [this.s, this.x, this.w, this.y, this.f];
     }
 

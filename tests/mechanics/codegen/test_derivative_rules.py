@@ -14,7 +14,11 @@ import pytest
 
 from osimlite.mechanics.codegen.cplusplus import write_library
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.laws.dual_numbers import is_nothing, plain, settled
+from osimlite.mechanics.laws.dual_numbers import (
+    differentiate_root,
+    is_exact_zero,
+    strip_derivatives,
+)
 from osimlite.simulation.engines.dual_numbers import (
     ARITHMETIC_SLOPES,
     DUAL_REPLACEMENTS,
@@ -35,7 +39,9 @@ CHANGES = [(0.0, 1.0, -0.5), (2.0, -0.0, 0.25)]
 
 def write_function(function, which):
     """Return a kernel that applies a function to numbers of x, of which some carry no derivatives."""
-    given = [f"x[{k}]" if carries else f"plain(x[{k}])" for k, carries in enumerate(which)]
+    given = [
+        f"x[{k}]" if carries else f"strip_derivatives(x[{k}])" for k, carries in enumerate(which)
+    ]
     text = SIGNS.get(function, f"{function.__name__}({', '.join(['{}'] * len(which))})").format(
         *given
     )
@@ -46,7 +52,7 @@ def write_function(function, which):
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     scope = {
         **vars(math),
-        "plain": plain,
+        "strip_derivatives": strip_derivatives,
         "Floats": Floats,
         "Ints": Ints,
         "__name__": "osimlite.rules",
@@ -139,9 +145,13 @@ def corners(s: Ints, x: Floats, out: Floats, count: int) -> int:
     out[5] = floor(b) + int(b) * a
     out[6] = a if a else b
     out[7] = (a and b) + (a or 2.0)
-    out[8] = is_nothing(a) + 2.0 * is_nothing(b)
-    out[9] = settled(a, b - 1.0, 2.0) + settled(3.0, a, b * b) + settled(a, 1.0, b)
-    out[10] = plain(b) * a
+    out[8] = is_exact_zero(a) + 2.0 * is_exact_zero(b)
+    out[9] = (
+        differentiate_root(a, b - 1.0, 2.0)
+        + differentiate_root(3.0, a, b * b)
+        + differentiate_root(a, 1.0, b)
+    )
+    out[10] = strip_derivatives(b) * a
     total = 0.0
     for k in range(count):
         total += a * k

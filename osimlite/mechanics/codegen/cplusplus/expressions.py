@@ -193,17 +193,17 @@ class ExpressionWriter:
             f"{text}.{escape_name(kind.record._fields[index]) if kind.record else f'item{index}'}"
         )
 
-    def build(self, kind: Tuple, texts: Sequence[str], have: Sequence[Type]) -> str:
+    def build(self, kind: Tuple, texts: Sequence[str], types: Sequence[Type]) -> str:
         """Return the text of a new tuple.
 
         Args:
             kind: its type.
             texts: the items.
-            have: types of the items.
+            types: types of the items.
         """
         parts = [
-            self.cast(text, own, want)
-            for text, own, want in zip(texts, have, kind.parts, strict=True)
+            self.cast(text, source_type, target_type)
+            for text, source_type, target_type in zip(texts, types, kind.parts, strict=True)
         ]
         inner = f"{{{', '.join(parts)}}}"
         return self.names.name_type(kind) + (f"{{{inner}}}" if kind.is_array else inner)
@@ -222,13 +222,13 @@ class ExpressionWriter:
                 isinstance(part, ast.Starred) for part in node.elts
             ):
                 # Convert the items instead of the tuple, so that no temporary tuple is made.
-                wanted = dict(zip(node.elts, want.parts, strict=True))
+                type_by_part = dict(zip(node.elts, want.parts, strict=True))
                 texts = self.order_operands(
-                    node.elts, lambda part: self.text_as(part, wanted[part])
+                    node.elts, lambda part: self.text_as(part, type_by_part[part])
                 )
                 kinds = [
-                    self.function.require_type(part) if is_number(own) else own
-                    for part, own in wanted.items()
+                    self.function.require_type(part) if is_number(target_type) else target_type
+                    for part, target_type in type_by_part.items()
                 ]
                 return self.build(want, texts, kinds)
             if isinstance(node, ast.IfExp):
@@ -432,13 +432,13 @@ class ExpressionWriter:
         name = (
             self.text(first) if isinstance(first, ast.Name) else self.hold(have, self.text(first))
         )
-        own = self.cast(name, have, kind)
-        rest = self.guard_expression(self._decide, op, others, kind)
+        first_value = self.cast(name, have, kind)
+        other_values = self.guard_expression(self._decide, op, others, kind)
         test = name if have is BOOLEAN else f"{name} != 0"
         return (
-            f"({test} ? {rest} : {own})"
+            f"({test} ? {other_values} : {first_value})"
             if isinstance(op, ast.And)
-            else f"({test} ? {own} : {rest})"
+            else f"({test} ? {first_value} : {other_values})"
         )
 
     def compare(self, node: ast.Compare) -> ExpressionText:
@@ -569,12 +569,14 @@ class ExpressionWriter:
             ]
             called = self.function.specialise(function, complete)
             # Functions as arguments are part of the specialisation.
-            given = [
+            argument_texts = [
                 text
                 for text, kind in zip(texts, complete, strict=True)
                 if not isinstance(kind, Callee)
             ]
-            return ExpressionText(f"{self.names.name_function(called)}({', '.join(given)})")
+            return ExpressionText(
+                f"{self.names.name_function(called)}({', '.join(argument_texts)})"
+            )
         raise self.function.refuse(node)
 
     @staticmethod

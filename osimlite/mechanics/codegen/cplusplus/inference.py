@@ -165,8 +165,8 @@ class Specialisation(Kernel):
             case ast.Tuple(elts=parts) if kind is not None:
                 if not isinstance(kind, Tuple) or len(kind.parts) != len(parts):
                     raise self.refuse(target, f"what is unpacked is {kind!r}")
-                for part, own in zip(parts, kind.parts, strict=True):
-                    self._assign(part, own)
+                for part, part_type in zip(parts, kind.parts, strict=True):
+                    self._assign(part, part_type)
             case ast.Tuple():
                 pass
             case ast.Subscript(value=vector):

@@ -244,13 +244,13 @@ def _constant(reader: Reader, node: ast.expr) -> int:
     return value
 
 
-def _infer_settled(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+def _infer_differentiate_root(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
     _check_numbers(kinds, 3, 3)
     return _dual_or_float(kinds[:2])
 
 
-def _write_settled(codes: Sequence[str], kinds: Types, result: Type) -> str:
-    return f"py::settled({', '.join(_convert_to_floats(codes, kinds))})"
+def _write_differentiate_root(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return f"py::differentiate_root({', '.join(_convert_to_floats(codes, kinds))})"
 
 
 def _infer_plain(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
@@ -264,24 +264,24 @@ def _write_plain(name: str) -> Callable[[Sequence[str], Types, Type], str]:
     )
 
 
-def _infer_carrying(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+def _infer_seed_derivative(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
     _check_numbers(kinds, 3, 3)
     if not 0 <= _constant(reader, nodes[1]) < _constant(reader, nodes[2]):
         raise TypeError("there is no such direction")
     return dual(_constant(reader, nodes[2]))
 
 
-def _write_carrying(codes: Sequence[str], kinds: Types, result: Type) -> str:
+def _write_seed_derivative(codes: Sequence[str], kinds: Types, result: Type) -> str:
     return f"{result!r}::along({_convert_to_floats(codes[:1], kinds[:1])[0]}, {codes[1]})"
 
 
-def _infer_carrying_room(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+def _infer_dual_workspace(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
     if len(kinds) != 2 or not isinstance(kinds[0], Pointer) or kinds[0].element is not FLOAT:
         raise TypeError("it takes a vector of floats and an integer constant")
     return pointer_to(dual(_constant(reader, nodes[1])))
 
 
-def _write_carrying_room(codes: Sequence[str], kinds: Types, result: Type) -> str:
+def _write_dual_workspace(codes: Sequence[str], kinds: Types, result: Type) -> str:
     return f"reinterpret_cast<{result!r}>({codes[0]})"
 
 
@@ -310,11 +310,15 @@ INTRINSICS: dict[Any, Intrinsic] = {
         _infer_offset, lambda codes, kinds, result: f"({codes[0]} + {codes[1]})"
     ),
     pointers.call: Intrinsic(_infer_call, _write_call, INTEGER, has_effects=True),
-    dual_numbers.settled: Intrinsic(_infer_settled, _write_settled),
-    dual_numbers.is_nothing: _declare_fixed_result("is_nothing", BOOLEAN),
-    dual_numbers.plain: Intrinsic(_infer_plain, _write_plain("plain"), FLOAT),
-    dual_numbers.slope_of: Intrinsic(_infer_plain, _write_plain("slope_of"), FLOAT),
-    dual_numbers.carrying: Intrinsic(_infer_carrying, _write_carrying),
-    dual_numbers.carrying_room: Intrinsic(_infer_carrying_room, _write_carrying_room),
+    dual_numbers.differentiate_root: Intrinsic(
+        _infer_differentiate_root, _write_differentiate_root
+    ),
+    dual_numbers.is_exact_zero: _declare_fixed_result("is_exact_zero", BOOLEAN),
+    dual_numbers.strip_derivatives: Intrinsic(
+        _infer_plain, _write_plain("strip_derivatives"), FLOAT
+    ),
+    dual_numbers.get_derivative: Intrinsic(_infer_plain, _write_plain("get_derivative"), FLOAT),
+    dual_numbers.seed_derivative: Intrinsic(_infer_seed_derivative, _write_seed_derivative),
+    dual_numbers.make_dual_workspace: Intrinsic(_infer_dual_workspace, _write_dual_workspace),
 }
 """Rules of each function that is not a kernel."""

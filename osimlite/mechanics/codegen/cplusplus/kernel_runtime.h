@@ -138,9 +138,9 @@ inline T max(T a, T b) {
 }
 
 // What laws say of numbers with derivatives, where there are none.
-inline double plain(double x) { return x; }
-inline double slope_of(double, int64_t) { return 0.0; }
-inline bool is_nothing(double x) { return x == 0.0; }
+inline double strip_derivatives(double x) { return x; }
+inline double get_derivative(double, int64_t) { return 0.0; }
+inline bool is_exact_zero(double x) { return x == 0.0; }
 
 }  // namespace py
 
@@ -317,7 +317,7 @@ OSIMLITE_COMPARE(!=)
 
 namespace py {
 
-// The rules are those of osimlite/simulation/engines/carrying.py; `x` is the argument and `f` the value. Where a slope
+// The rules are those of osimlite/simulation/engines/dual_numbers.py; `x` is the argument and `f` the value. Where a slope
 // has no end, at the edge of what a function is defined for, it counts as 0.
 #define OSIMLITE_RULE(name, slope)                \
     OSIMLITE_DUAL Dual<N> name(const Dual<N>& a) { \
@@ -397,9 +397,9 @@ OSIMLITE_DUAL double ceil(const Dual<N>& x) { return std::ceil(x.value); }
 OSIMLITE_DUAL bool isnan(const Dual<N>& x) { return isnan(x.value); }
 OSIMLITE_DUAL bool isfinite(const Dual<N>& x) { return isfinite(x.value); }
 OSIMLITE_DUAL bool isinf(const Dual<N>& x) { return isinf(x.value); }
-OSIMLITE_DUAL double plain(const Dual<N>& x) { return x.value; }
-OSIMLITE_DUAL double slope_of(const Dual<N>& x, int64_t direction) { return x.slopes[direction]; }
-OSIMLITE_DUAL bool is_nothing(const Dual<N>& x) {
+OSIMLITE_DUAL double strip_derivatives(const Dual<N>& x) { return x.value; }
+OSIMLITE_DUAL double get_derivative(const Dual<N>& x, int64_t direction) { return x.slopes[direction]; }
+OSIMLITE_DUAL bool is_exact_zero(const Dual<N>& x) {
     bool result = x.value == 0.0;
     for (int k = 0; k < N; ++k) result = result && x.slopes[k] == 0.0;
     return result;
@@ -407,20 +407,20 @@ OSIMLITE_DUAL bool is_nothing(const Dual<N>& x) {
 
 // The derivatives of a root are those that its equation says: a Newton step whose error has no value.
 template <class Slope>
-static OSIMLITE_INLINE double settled(double root, double, const Slope&) {
+static OSIMLITE_INLINE double differentiate_root(double root, double, const Slope&) {
     return root;
 }
 template <int N, class Slope>
-static OSIMLITE_INLINE Dual<N> settled(const Dual<N>& root, double, const Slope&) {
+static OSIMLITE_INLINE Dual<N> differentiate_root(const Dual<N>& root, double, const Slope&) {
     return root;
 }
 template <int N, class Slope>
-static OSIMLITE_INLINE Dual<N> settled(const Dual<N>& root, const Dual<N>& error, const Slope& slope) {
-    return {root.value, root.slopes - (1.0 / plain(slope)) * error.slopes};
+static OSIMLITE_INLINE Dual<N> differentiate_root(const Dual<N>& root, const Dual<N>& error, const Slope& slope) {
+    return {root.value, root.slopes - (1.0 / strip_derivatives(slope)) * error.slopes};
 }
 template <int N, class Slope>
-static OSIMLITE_INLINE Dual<N> settled(double root, const Dual<N>& error, const Slope& slope) {
-    return {root, -((1.0 / plain(slope)) * error.slopes)};
+static OSIMLITE_INLINE Dual<N> differentiate_root(double root, const Dual<N>& error, const Slope& slope) {
+    return {root, -((1.0 / strip_derivatives(slope)) * error.slopes)};
 }
 
 }  // namespace py

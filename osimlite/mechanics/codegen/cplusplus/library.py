@@ -231,8 +231,10 @@ class Library:
 
     def _constant_text(self, value: tuple[Any, ...], kind: Tuple) -> str:
         inner = ", ".join(
-            self._constant_text(part, own) if isinstance(own, Tuple) else write_number(part)
-            for part, own in zip(value, kind.parts, strict=True)
+            self._constant_text(part, part_type)
+            if isinstance(part_type, Tuple)
+            else write_number(part)
+            for part, part_type in zip(value, kind.parts, strict=True)
         )
         return f"{{{{{inner}}}}}" if kind.is_array else f"{{{inner}}}"
 

@@ -45,22 +45,23 @@ class FunctionWriter(ExpressionWriter):
         function = self.function
         copies, parameters = [], []
         for parameter, kind in zip(function.given, function.arguments, strict=True):
-            own = function.variables[parameter]
-            if isinstance(kind, Callee) or own is None:
+            variable_type = function.variables[parameter]
+            if isinstance(kind, Callee) or variable_type is None:
                 continue
             local = self.local(parameter)
-            given = local if own is kind else f"{local}_given"
-            parameters.append(f"{self.names.name_type(kind)} {given}")
-            if own is not kind:
+            parameter_name = local if variable_type is kind else f"{local}_given"
+            parameters.append(f"{self.names.name_type(kind)} {parameter_name}")
+            if variable_type is not kind:
                 # The function assigns a wider type to this parameter, so it needs a copy.
                 copies.append(
-                    f"{self.names.name_type(own)} {local} = {self.convert(given, kind, own)};"
+                    f"{self.names.name_type(variable_type)} {local} = {self.convert(parameter_name, kind, variable_type)};"
                 )
                 copies[-1:-1] = self._take_pending()
         outer = [
-            f"{self.names.name_type(found)} {self.local(variable)};"
+            f"{self.names.name_type(outer_type)} {self.local(variable)};"
             for variable in self._places.outer
-            if (found := function.variables[variable]) is not None and not isinstance(found, Callee)
+            if (outer_type := function.variables[variable]) is not None
+            and not isinstance(outer_type, Callee)
         ]
         lines = [*copies, *outer, *self.block(function.body)]
         result = self.names.name_type(function.result or VOID)
@@ -198,10 +199,10 @@ class FunctionWriter(ExpressionWriter):
         constant = self.function.constant_index(bounds[2])
         # Without a constant step its sign is known at run time only.
         if constant is None:
-            held = self.new_name(f"{counter}_step")
+            step_name = self.new_name(f"{counter}_step")
             return (
-                f"for ({start}, {held} = {step}; {held} > 0 ? {counter} < {stop} : {counter} > {stop}; "
-                f"{counter} += {held})"
+                f"for ({start}, {step_name} = {step}; {step_name} > 0 ? {counter} < {stop} : {counter} > {stop}; "
+                f"{counter} += {step_name})"
             )
         if constant == 0:
             raise self.function.refuse(node, "the step is 0")
@@ -226,11 +227,13 @@ class FunctionWriter(ExpressionWriter):
             return self._assign_items(node, targets, value)
         # Several targets, or a tuple that is unpacked: evaluate the value once.
         text = self.text(value)
-        held = (
+        value_name = (
             text if is_number(kind) and isinstance(value, ast.Constant) else self.hold(kind, text)
         )
         lines = self._take_pending()
-        return lines + [line for target in targets for line in self.store(node, target, held, kind)]
+        return lines + [
+            line for target in targets for line in self.store(node, target, value_name, kind)
+        ]
 
     @staticmethod
     def _are_separate(targets: Sequence[ast.expr], value: ast.Tuple) -> bool:
@@ -285,13 +288,13 @@ class FunctionWriter(ExpressionWriter):
         lines: list[str] = []
         if len(targets) == 1 and self._is_independent(first, value, stored):
             for target, part in zip(first.elts, value.elts, strict=True):
-                own = self._assign_one(node, target, part, self.function.require_type(part))
-                lines += [*self._take_pending(), *own]
+                item_lines = self._assign_one(node, target, part, self.function.require_type(part))
+                lines += [*self._take_pending(), *item_lines]
             return lines
-        held = []
+        value_names = []
         for part in value.elts:
             text = self.text(part)
-            held.append(
+            value_names.append(
                 text
                 if isinstance(part, ast.Constant)
                 else self.hold(self.function.require_type(part), text)
@@ -299,7 +302,7 @@ class FunctionWriter(ExpressionWriter):
             lines += self._take_pending()
         for target in targets:
             assert isinstance(target, ast.Tuple)
-            for target_part, text, part in zip(target.elts, held, value.elts, strict=True):
+            for target_part, text, part in zip(target.elts, value_names, value.elts, strict=True):
                 lines += self.store(node, target_part, text, self.function.require_type(part))
         return lines
 
@@ -328,10 +331,10 @@ class FunctionWriter(ExpressionWriter):
             case ast.Name(id="_"):
                 return []
             case ast.Name(id=name):
-                own = self.function.variables[name]
-                assert own is not None
+                variable_type = self.function.variables[name]
+                assert variable_type is not None
                 return [
-                    f"{self._definition(node, name)}{self.local(name)} = {self.convert(text, kind, own)};"
+                    f"{self._definition(node, name)}{self.local(name)} = {self.convert(text, kind, variable_type)};"
                 ]
             case ast.Tuple(elts=parts):
                 assert isinstance(kind, Tuple)

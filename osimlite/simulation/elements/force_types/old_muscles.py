@@ -458,10 +458,10 @@ def compute_schutte(
     cos, active, passive, tendon = fibers
     # Fibers across the tendon carry nothing along it; OpenSim then takes the velocity of the path.
     if cos > NOTHING:
-        borne = max(tendon / cos - passive, 0.0)
+        active_force = max(tendon / cos - passive, 0.0)
         # The velocity follows from the force that the tendon bears.
         velocity = (
-            schutte_velocity(now.activation, max(active, 0.0), borne, fields.damping)
+            schutte_velocity(now.activation, max(active, 0.0), active_force, fields.damping)
             * m.optimal
             / fields.time
         )

@@ -101,9 +101,9 @@ def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tup
         # In this version the maximum speed depends on the activation: Vmax0 without, Vmax with full
         # activation.
         fastest = fields.slowest + min(now.activation, 1.0) * (fields.fastest - fields.slowest)
-        borne = tendon / cos - passive
+        active_force = tendon / cos - passive
         velocity = thelen_velocity(
-            now.activation, active, borne, fields.damping, fields.shape, fields.most
+            now.activation, active, active_force, fields.damping, fields.shape, fields.most
         )
         velocity *= fastest * m.optimal
     else:

@@ -168,8 +168,8 @@ class Window:
                 PITCH_DEG,
                 max(0.5, DISTANCE_FACTOR * float(np.ptp(places, axis=0).max())),
             )
-        elif asked := self._get_selected_view():
-            self._view = asked
+        elif selected_view := self._get_selected_view():
+            self._view = selected_view
         yaw, pitch, distance = self._view
         bullet.resetDebugVisualizerCamera(
             distance, yaw, pitch, places.mean(axis=0).tolist(), physicsClientId=client

@@ -35,7 +35,7 @@ def mute_output(descriptor: int = 2) -> Iterator[None]:
     """
     # PyBullet prints from C, so that only the descriptor can be redirected.
     try:
-        kept = os.dup(descriptor)
+        saved_descriptor = os.dup(descriptor)
     except OSError:
         # Programs without standard error have nothing to mute.
         yield
@@ -46,8 +46,8 @@ def mute_output(descriptor: int = 2) -> Iterator[None]:
     try:
         yield
     finally:
-        os.dup2(kept, descriptor)
-        os.close(kept)
+        os.dup2(saved_descriptor, descriptor)
+        os.close(saved_descriptor)
         os.close(nowhere)
 
 

@@ -168,14 +168,14 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
         raise ModelError(
             f"the 'coordinate_paths' of '{where}' name a coordinate twice; name each once"
         )
-    given = path.moment_arm_functions
-    if given and len(given) != count:
+    moment_arm_functions = path.moment_arm_functions
+    if moment_arm_functions and len(moment_arm_functions) != count:
         raise ModelError(
-            f"'{where}' has {len(given)} moment_arm_functions for {count} coordinates; give one for each, or none"
+            f"'{where}' has {len(moment_arm_functions)} moment_arm_functions for {count} coordinates; give one for each, or none"
         )
     arms = tuple(
         _read_function(item, count, f"'moment_arm_functions[{number}]' of '{where}'")
-        for number, item in enumerate(given)
+        for number, item in enumerate(moment_arm_functions)
     )
     speed = path.lengthening_speed_function
     return CoordinatePath(

@@ -212,9 +212,9 @@ class ThroughPoints:
                 if not self.geodesic
                 else (-1 - of if node.kind == NODE_TYPE.TANGENT else number)
             )
-            own, more = node.pack(places, of, len(numbers), self.path, piece)
-            ints += own
-            numbers += more
+            node_ints, node_numbers = node.pack(places, of, len(numbers), self.path, piece)
+            ints += node_ints
+            numbers += node_numbers
         kernel, work = (
             "wrapped_path" if self.surfaces else "straight_path",
             PATH_WORK.ORDER + len(nodes) * (1 + NODE_WORK.SIZE),
@@ -394,14 +394,14 @@ def _read_conditional_point(builder: ElementBuilder, point: Any, body: int, fram
     low, high = point.range
     coordinate = builder.find_coordinate(point, "socket_coordinate")
     # The tolerance keeps points active at a range that is given with few digits.
-    within = low - TOLERANCE, high + TOLERANCE
+    active_range = low - TOLERANCE, high + TOLERANCE
     return Node(
         body,
         frame,
         np.array(point.location),
         NODE_TYPE.CONDITIONAL,
         coordinate,
-        within,
+        active_range,
         name=point.name,
     )
 
@@ -418,9 +418,16 @@ def _read_moving_point(builder: ElementBuilder, point: Any, body: int, frame: Ar
         raise ModelError(
             f"the three coordinates of '{builder.path(point)}' differ; name the same one in all sockets"
         )
-    within = builder.mechanism.coordinates[coordinate].range
+    coordinate_range = builder.mechanism.coordinates[coordinate].range
     return Node(
-        body, frame, np.zeros(3), NODE_TYPE.MOVING, coordinate, within, tuple(functions), point.name
+        body,
+        frame,
+        np.zeros(3),
+        NODE_TYPE.MOVING,
+        coordinate,
+        coordinate_range,
+        tuple(functions),
+        point.name,
     )
 
 

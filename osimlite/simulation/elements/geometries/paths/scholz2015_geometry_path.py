@@ -157,23 +157,23 @@ class Cable:
         Args:
             places: placement of the bodies in the links of the tree.
         """
-        most = together = 0
+        longest_run = run_length = 0
         ints, numbers, work = list[int](), list[float](), CABLE_WORK.FIRST
         for element in self.elements:
             # The solver couples obstacles between two points, so its size follows from the longest
             # run of obstacles.
-            together = together + 1 if element.is_obstacle else 0
-            most = max(most, together)
-            link, own = element.pack(places)
+            run_length = run_length + 1 if element.is_obstacle else 0
+            longest_run = max(longest_run, run_length)
+            link, element_numbers = element.pack(places)
             ints += int(element.is_obstacle), link, len(numbers), work
-            numbers += own
+            numbers += element_numbers
             work += element.size
         head = ITEM.OWN, len(self.elements), work
         path = ForceRecord(
             "cable_path",
             (*head, *ints),
             tuple(numbers),
-            record_size=work + solver_size(most),
+            record_size=work + solver_size(longest_run),
             is_part=True,
         )
         return [ForceRecord("pull_cable", is_part=True), path]
