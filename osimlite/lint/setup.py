@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -60,6 +61,7 @@ class Setup(Subject):
     def __init__(self, survey: Survey, config: Config | None = None) -> None:
         super().__init__(survey, config)
         self._looked_at: dict[str, None] = {}
+        self._tools_by_folder: dict[Path, list[tuple[str, Object]]] = {}
 
     def is_for(self, rule: Rule) -> bool:
         """Return whether a rule applies: rules on text, tags and values apply to every document."""
@@ -171,36 +173,56 @@ class Setup(Subject):
 
     # ------------------------------------------------------------------------------------------------- context
 
-    @cached_property
-    def neighbours(self) -> list[tuple[str, Object]]:
-        """Tools in this folder, its parent, and folders beside and below, with the paths of their setups."""
-        if self.folder is None:
-            return []
-        folder = self.folder.resolve()
-        return self._read_tools(
-            [folder, folder.parent, *list_folders(folder), *list_folders(folder.parent)]
-        )
+    def iterate_neighbours(self) -> Iterator[tuple[str, Object]]:
+        """Yield tools in this folder, its parent, and folders beside and below, with the paths of their setups.
 
-    def _read_tools(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
-        """Return the tools that name a model in setup files directly in folders, and note what was read.
+        A folder is read when its first tool is asked for: most sets are read by a tool of their own folder.
+        """
+        if self.folder is None:
+            return
+        folder = self.folder.resolve()
+        beside = (other for above in (folder, folder.parent) for other in list_folders(above))
+        yield from self._read_tools(chain((folder, folder.parent), beside))
+
+    def list_tools_beside(self) -> list[tuple[str, Object]]:
+        """Return the tools in the folder of this document, with the paths of their setups."""
+        return [] if self.folder is None else self._read_folder(self.folder.resolve())
+
+    def _read_tools(self, folders: Iterable[Path]) -> Iterator[tuple[str, Object]]:
+        """Yield the tools in setup files directly in folders, each folder once.
 
         Args:
-            folders: folders to search, without those below them; of each the first
-                `_MAX_NEIGHBOURS` documents.
+            folders: folders to search, without those below them.
+
+        Yields:
+            Path of each setup, and its tool.
+        """
+        visited: set[Path] = set()
+        for folder in folders:
+            if folder not in visited:
+                visited.add(folder)
+                yield from self._read_folder(folder)
+
+    def _read_folder(self, folder: Path) -> list[tuple[str, Object]]:
+        """Return the tools that name a model in setup files directly in a folder, and note what was read.
+
+        Args:
+            folder: the folder; its first `_MAX_NEIGHBOURS` documents are read.
 
         Returns:
             Path of each setup, and its tool.
         """
-        tools = []
-        for folder in dict.fromkeys(folders):
-            # The cache of reports must expire when a file in the folder appears or changes.
-            self._looked_at[str(folder)] = None
-            for file in (list_documents(str(folder)) or [])[:_MAX_NEIGHBOURS]:
-                # Most documents are no tools, which their first bytes show without parsing.
-                top = get_object(file) if _NAMES_MODEL.search(read_beginning(file)) else None
-                if top is not None and _find_model_file(top) is not None:
-                    tools.append((file, top))
-                    self._looked_at[file] = None
+        if folder in self._tools_by_folder:
+            return self._tools_by_folder[folder]
+        tools = self._tools_by_folder[folder] = []
+        # The cache of reports must expire when a file in the folder appears or changes.
+        self._looked_at[str(folder)] = None
+        for file in (list_documents(str(folder)) or [])[:_MAX_NEIGHBOURS]:
+            # Most documents are no tools, which their first bytes show without parsing.
+            top = get_object(file) if _NAMES_MODEL.search(read_beginning(file)) else None
+            if top is not None and _find_model_file(top) is not None:
+                tools.append((file, top))
+                self._looked_at[file] = None
         return tools
 
     @cached_property
@@ -221,7 +243,7 @@ class Setup(Subject):
             return
         own_path = os.path.realpath(self.file)
         # Paths may differ by symbolic links and by "..".
-        for file, top in self.neighbours:
+        for file, top in self.iterate_neighbours():
             folder = os.path.dirname(file)
             if any(
                 os.path.realpath(os.path.join(folder, name)) == own_path
@@ -331,9 +353,9 @@ class Setup(Subject):
     def find_writer(self, path: str) -> str | None:
         """Return another setup of the project that writes a file; None without one."""
         target = os.path.realpath(path)
-        around = self._read_tools(list(Path(target).parents)[:3])
+        around = self._read_tools([*Path(target).parents][:3])
         files_by_name_length: dict[int, str] = {}
-        for file, top in dict(self.neighbours + around).items():
+        for file, top in dict([*self.iterate_neighbours(), *around]).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
                 # Only other setups are searched.
                 continue

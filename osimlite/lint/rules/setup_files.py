@@ -297,10 +297,11 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
         return
     tool_path = os.path.realpath(setup.tool[0])
     reported_tags: set[str] = set()
-    for file, other_tool in setup.neighbours:
+    for file, other_tool in setup.list_tools_beside():
         other_path = os.path.realpath(file)
         if (
             other_path == tool_path
+            # A symbolic link may lead to a setup in another folder.
             or os.path.dirname(other_path) != os.path.dirname(tool_path)
             or find_motion_file(file, other_tool) != mine
         ):

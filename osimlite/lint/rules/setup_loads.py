@@ -158,7 +158,9 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
       </ExternalLoads>
     ```
     """
-    if setup.tree is None:
+    # Tools that read the document are searched in other folders, so this comes first.
+    all_loads = [*setup.find_by_class("ExternalLoads")]
+    if not all_loads or setup.tree is None:
         return
     # Of several tools that read the same loads, some have no motion yet.
     # A load may be read by several tools: inverse dynamics, RRA and so on.
@@ -171,7 +173,7 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
         return
     up = tuple(-component / weight for component in model.gravity)
     mass = sum(body.mass for body in setup.tree.list_members("/bodyset", "Body").values())
-    for loads in setup.find_by_class("ExternalLoads"):
+    for loads in all_loads:
         table = setup.read_table(loads.datafile)
         mean_force = [0.0, 0.0, 0.0]
         for force in select_members(loads, "ExternalForce") if table is not None else ():
