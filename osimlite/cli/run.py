@@ -208,27 +208,37 @@ def _run_alone(
     write_outside: bool,
 ) -> Outcome:
     """Run a setup, and say what came out."""
-    from osimlite.cli._console import say
+    import sys
+
+    from osimlite.cli._console import complain, say
+    from osimlite.cli._progress import progress_bar
     from osimlite.lint.diagnostic import Report
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
     try:
-        outcome = run_setup(
-            setup,
-            output,
-            tell=_show_findings,
-            progress=lambda line: say(line, err=True),
-            refine=refine,
-            simulates=simulates,
-            overwrite=overwrite,
-            write_outside=write_outside,
-        )
+        with progress_bar("running", None) as advance:
+            outcome = run_setup(
+                setup,
+                output,
+                tell=_show_findings,
+                # A terminal shows the last iteration of a search, a log all of them.
+                progress=(lambda line: advance(0, None, line))
+                if sys.stderr.isatty()
+                else (lambda line: say(line, err=True)),
+                refine=refine,
+                simulates=simulates,
+                overwrite=overwrite,
+                write_outside=write_outside,
+            )
     except FaultySetup as fault:
         # Only the errors: the warnings do not stop the setup.
         _show_findings(Report(fault.report.errors, fault.report.texts))
         raise
     _print_outcome(setup, outcome)
+    # Ipopt's status after Ctrl-C.
+    if outcome.summary.get("status") == "User_Requested_Stop":
+        complain("interrupted; the files contain the best iteration")
     return outcome
 
 

@@ -21,6 +21,7 @@ from osimlite.derivatives.symbols import (
     combine_condition,
     is_symbol,
     merge_values,
+    raise_interrupt,
     simplify_number,
     where,
 )
@@ -260,6 +261,7 @@ def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: A
     Raises:
         NoFormula: there are more than `MAX_BRANCH_COMBINATIONS` combinations.
     """
+    raise_interrupt()
     outer_frame = run.frame
     condition = where.condition
     # The caller runs the combinations of a widened part, as if its branches were the caller's own.

@@ -11,7 +11,7 @@ from osimlite.derivatives import branches
 from osimlite.derivatives.constraints import make_constrained_dynamics
 from osimlite.derivatives.outputs import list_probe_items
 from osimlite.derivatives.symbolic import make_symbolic, register_symbolic, replace_kernel
-from osimlite.derivatives.symbols import RecordedVector, casadi
+from osimlite.derivatives.symbols import RecordedVector, casadi, postpone_interrupts
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.constraint_equations import add_wrench_row
@@ -284,7 +284,8 @@ class SymbolicEvaluator:
             return SymbolicWorkspace(model, reals, data, f, result, branches.run.failures)
 
         try:
-            return branches.run_until_mergeable(run_once)
+            with postpone_interrupts():
+                return branches.run_until_mergeable(run_once)
         except branches.NoFormula as error:
             path = next(
                 (

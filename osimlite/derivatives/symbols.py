@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 import operator
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,10 +19,53 @@ from typing import Any
 from osimlite.base.require import require
 from osimlite.errors import MissingDependency
 
+_interruptions: list[object] = []
+"""Presses of Ctrl-C within `postpone_interrupts` that no `raise_interrupt` has raised yet."""
+
+
+@contextmanager
+def postpone_interrupts() -> Iterator[None]:
+    """Raise an interruption by the keyboard between calls of CasADi only.
+
+    CasADi's conversion of arguments calls Python, and discards whatever that raises: an exception
+    that Python's handler of Ctrl-C raises there would be lost, and the work would continue. Within
+    this context Ctrl-C is only noted. `raise_interrupt` and the end of the context raise it.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed within the block.
+    """
+    # Python delivers signals to the main thread only. A handler of the caller's stays.
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
+        return
+    _interruptions.clear()
+    signal.signal(signal.SIGINT, lambda *arguments: _interruptions.append(arguments))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    raise_interrupt()
+
+
+def raise_interrupt() -> None:
+    """Raise an interruption that `postpone_interrupts` has noted.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed.
+    """
+    if _interruptions:
+        _interruptions.clear()
+        raise KeyboardInterrupt
+
+
 if "opensim" in sys.modules and "casadi" not in sys.modules:
     # OpenSim ships another version of CasADi's library under the same name.
     raise MissingDependency("casadi cannot be loaded after opensim; use another process")
-casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
+with postpone_interrupts():
+    casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
 SX: Any = casadi.SX
 """Type of CasADi's symbolic scalar expressions."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.derivatives.symbols import casadi
+from osimlite.derivatives.symbols import casadi, postpone_interrupts, raise_interrupt
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.program import Program
 from osimlite.optimal.sparse import SparseMatrix
@@ -24,10 +24,12 @@ class Hessian:
         UnsupportedError: a goal is not linear in its integral, which would couple all points.
     """
 
+    @postpone_interrupts()
     def __init__(self, program: Program) -> None:
         self.program = program
         width = len(program.layout.lower)
         for group in program.groups:
+            raise_interrupt()
             group.make_hessian()
         rows, columns = program._list_entries("hessian_rows", "hessian_columns")
         # E depends on the variables at both ends (`direct` of them), then on the integrals.

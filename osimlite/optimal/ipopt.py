@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.derivatives.symbols import casadi
+from osimlite.derivatives.symbols import casadi, postpone_interrupts
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.hessian import Hessian
@@ -71,8 +71,11 @@ class Progress:
     worst: Violation | None
 
     def __str__(self) -> str:
-        violation_note = "" if self.worst is None else f"  largest violation {self.worst}"
-        return f"{self.iteration:5d}  objective {self.objective:.8g}{violation_note}"
+        violation = 0.0 if self.worst is None else self.worst.size
+        return (
+            f"iteration {self.iteration}, objective {self.objective:.6g}, "
+            f"infeasibility {violation:.2g}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,29 +147,13 @@ def run_ipopt(
     Raises:
         SimulationError: the objective or a constraint is not a number.
     """
-    search = _SearchCallbacks(program, report)
-    # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current
-    # folder, which may name a file to write to and a library to load.
-    options = {
-        "ipopt": _make_options(program)
-        | (WARM_START_OPTIONS if is_warm_start else {})
-        | {"print_level": 0, "sb": "yes", "option_file_name": ""},
-        # Values of bad trial points are normal in a line search; progress comes from the callback.
-        "print_time": False,
-        "show_eval_warnings": False,
-        # The multipliers and gradients of the result are not used.
-        "no_nlp_grad": True,
-        "calc_lam_p": False,
-        "calc_lam_x": False,
-        "iteration_callback": search.record_iteration,
-        "grad_f": search.gradient,
-        "jac_g": search.jacobian,
-    }
-    if _uses_exact_hessian(program):
-        options["hess_lag"] = _make_hessian_callback(program, search)
+    with postpone_interrupts():
+        search = _SearchCallbacks(program, report)
+        options = _make_solver_options(program, search, is_warm_start=is_warm_start)
     start_time = time.perf_counter()
-    _load_ipopt()
-    solver = casadi.nlpsol("moco", "ipopt", search.objective, options)
+    with postpone_interrupts():
+        _load_ipopt()
+        solver = casadi.nlpsol("moco", "ipopt", search.objective, options)
     lower = program.layout.lower
     upper = program.layout.upper
     with search.stop_on_interrupt():
@@ -200,6 +187,32 @@ def _load_ipopt() -> None:
     casadi.load_nlpsol("ipopt")
     if previous_value is None:
         del os.environ[THREADS_VARIABLE]
+
+
+def _make_solver_options(
+    program: Program, search: _SearchCallbacks, *, is_warm_start: bool
+) -> dict[str, Any]:
+    """Return the options of CasADi's solver with the functions of a search."""
+    # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current
+    # folder, which may name a file to write to and a library to load.
+    options = {
+        "ipopt": _make_options(program)
+        | (WARM_START_OPTIONS if is_warm_start else {})
+        | {"print_level": 0, "sb": "yes", "option_file_name": ""},
+        # Values of bad trial points are normal in a line search; progress comes from the callback.
+        "print_time": False,
+        "show_eval_warnings": False,
+        # The multipliers and gradients of the result are not used.
+        "no_nlp_grad": True,
+        "calc_lam_p": False,
+        "calc_lam_x": False,
+        "iteration_callback": search.record_iteration,
+        "grad_f": search.gradient,
+        "jac_g": search.jacobian,
+    }
+    if _uses_exact_hessian(program):
+        options["hess_lag"] = _make_hessian_callback(program, search)
+    return options
 
 
 def _uses_exact_hessian(program: Program) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.derivatives.symbols import casadi
+from osimlite.derivatives.symbols import casadi, raise_interrupt
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import read_range
 
@@ -119,6 +119,7 @@ class PointFormula:
         rows.append(errors)
         labels += names
         limits += [read_range(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
+        raise_interrupt()
         # The order of the results: rates, rates before projection, rows, integrands.
         rates = [problem.dynamics.correct_rates(point)]
         if self.projected:
@@ -141,12 +142,14 @@ class PointFormula:
         self.labels = labels
         self.limits = limits
         self.rows = column.numel()
+        raise_interrupt()
         simplified = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
         self._inputs = [s, z, fraction, time_data]
         self._variables = casadi.vertcat(s, z)
         self._implicit = implicit
         self._column = simplified[: self.rows]
         self._equations = simplified[self.rows :]
+        raise_interrupt()
         slopes = casadi.jacobian(simplified, casadi.vertcat(self._variables, implicit))
         width = self._variables.numel()
         jacobian = slopes[: self.rows, :width]
@@ -164,6 +167,7 @@ class PointFormula:
                 casadi.ldl_solve(slopes[self.rows :, :width], *self._factors)
             )
             jacobian += self._slope_by_implicit @ self._implicit_slope
+        raise_interrupt()
         self.jacobian_entries = [*map(np.array, jacobian.sparsity().get_triplet())]
         self.value = self._make_function("F", self._inputs, self._column)
         self.slope = self._make_function("J", self._inputs, casadi.vertcat(*jacobian.nonzeros()))

@@ -11,6 +11,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.derivatives.functions import CasadiModel
+from osimlite.derivatives.symbols import postpone_interrupts
 from osimlite.errors import SettingError
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
@@ -99,6 +100,7 @@ class Problem(StudyContext):
         DocumentError: the study is invalid, for example names a state that does not exist.
     """
 
+    @postpone_interrupts()
     def __init__(
         self,
         study: MocoStudy,

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.derivatives.symbols import casadi
+from osimlite.derivatives.symbols import casadi, postpone_interrupts, raise_interrupt
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import read_range
 from osimlite.optimal.layout import VARIABLE_KINDS, VariableLayout
@@ -52,6 +52,7 @@ class Program:
         jacobian_sparsity: sparsity pattern of the Jacobian of g.
     """
 
+    @postpone_interrupts()
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.layout = VariableLayout(problem)
@@ -148,6 +149,7 @@ class Program:
         self.end_labels: list[str] = []
         limits: list[tuple[float, float]] = []
         for goal, terms in problem.goals:
+            raise_interrupt()
             # By identity: goals may be equal.
             indices = [k for k, integral in enumerate(self.integrals) if integral[0] is goal]
             endpoints = Endpoints(start, end, totals[indices[0]] if indices else None)

@@ -163,7 +163,8 @@ def test_progress_names_what_is_violated_and_when(tmp_path):
     assert [each.iteration for each in told] == list(range(7))
     assert not found.success
     assert found.status == "Maximum_Iterations_Exceeded"
-    assert "defect at" in str(told[1])
+    assert "defect at" in str(told[1].worst)
+    assert str(told[1]).startswith("iteration 1, objective ")
     assert found.violations[0].size >= found.violations[-1].size > 0.0
 
 

@@ -32,7 +32,7 @@ def test_solutions_are_read(name, tmp_path, repo):
     command = [sys.executable, "-m", "osimlite", "run", str(file), "-o", str(tmp_path)]
     done = subprocess.run(command, cwd=repo, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "largest violation /jointset/j1/q1/speed defect at" in done.stderr
+    assert ", infeasibility " in done.stderr
     path = str(tmp_path / "MocoStudy_solution.sto")
     trajectory = osim.MocoTrajectory(path)
     assert trajectory.getNumTimes() == 101
