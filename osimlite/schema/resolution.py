@@ -47,11 +47,17 @@ def is_a(component: Object, target: str) -> bool:
         component: the component.
         target: name of a class.
     """
-    return _derives_from(type(component), target)
+    return derives_from(type(component), target)
 
 
 @cache
-def _derives_from(cls: type[Object], target: str) -> bool:
+def derives_from(cls: type[Object], target: str) -> bool:
+    """Return whether a class is `target` or derives from it; the module of `target` need not be imported.
+
+    Args:
+        cls: the class.
+        target: name of a class.
+    """
     return any(base.__name__ == target for base in cls.__mro__)
 
 

@@ -23,7 +23,6 @@ from osimlite.mechanics.multibody.parts import (
     MobileBody,
     StationPlacement,
 )
-from osimlite.mechanics.multibody.schema_constraints import ConstraintReader, unknown_constraint
 from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.schema_joints import joint_motions, unknown_joint
@@ -177,6 +176,8 @@ class _Builder:
         if holder in (self.model.joint_set, self.model.body_set):
             raise unknown_joint(path, component.class_name)
         if holder is self.model.constraint_set:
+            from osimlite.mechanics.multibody.schema_constraints import unknown_constraint
+
             raise unknown_constraint(path, component.class_name)
 
     def _make_edge(self, joint: Joint) -> _Edge:
@@ -383,15 +384,23 @@ class _Builder:
         Args:
             index: index of each body and of ground, by path.
         """
+        enforced = [
+            component
+            for component in self.tree.components
+            if isinstance(component, schema.Constraint) and component.isEnforced
+        ]
+        if not enforced:
+            return
+        # Models without constraints save the import of the classes.
+        from osimlite.mechanics.multibody.schema_constraints import ConstraintReader
+
         coordinate_indices = {
             info.path: coordinate_index for coordinate_index, info in enumerate(self.coordinates)
         }
         reader = ConstraintReader(
             self.placements, index, coordinate_indices, self.opensim_derivatives
         )
-        for component in self.tree.components:
-            if not isinstance(component, schema.Constraint) or not component.isEnforced:
-                continue
+        for component in enforced:
             constraint = reader.build_constraint(component)
             if isinstance(constraint, RollingConstraint) and not self.rolling:
                 continue

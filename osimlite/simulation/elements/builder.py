@@ -16,11 +16,13 @@ from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
+from osimlite.schema.resolution import is_a
 from osimlite.simulation.elements.controls import Drive, ModelControls
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 if TYPE_CHECKING:
     from osimlite.io.meshes.folders import MeshFolders
+    from osimlite.schema.actuators import Actuator
     from osimlite.simulation.elements.force_records import ForceElement
 
 C = TypeVar("C")
@@ -103,6 +105,12 @@ class ElementBuilder:
                 item for item in self.tree.components if isinstance(item, component_class)
             ]
         return self._of[component_class]
+
+    def list_actuators(self) -> list[Actuator]:
+        """Return the actuators, in the order of the model."""
+        # The name of the class saves models without actuators its import.
+        actuators: list[Any] = [item for item in self.tree.components if is_a(item, "Actuator")]
+        return actuators
 
     def iterate_forces(self) -> Iterator[Any]:
         """Yield every component that applies a force or has the states of one.

@@ -14,18 +14,14 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM, WORK
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import SmoothFunction
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
-from osimlite.schema.controller_types import (
-    ControlSetController,
-    CorrectionController,
-    TrackingController,
-)
+from osimlite.schema.resolution import is_a
 from osimlite.schema.sets import Controller
 from osimlite.simulation.elements.integral import evaluate_function
 from osimlite.simulation.elements.registry import CONTROLLERS
 
 if TYPE_CHECKING:
+    from osimlite.schema.actuators import Actuator
     from osimlite.simulation.elements.builder import ElementBuilder
 
 
@@ -129,7 +125,7 @@ class ModelControls:
     def __init__(self, builder: ElementBuilder) -> None:
         names: list[str] = []
         self._first: dict[str, int] = {}
-        for actuator in builder.find_components(Actuator):
+        for actuator in builder.list_actuators():
             path, count = builder.path(actuator), actuator.control_count
             self._first[path] = len(names)
             names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
@@ -137,7 +133,7 @@ class ModelControls:
         self.reflexes: dict[str, float] = {}
         self._refused: dict[str, UnsupportedError] = {}
         for controller, (actuator, signal, number) in _iterate_drives(builder):
-            if not isinstance(actuator, Actuator):
+            if not is_a(actuator, "Actuator"):
                 # An actuator of an unknown class is reported as an unsupported force.
                 continue
             path = builder.path(actuator)
@@ -196,7 +192,7 @@ def _iterate_drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive
         if isinstance(controller, Unknown):
             continue
         # OpenSim 4.6 enables a ControlSetController that has read its file.
-        if not (controller.enabled or isinstance(controller, ControlSetController)):
+        if not (controller.enabled or is_a(controller, "ControlSetController")):
             continue
         if (drive_by := CONTROLLERS.find(type(controller))) is not None:
             path = builder.path(controller)
@@ -204,13 +200,13 @@ def _iterate_drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive
                 builder.drives[path] = list(drive_by(builder, controller))
             yield from ((controller, drive) for drive in builder.drives[path])
             continue
-        if isinstance(controller, CorrectionController):
+        if is_a(controller, "CorrectionController"):
             raise ModelError(
                 f"the CorrectionController '{builder.path(controller)}' follows the states of a "
                 "ForwardTool, which a model alone does not have: OpenSim crashes; disable it"
             )
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"
-        if isinstance(controller, TrackingController):
+        if is_a(controller, "TrackingController"):
             why += ", whose desired motion is known to its tool only"
         for actuator in find_actuators(builder, controller):
             yield controller, Drive(actuator, builder.unsupported_error(actuator, why))
@@ -231,6 +227,6 @@ def map_actuators(builder: ElementBuilder) -> dict[str, Actuator]:
         Actuators by name.
     """
     result: dict[str, Actuator] = {}
-    for component in builder.find_components(Actuator):
+    for component in builder.list_actuators():
         result.setdefault(component.name, component)
     return result

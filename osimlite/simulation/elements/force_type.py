@@ -25,9 +25,8 @@ from typing import Any, ClassVar
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.multibody.links import Places
-from osimlite.schema.actuators import Actuator
+from osimlite.schema.resolution import derives_from, is_a
 from osimlite.schema.states import list_states
-from osimlite.schema.tree import is_a
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceRecord, Response, Silent
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
@@ -147,13 +146,14 @@ class ForceType:
 
     def __post_init__(self) -> None:
         named = [Number(item) if isinstance(item, str) else item for item in self.parameters]
-        if self.has_control and issubclass(self.component, Actuator):
+        if self.has_control and derives_from(self.component, "Actuator"):
             from osimlite.schema.muscles import Muscle
 
-            is_muscle = issubclass(self.component, Muscle)
+            actuator: Any = self.component
+            is_muscle = issubclass(actuator, Muscle)
             # Laws take the control first. Controllers that act by a muscle's lengthening speed add
             # to it in the kernel.
-            named.insert(0, ReflexControl() if is_muscle else Control(self.component.control_count))
+            named.insert(0, ReflexControl() if is_muscle else Control(actuator.control_count))
         # The record is frozen; this is its only field that follows from others.
         object.__setattr__(self, "terms", tuple(named))
         if self.inputs_type is not None and not {state.name for state in self.states} <= {
@@ -226,7 +226,7 @@ class ForceType:
         # the kernel.
         others = {SOLVED, *(state.rate for state in self.states)}
         names = [name for name in self.outputs if name not in others] + list(self.recorded_inputs)
-        if self.geometry.speed and issubclass(self.component, Actuator):
+        if self.geometry.speed and derives_from(self.component, "Actuator"):
             names.append(self.geometry.speed)
         return {name: index for index, name in enumerate(dict.fromkeys(names))}
 
