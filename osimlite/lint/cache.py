@@ -23,7 +23,7 @@ from osimlite.base.pruning import mark_used
 from osimlite.base.require import find_missing_packages
 from osimlite.base.writing import write_cached
 from osimlite.errors import OsimliteError
-from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
+from osimlite.lint.diagnostic import Consequence, Edit, Finding, Fix, Report, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -215,6 +215,7 @@ _TEXT, _NUMBER, _LIST, _FLAG = (str,), (int,), (list,), (bool,)
 _MAYBE_TEXT, _MAYBE_NUMBER, _MAYBE_LIST = (str, NoneType), (int, NoneType), (list, NoneType)
 _FINDING = (
     _TEXT, _TEXT, _TEXT, _TEXT, _MAYBE_NUMBER, _MAYBE_NUMBER, _NUMBER, _TEXT, _MAYBE_TEXT, _MAYBE_LIST,
+    _MAYBE_TEXT,
 )  # fmt: skip
 
 
@@ -240,14 +241,15 @@ def _dump_finding(finding: Finding) -> list[object]:
         None
         if fix is None
         else [fix.safe, [[edit.start, edit.end, edit.text] for edit in fix.edits]],
+        finding.consequence and finding.consequence.value,
     ]
 
 
 def _parse_finding(file: str, values: Any) -> Finding:
     """Return the finding that `_dump_finding` made a list of; TypeError for anything else."""
-    code, name, severity, message, line, column, length, component, suggestion, fix = _check_types(
-        values, *_FINDING
-    )
+    values = _check_types(values, *_FINDING)
+    code, name, severity, message, line, column, length, component, suggestion, fix = values[:-1]
+    consequence = values[-1]
     position = [number for number in (line, column) if number is not None]
     # A line without a column, or the other way round, cannot come from a finding; numbers count
     # from 1.
@@ -266,6 +268,7 @@ def _parse_finding(file: str, values: Any) -> Finding:
         component,
         suggestion,
         _parse_fix(fix),
+        None if consequence is None else Consequence(consequence),
     )
 
 

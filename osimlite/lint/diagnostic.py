@@ -30,6 +30,21 @@ class Severity(StrEnum):
         return _RANKS[self]
 
 
+class Consequence(StrEnum):
+    """What OpenSim does with a file that has a fault.
+
+    REFUSES: it rejects the file or the model, crashes, or hangs, before it computes a motion.
+    FAILS: it loads the model, and fails as soon as it needs the faulty part.
+    NAN: it runs the model, and computes NaN.
+    RUNS: it runs the model, maybe as something other than the text says.
+    """
+
+    REFUSES = "refuses"
+    FAILS = "fails"
+    NAN = "nan"
+    RUNS = "runs"
+
+
 _RANKS = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
 
@@ -66,6 +81,7 @@ class Finding:
         component: absolute path of the component; empty without one.
         suggestion: text that would be correct at this position.
         fix: change that removes the finding.
+        consequence: what OpenSim does because of the fault; None if the rule does not say.
     """
 
     code: str
@@ -79,6 +95,7 @@ class Finding:
     component: str = ""
     suggestion: str | None = None
     fix: Fix | None = field(default=None, compare=False)
+    consequence: Consequence | None = None
 
     @property
     def fixable(self) -> bool:
@@ -109,6 +126,7 @@ class Finding:
             "component": self.component,
             "suggestion": self.suggestion,
             "fixable": self.fixable,
+            "consequence": self.consequence and self.consequence.value,
         }
 
     def __str__(self) -> str:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from inspect import cleandoc
 
-from osimlite.lint.registry import FAMILIES, Rule, all_rules, rule_groups
+from osimlite.lint.registry import FAILS, FAMILIES, NAN, REFUSES, RUNS, Rule, all_rules, rule_groups
 
 _FIX_TEXTS = {
     "": "none",
     "safe": "sometimes, with --fix",
     "unsafe": "sometimes, with --unsafe-fixes (check it with --diff first)",
     "both": "sometimes, with --fix, or with --unsafe-fixes where it is a guess",
+}
+_CONSEQUENCE_TEXTS = {
+    REFUSES: "refuses the file",
+    FAILS: "fails when it needs the faulty part",
+    NAN: "computes NaN",
+    RUNS: "runs it, maybe as something else than is written",
 }
 _INTRODUCTION = """\
 # Rules
@@ -21,7 +27,12 @@ example, and the same example fixed.
 An **error** is something that OpenSim rejects, crashes on, computes NaN from, or reads differently from what is written.
 A **warning** is physically or numerically doubtful. An **info** is untidy, or worth knowing. A finding may have another
 severity than its rule where the file shows the reason. `--fix` makes **safe** fixes: OpenSim then reads the same model,
-or the one that was certainly meant. An **unsafe** fix is a guess; `--unsafe-fixes` makes it."""
+or the one that was certainly meant. An **unsafe** fix is a guess; `--unsafe-fixes` makes it.
+
+The column **OpenSim** is about errors: OpenSim **refuses** the file or the model (or crashes or hangs), loads it and
+**fails** as soon as it needs the faulty part, computes **nan**, or **runs** the model, maybe as something else than is
+written. It is empty if the rule does not say. Each finding has one of these words as `consequence` in `--format json`;
+that of a warning or an info is `runs`."""
 _SHORT = {"": "", "safe": "safe", "unsafe": "unsafe", "both": "safe or unsafe"}
 
 
@@ -32,6 +43,7 @@ def format_rule_page(rule: Rule) -> str:
         "",
         f"Severity: {describe_severity(rule)}",
         f"Fix: {_FIX_TEXTS[rule.fixes]}",
+        *([f"OpenSim: {describe_consequences(rule)}"] if rule.consequences else []),
         "",
         rule.page,
     ]
@@ -62,6 +74,11 @@ def describe_severity(rule: Rule) -> str:
     )
 
 
+def describe_consequences(rule: Rule) -> str:
+    """Return what OpenSim does because of the errors of a rule, such as ``computes NaN``; empty if the rule does not say."""
+    return ", or ".join(map(_CONSEQUENCE_TEXTS.__getitem__, rule.consequences))
+
+
 def format_index() -> str:
     """Return all rules and thresholds as one Markdown page, which is ``docs/rules.md``."""
     rows = [_INTRODUCTION]
@@ -70,14 +87,14 @@ def format_index() -> str:
             "",
             f"## {family.capitalize()}",
             "",
-            "| Code | Name | Severity | Fix | Reports |",
-            "|---|---|---|---|---|",
+            "| Code | Name | Severity | Fix | OpenSim | Reports |",
+            "|---|---|---|---|---|---|",
         ]
         rows += [
             f"| {rule.code} | {rule.name} | {describe_severity(rule)} | {_SHORT[rule.fixes]} | "
-            f"{rule.summary} |"
+            f"{', '.join(rule.consequences)} | {rule.summary} |"
             if rule not in rule_groups()
-            else f"| {rule.code} | {rule.name} | a group | | {rule.summary}: the codes that begin with {rule.code} |"
+            else f"| {rule.code} | {rule.name} | a group | | | {rule.summary}: the codes that begin with {rule.code} |"
             for rule in sorted((*all_rules(), *rule_groups()), key=lambda rule: rule.code)
             if rule.code[4] == digit
         ]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack
 
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import shorten_message
-from osimlite.lint.diagnostic import Finding, Fix, Severity
+from osimlite.lint.diagnostic import Consequence, Finding, Fix, Severity
 from osimlite.lint.faults import RuleFault, parse_faults
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from osimlite.schema.base import Object
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
+REFUSES, FAILS, NAN, RUNS = Consequence
 
 FAMILIES = {
     "0": "text",
@@ -67,6 +68,7 @@ class FindingCollector:
         fault: str = "",
         at: Position | None = None,
         severity: Severity | None = None,
+        consequence: Consequence | None = None,
         suggestion: str | None = None,
         certain: bool = False,
         fix: Fix | None = None,
@@ -84,6 +86,7 @@ class FindingCollector:
             fault: name of the fault, in a group rule.
             at: position in the text.
             severity: severity, if it is not that of the rule.
+            consequence: what OpenSim does, for an error of a rule with several consequences.
             suggestion: the text that would be right at this position.
             certain: whether the suggestion is certainly right.
             fix: the fix.
@@ -92,6 +95,8 @@ class FindingCollector:
         rule, subject = self.rules.get(fault), self.subject
         if rule is None:
             return
+        # Severities in the settings do not change what OpenSim does.
+        severity = severity or rule.severity_in(subject.version)
         if at is None and (item is not None or where.get("number") is not None):
             at = subject.position(item, **where)
         line, column, length = at if at is not None else (None, None, 1)
@@ -109,7 +114,7 @@ class FindingCollector:
             Finding(
                 rule.code,
                 rule.name,
-                subject.config.severity_of(rule, severity or rule.severity_in(subject.version)),
+                subject.config.severity_of(rule, severity),
                 shorten_message(message),
                 subject.file,
                 line,
@@ -119,6 +124,7 @@ class FindingCollector:
                 suggestion,
                 # Nor may findings on a text that was repaired for reading.
                 None if subject.sure_until is not None else fix,
+                rule.consequence_of(severity, consequence),
             )
         )
 
@@ -136,8 +142,10 @@ class Rule:
     what kind its fixes are, `about` what it looks
     at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's
     paths and muscles), ``construction`` (what stops the computation of a model), ``trial`` (what
-    was measured of a finished one). A rule that tells faults apart is a `group`: there is a rule
-    for each `fault`, all with the same `check`.
+    was measured of a finished one). `consequences` are all things that OpenSim may do because of
+    its errors: a single one holds for all of them, of several each finding names its own. A rule
+    that tells faults apart is a `group`: there is a rule for each `fault`, all with the same
+    `check`.
     """
 
     code: str
@@ -150,6 +158,7 @@ class Rule:
     about: str = "model"
     fault: RuleFault | None = None
     group: str = ""
+    consequences: tuple[Consequence, ...] = ()
 
     @property
     def family(self) -> str:
@@ -194,6 +203,23 @@ class Rule:
             return self.before[1]
         return self.severity
 
+    def consequence_of(
+        self, severity: Severity, stated: Consequence | None = None
+    ) -> Consequence | None:
+        """Return what OpenSim does because of a finding; None if the rule does not say.
+
+        OpenSim runs what has no error, by the definition of :class:`Severity`.
+
+        Args:
+            severity: severity of the finding, before settings change it.
+            stated: consequence that the finding names.
+        """
+        if severity is not ERROR:
+            return RUNS
+        if stated is None and len(self.consequences) == 1:
+            return self.consequences[0]
+        return stated
+
     def has_name(self, word: str) -> bool:
         """Return whether `word` is the code of this rule, a prefix of it, its name, or that of its group."""
         # An empty word would be a prefix of every code.
@@ -222,6 +248,7 @@ def rule(
     about: str = "model",
     faults: str = "",
     frames: Mapping[str, str] | None = None,
+    consequences: tuple[Consequence, ...] = (),
 ) -> Callable[[Check], Check]:
     """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
 
@@ -233,7 +260,9 @@ def rule(
     """
 
     def register(check: Check) -> Check:
-        group_rule = Rule(code, name, severity, check, before, thresholds, fixes, about)
+        group_rule = Rule(
+            code, name, severity, check, before, thresholds, fixes, about, consequences=consequences
+        )
         if not faults:
             _register_rule(_RULES, group_rule)
             return check

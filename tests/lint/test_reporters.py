@@ -93,6 +93,7 @@ def test_json_has_what_is_promised(report):
         "component": "/markerset/asis",
         "suggestion": "/ground",
         "fixable": findings[1]["fixable"],
+        "consequence": "refuses",
     }
 
 

@@ -14,6 +14,7 @@ import pytest
 from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, rules, validate
 from osimlite.lint.baseline import subtract_baseline, write_baseline
+from osimlite.lint.diagnostic import Consequence
 from osimlite.lint.pages import format_index, format_rule_page
 from osimlite.lint.registry import (
     DOCUMENT_MODULES,
@@ -153,6 +154,28 @@ def test_a_rule_mends_as_its_page_says(rule):
     assert kinds == {"": set(), "both": {"safe", "unsafe"}}.get(rule.fixes, {rule.fixes})
 
 
+@pytest.mark.parametrize("rule", RULES)
+def test_a_finding_says_what_opensim_does_as_its_rule_declares(rule):
+    for path in (FIXTURES / rule.code).glob("fail-*"):
+        for finding in checked(path, rule):
+            if finding.severity is not Severity.ERROR:
+                assert finding.consequence is Consequence.RUNS
+            elif len(rule.consequences) == 1:
+                assert finding.consequence is rule.consequences[0]
+            else:
+                assert finding.consequence in (None, *rule.consequences)
+
+
+def test_a_severity_in_the_settings_does_not_change_what_opensim_does():
+    path = next((FIXTURES / "OSIM401").glob("fail-*"))
+    lenient = Config(severity={"OSIM401": Severity.INFO})
+    consequences = [
+        [finding.consequence for finding in validate(path, config=config)]
+        for config in (Config(), lenient)
+    ]
+    assert consequences[0] == consequences[1]
+
+
 def test_the_index_of_rules_is_that_of_the_rules():
     # python -c "from osimlite.lint.pages import format_index; print(format_index(), end='')" > docs/rules.md
     assert (HERE.parents[1] / "docs" / "rules.md").read_text(encoding="utf-8") == format_index()
@@ -162,8 +185,11 @@ def test_a_page_says_severity_mends_and_settings():
     pages = {rule.code: format_rule_page(rule) for rule in all_rules()}
     assert pages["OSIM312"].startswith(
         "# illegal-name (OSIM312)\n\nSeverity: error; warning in files of a version before 30500\nFix: none\n"
+        "OpenSim: refuses the file\n"
     )
     assert "Fix: sometimes, with --fix\n" in pages["OSIM104"]
+    assert "\nOpenSim: refuses the file, or computes NaN\n" in pages["OSIM407"]
+    assert "\nOpenSim: " not in pages["OSIM311"]
     assert (
         "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other"
         in pages["OSIM521"]

@@ -19,6 +19,7 @@ from osimlite.io.document.source import Source
 from osimlite.io.document.survey import survey_source
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.lint import Finding, validate
+from osimlite.lint.diagnostic import Consequence
 from osimlite.lint.subject import Subject
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.actuators import (
@@ -350,25 +351,9 @@ def victim(model: CorpusModel, folder: Path) -> Victim | None:
     return Victim(model.id, folder, text, places, names, targets) if names else None
 
 
-REFUSES = re.compile(r"(?:OpenSim|and) (?:refuses|rejects|crashes|cannot load)|which rejects it")
-
-
-# Words of another fate, or of a refusal that is only one of several.
-ELSE = re.compile(
-    r"OpenSim (?:ignores|takes the first|uses the first|keeps)|leaves the object out|crashes or|, or |needs (?:one|a value)|"
-    r"other programs reject|OpenSim creates|disables the whole"
-)
-
-
-# Rules whose page says that OpenSim refuses whatever they find.
-ALWAYS = re.compile(r"OSIM(?:107|209|30[1-5]|312|33[123]|402|405|41[13]|501|611|615|622)")
-
-
 def claims_refusal(finding: Finding) -> bool:
-    """Whether a finding says, without an alternative, that OpenSim does not take the model."""
-    if ELSE.search(finding.message):
-        return False
-    return ALWAYS.match(finding.code) is not None or REFUSES.search(finding.message) is not None
+    """Whether a finding says that OpenSim does not take the model."""
+    return finding.consequence is Consequence.REFUSES
 
 
 KEPT = (

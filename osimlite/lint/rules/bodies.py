@@ -10,7 +10,16 @@ from osimlite.lint.diagnostic import Fix
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.inertia import compute_principal_axes, find_possible_inertia
 from osimlite.lint.placement import locate_frame
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.registry import (
+    ERROR,
+    INFO,
+    NAN,
+    REFUSES,
+    WARNING,
+    FindingCollector,
+    Threshold,
+    rule,
+)
 from osimlite.lint.skeleton import build_skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
@@ -28,7 +37,7 @@ GYRATION = Threshold(
 MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 
 
-@rule("OSIM501", "missing-mass", severity=ERROR)
+@rule("OSIM501", "missing-mass", severity=ERROR, consequences=(REFUSES,))
 def report_missing_mass(subject: Subject, report: FindingCollector) -> None:
     """A body has no mass.
 
@@ -116,7 +125,7 @@ def report_inertia_not_positive(subject: Subject, report: FindingCollector) -> N
             )
 
 
-@rule("OSIM504", "no-inertia", severity=WARNING)
+@rule("OSIM504", "no-inertia", severity=WARNING, consequences=(NAN,))
 def report_no_inertia(subject: Subject, report: FindingCollector) -> None:
     """A body has mass and no inertia.
 

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping
 
 from osimlite.base.text import find_nearest
 from osimlite.io.document.notes import Note
+from osimlite.lint.diagnostic import Consequence
 from osimlite.lint.fixes import rename_tag, replace_text
 from osimlite.lint.old_tags import successor
-from osimlite.lint.registry import ERROR, FindingCollector, rule
+from osimlite.lint.registry import ERROR, REFUSES, RUNS, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import add_article, describe_object
 from osimlite.schema.base import Object
@@ -19,7 +20,7 @@ from osimlite.schema.registry import find_class, list_class_tags, list_tags
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 
-@rule("OSIM102", "unknown-class", severity=ERROR, fixes="both")
+@rule("OSIM102", "unknown-class", severity=ERROR, fixes="both", consequences=(REFUSES, RUNS))
 def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     """An object has a class that OpenSim does not have.
 
@@ -42,14 +43,14 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for note, owner in subject.notes_of("unknown-class"):
-        consequence = _describe_consequence(subject, note)
+        description, consequence = _describe_consequence(subject, note)
         accepted_tags = (
             list_tags()
             if note.spec is None or note.spec.accepts is None
             else list_class_tags(note.spec.accepts)
         )
         suggestion = _find_nearest_class(subject, note, accepted_tags)
-        message = f"OpenSim has no class '{note.word}' and {consequence}"
+        message = f"OpenSim has no class '{note.word}' and {description}"
         # Classes of plug-ins are not misspelt.
         plugin = find_plugin(note.word)
         if plugin:
@@ -59,7 +60,14 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
         is_same_word = suggestion is not None and suggestion.lower() == note.word.lower()
         fix = rename_tag(subject.source, note.number, suggestion, safe=is_same_word)
-        report(message, owner, number=note.number, suggestion=suggestion, fix=fix)
+        report(
+            message,
+            owner,
+            number=note.number,
+            consequence=consequence,
+            suggestion=suggestion,
+            fix=fix,
+        )
 
 
 PLUGINS = {
@@ -143,7 +151,7 @@ def _can_contain(specs: Mapping[str, FieldSpec], tag: str) -> bool:
     )
 
 
-@rule("OSIM103", "wrong-class", severity=ERROR)
+@rule("OSIM103", "wrong-class", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
     """An object is in a place where its class is not allowed.
 
@@ -164,6 +172,7 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
         assert note.spec is not None and note.spec.accepts is not None
         kinds = note.spec.accepts.__name__
         home = find_set(note.value)
+        description, consequence = _describe_consequence(subject, note)
         home_hint = f"; it belongs in the {home}" if home else ""
         holder = (
             f"{describe_object(owner)}: {note.spec.tag}"
@@ -172,13 +181,14 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
         )
         report(
             f"{holder} expects {add_article(kinds)}, found {add_article(note.word)}: OpenSim "
-            f"{_describe_consequence(subject, note)}{home_hint}",
+            f"{description}{home_hint}",
             owner,
+            consequence=consequence,
             number=note.number,
         )
 
 
-@rule("OSIM108", "wrong-part-name", severity=ERROR, fixes="unsafe")
+@rule("OSIM108", "wrong-part-name", severity=ERROR, fixes="unsafe", consequences=(RUNS,))
 def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
     """An object in a property does not have the name of the property.
 
@@ -215,7 +225,7 @@ def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
             )
 
 
-@rule("OSIM109", "missing-wrapper", severity=ERROR)
+@rule("OSIM109", "missing-wrapper", severity=ERROR, consequences=(RUNS,))
 def report_missing_wrapper(subject: Subject, report: FindingCollector) -> None:
     """Members of a set are outside its `<objects>`.
 
@@ -297,20 +307,20 @@ def find_part(note: Note, owner: Object) -> FieldSpec | None:
     return None
 
 
-def _describe_consequence(subject: Subject, note: Note) -> str:
-    """Return what OpenSim does with an object that it cannot accept."""
+def _describe_consequence(subject: Subject, note: Note) -> tuple[str, Consequence | None]:
+    """Return what OpenSim does with an object that it cannot accept, in words and as declared."""
     spec = note.spec
     if spec is None or not isinstance(spec.kind, ObjectField):
-        return "leaves the object out"
+        return "leaves the object out", RUNS
     if spec.tag == "objects":
-        return "rejects the file"
+        return "rejects the file", REFUSES
     if spec.kind.form != "single":
-        return "leaves the object out"
+        return "leaves the object out", RUNS
     attributes = None if subject.source is None else subject.source.get_attributes(note.number)
     # With the name of the property OpenSim tries to make this object, and fails.
     if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
-        return "rejects the file"
-    return "leaves the object out, and fails where it needs one"
+        return "rejects the file", REFUSES
+    return "leaves the object out, and fails where it needs one", None
 
 
 def find_set(cls: type[Object] | None) -> str | None:

@@ -10,7 +10,7 @@ from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, FAILS, INFO, NAN, REFUSES, WARNING, FindingCollector, rule
 from osimlite.lint.rules.functions import is_unused
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
@@ -22,7 +22,13 @@ from osimlite.schema.registry import get_plugin_classes
 _QUOTED = re.compile(r"'([^']+)'")
 
 
-@rule("OSIM421", "impossible-mechanism", severity=ERROR, about=CONSTRUCTION)
+@rule(
+    "OSIM421",
+    "impossible-mechanism",
+    severity=ERROR,
+    about=CONSTRUCTION,
+    consequences=(REFUSES, NAN),
+)
 def report_impossible_mechanism(subject: Subject, report: FindingCollector) -> None:
     """The bodies, joints and constraints of a model do not form a mechanism.
 
@@ -46,7 +52,7 @@ def report_impossible_mechanism(subject: Subject, report: FindingCollector) -> N
         _report_obstacle(subject, report, obstacle, obstacle.message)
 
 
-@rule("OSIM422", "unmet-constraint", severity=ERROR, about=CONSTRUCTION)
+@rule("OSIM422", "unmet-constraint", severity=ERROR, about=CONSTRUCTION, consequences=(FAILS,))
 def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
     """No pose of the model fulfils a constraint.
 
@@ -98,7 +104,7 @@ def report_range_not_kept(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-@rule("OSIM424", "singular-mass-matrix", severity=ERROR, about=CONSTRUCTION)
+@rule("OSIM424", "singular-mass-matrix", severity=ERROR, about=CONSTRUCTION, consequences=(NAN,))
 def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> None:
     """A coordinate moves no mass in the default pose.
 
@@ -132,7 +138,9 @@ def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> N
         _report_obstacle(subject, report, obstacle, message)
 
 
-@rule("OSIM531", "impossible-force", severity=ERROR, about=CONSTRUCTION)
+@rule(
+    "OSIM531", "impossible-force", severity=ERROR, about=CONSTRUCTION, consequences=(REFUSES, FAILS)
+)
 def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
     """A force, a controller or a probe cannot be computed.
 
@@ -167,7 +175,7 @@ def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
             _report_obstacle(subject, report, obstacle, obstacle.message)
 
 
-@rule("OSIM532", "no-acceleration", severity=ERROR, about=CONSTRUCTION)
+@rule("OSIM532", "no-acceleration", severity=ERROR, about=CONSTRUCTION, consequences=(NAN,))
 def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
     """The accelerations of a model are not finite in the default pose.
 
@@ -271,7 +279,7 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
         _report_obstacle(subject, report, first, message)
 
 
-@rule("OSIM534", "impassable-obstacle", severity=ERROR, about=CONSTRUCTION)
+@rule("OSIM534", "impassable-obstacle", severity=ERROR, about=CONSTRUCTION, consequences=(REFUSES,))
 def report_impassable_obstacle(subject: Subject, report: FindingCollector) -> None:
     """A path cannot wrap over an obstacle.
 

@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.rules.references import find_broken_references
 from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
@@ -93,7 +93,7 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     return f"{shapes}, between which OpenSim computes no contact"
 
 
-@rule("OSIM322", "contact-listed-twice", severity=ERROR)
+@rule("OSIM322", "contact-listed-twice", severity=ERROR, consequences=(RUNS,))
 def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> None:
     """A contact force lists the same surface twice.
 

@@ -6,7 +6,16 @@ import math
 
 from osimlite.io.document.lexical import format_shortest
 from osimlite.lint.fixes import replace_text
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.registry import (
+    ERROR,
+    FAILS,
+    REFUSES,
+    RUNS,
+    WARNING,
+    FindingCollector,
+    Threshold,
+    rule,
+)
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Object
@@ -40,7 +49,7 @@ ORIENTATION = Threshold(
 )
 
 
-@rule("OSIM511", "inverted-range", severity=WARNING, fixes="unsafe")
+@rule("OSIM511", "inverted-range", severity=WARNING, fixes="unsafe", consequences=(REFUSES,))
 def report_inverted_range(subject: Subject, report: FindingCollector) -> None:
     """The range of a coordinate ends before it begins.
 
@@ -78,7 +87,7 @@ def report_inverted_range(subject: Subject, report: FindingCollector) -> None:
             )
 
 
-@rule("OSIM512", "default-outside-range", severity=WARNING)
+@rule("OSIM512", "default-outside-range", severity=WARNING, consequences=(REFUSES,))
 def report_default_outside_range(subject: Subject, report: FindingCollector) -> None:
     """The default value of a coordinate lies outside its range.
 
@@ -117,7 +126,7 @@ def report_default_outside_range(subject: Subject, report: FindingCollector) -> 
             )
 
 
-@rule("OSIM515", "locked-and-prescribed", severity=ERROR)
+@rule("OSIM515", "locked-and-prescribed", severity=ERROR, consequences=(REFUSES, FAILS))
 def report_locked_and_prescribed(subject: Subject, report: FindingCollector) -> None:
     """A coordinate is both locked and prescribed.
 
@@ -152,7 +161,7 @@ def report_locked_and_prescribed(subject: Subject, report: FindingCollector) -> 
             )
 
 
-@rule("OSIM513", "prescribed-without-function", severity=ERROR)
+@rule("OSIM513", "prescribed-without-function", severity=ERROR, consequences=(RUNS,))
 def report_prescribed_without_function(subject: Subject, report: FindingCollector) -> None:
     """A prescribed coordinate has no function.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.lint.axes import list_axes, list_coordinates, refuses_axes
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, NAN, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import cross, norm
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint
 
 
-@rule("OSIM410", "made-up-coordinate", severity=ERROR)
+@rule("OSIM410", "made-up-coordinate", severity=ERROR, consequences=(RUNS,))
 def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
@@ -71,7 +71,7 @@ def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> Non
                 )
 
 
-@rule("OSIM412", "axis-without-coordinate", severity=ERROR)
+@rule("OSIM412", "axis-without-coordinate", severity=ERROR, consequences=(REFUSES,))
 def report_axis_without_coordinate(subject: Subject, report: FindingCollector) -> None:
     """An axis of a custom joint has a function and no coordinate for it.
 
@@ -109,7 +109,7 @@ def report_axis_without_coordinate(subject: Subject, report: FindingCollector) -
                 )
 
 
-@rule("OSIM413", "collinear-axes", severity=ERROR)
+@rule("OSIM413", "collinear-axes", severity=ERROR, consequences=(REFUSES,))
 def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
@@ -158,7 +158,7 @@ def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
                     )
 
 
-@rule("OSIM414", "idle-coordinate", severity=ERROR)
+@rule("OSIM414", "idle-coordinate", severity=ERROR, consequences=(NAN,))
 def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """A coordinate of a custom joint moves nothing.
 

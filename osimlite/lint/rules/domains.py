@@ -9,10 +9,11 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from osimlite.base.text import find_nearest, join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, FAILS, NAN, REFUSES, WARNING, FindingCollector, rule
 from osimlite.lint.rules.functions import UNUSED, is_unused
 from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.words import describe_object, format_quantity, format_value
+from osimlite.schema import facts
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
 from osimlite.schema.fields import Value, make_domain_test
@@ -52,7 +53,7 @@ def describe_consequence(
     return "", False
 
 
-@rule("OSIM205", "not-finite", severity=ERROR)
+@rule("OSIM205", "not-finite", severity=ERROR, consequences=(REFUSES, NAN))
 def report_not_finite(subject: Subject, report: FindingCollector) -> None:
     """A number is NaN, or infinite where that is not allowed.
 
@@ -97,6 +98,7 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
                 item,
                 tag=spec.tag,
                 word=_find_word(subject, item, spec, non_finite[0]),
+                consequence=_DECLARED_CONSEQUENCES.get(consequence),
                 severity=WARNING if consequence in _MILD_CONSEQUENCES else None,
             )
 
@@ -107,15 +109,15 @@ def _describe_nan_consequence(
     """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
     assert isinstance(spec.kind, Value)
     if _is_older_list(spec.kind):
-        return "OpenSim rejects the file"
+        return _FILE_REFUSED
     if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):
-        return "OpenSim rejects the model"
+        return REFUSED
     if not _DRAWN.isdisjoint(get_class_names(type(item))):
         return _DRAWN_CONSEQUENCE
     if _may_be_infinite(item, spec):
         return _BOUND_CONSEQUENCE
     if number != number and spec.name in _NAN_REFUSED.get(type(item).__name__, "").split():
-        return "OpenSim rejects the model"
+        return REFUSED
     return UNUSED if is_unused(subject, item) else _NAN_CONSEQUENCE
 
 
@@ -127,7 +129,7 @@ def _is_older_list(kind: object) -> bool:
     return isinstance(kind, Value) and kind.legacy and kind.shape == "list"
 
 
-@rule("OSIM206", "impossible-value", severity=ERROR)
+@rule("OSIM206", "impossible-value", severity=ERROR, consequences=(REFUSES, FAILS, NAN))
 def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """A number makes OpenSim fail or compute NaN.
 
@@ -170,11 +172,12 @@ def _report_lost_transition(subject: Subject, report: FindingCollector, force: A
                 f"transition of {subject.describe_part(force)} is {force.transition:g}, which is "
                 f"lost beside its {name} of {limit:g}: OpenSim rejects the model",
                 force,
+                consequence=REFUSES,
                 tag="transition",
             )
 
 
-@rule("OSIM207", "doubtful-value", severity=WARNING)
+@rule("OSIM207", "doubtful-value", severity=WARNING, consequences=(FAILS, NAN))
 def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
     """A number is outside the sensible range of its property.
 
@@ -226,6 +229,7 @@ def _report_short_fibers(subject: Subject, report: FindingCollector) -> None:
             f"{'does' if fails else 'may'} not find the velocity of so short a fiber",
             muscle,
             tag="optimal_fiber_length",
+            consequence=FAILS,
             severity=ERROR if fails and not is_unused(subject, muscle) else None,
         )
 
@@ -324,6 +328,17 @@ class DomainVerdict(NamedTuple):
 _NAN_CONSEQUENCE = "everything computed from it becomes NaN, without a message"
 _DRAWN_CONSEQUENCE = "it cannot be drawn"
 _BOUND_CONSEQUENCE = "whatever uses it as a bound fails"
+_FILE_REFUSED = "OpenSim rejects the file"
+_DECLARED_CONSEQUENCES = {
+    _FILE_REFUSED: REFUSES,
+    REFUSED: REFUSES,
+    _NAN_CONSEQUENCE: NAN,
+    facts.NAN: NAN,
+    facts.TOUCHING: NAN,
+    facts.STOPS: FAILS,
+    facts.STUCK: FAILS,
+}
+"""What OpenSim does, by the words of the messages."""
 _NAN_REFUSED = {
     "PathSpring": "resting_length stiffness dissipation",
     "ClutchedPathSpring": "stiffness dissipation relaxation_time_constant initial_stretch",
@@ -427,6 +442,7 @@ def _report_domain(
             f"{subject.describe_property(item, spec)} is missing and has no default: "
             f"{verdict.consequence}",
             item,
+            consequence=_DECLARED_CONSEQUENCES.get(verdict.consequence),
             tag=spec.tag,
         )
         return
@@ -445,6 +461,7 @@ def _report_domain(
     report(
         f"{subject.describe_property(item, spec)} is {size}, expected {domain_text}{consequence}",
         item,
+        consequence=_DECLARED_CONSEQUENCES.get(verdict.consequence),
         tag=spec.tag,
         word=_find_word(subject, item, spec, verdict.number),
     )

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from osimlite.lint.placement import FramePose, compute_default_poses, locate_frame
-from osimlite.lint.registry import ERROR, FindingCollector, rule
+from osimlite.lint.registry import ERROR, NAN, REFUSES, FindingCollector, rule
 from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
@@ -19,7 +19,7 @@ NO_LENGTH_M = 1e-14
 """Distance of two ends below which OpenSim 4.6 divides by zero; 1e-9 m is computed with (measured)."""
 
 
-@rule("OSIM541", "ends-in-one-place", severity=ERROR)
+@rule("OSIM541", "ends-in-one-place", severity=ERROR, consequences=(NAN,))
 def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None:
     """Both ends of a force coincide in the default pose.
 
@@ -74,7 +74,7 @@ def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None
                 )
 
 
-@rule("OSIM542", "spring-on-one-body", severity=ERROR)
+@rule("OSIM542", "spring-on-one-body", severity=ERROR, consequences=(REFUSES,))
 def report_spring_on_one_body(subject: Subject, report: FindingCollector) -> None:
     """Both ends of a PointToPointSpring are on one body.
 
@@ -108,7 +108,7 @@ def report_spring_on_one_body(subject: Subject, report: FindingCollector) -> Non
             )
 
 
-@rule("OSIM543", "external-force-in-model", severity=ERROR)
+@rule("OSIM543", "external-force-in-model", severity=ERROR, consequences=(REFUSES,))
 def report_external_force_in_model(subject: Subject, report: FindingCollector) -> None:
     """A model contains an ExternalForce.
 
@@ -135,7 +135,7 @@ def report_external_force_in_model(subject: Subject, report: FindingCollector) -
         )
 
 
-@rule("OSIM544", "reflex-without-muscle", severity=ERROR)
+@rule("OSIM544", "reflex-without-muscle", severity=ERROR, consequences=(REFUSES,))
 def report_reflex_without_muscle(subject: Subject, report: FindingCollector) -> None:
     """A ToyReflexController drives an actuator that is not a muscle.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.errors import ModelError
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, FAILS, REFUSES, WARNING, FindingCollector, rule
 from osimlite.lint.rules.functions import UNUSED, is_unused
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
@@ -26,7 +26,7 @@ FORMULAS = {
 """The properties of each class that are formulas, and the variables that these may name."""
 
 
-@rule("OSIM606", "broken-expression", severity=ERROR)
+@rule("OSIM606", "broken-expression", severity=ERROR, consequences=(REFUSES, FAILS))
 def report_broken_expression(subject: Subject, report: FindingCollector) -> None:
     """The formula of a force or a function cannot be read.
 
@@ -65,6 +65,11 @@ def report_broken_expression(subject: Subject, report: FindingCollector) -> None
                 f"{formula_text}: {reason}; {UNUSED if is_off else 'OpenSim cannot compute it'}",
                 item,
                 tag=tag,
+                consequence=FAILS
+                if isinstance(error, UnknownVariableError)
+                else REFUSES
+                if isinstance(item, Force)
+                else None,
                 severity=WARNING if is_off else None,
             )
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 from osimlite.base.files import MESH_FOLDER_HINT
 from osimlite.base.text import format_count, join_words
 from osimlite.io.document.source import Source
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
@@ -16,7 +16,7 @@ from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Mesh
 
 
-@rule("OSIM701", "missing-mesh", severity=WARNING)
+@rule("OSIM701", "missing-mesh", severity=WARNING, consequences=(REFUSES,))
 def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
     """A mesh file does not exist.
 
@@ -189,7 +189,7 @@ def _has_content(source: Source | None, number: int) -> bool:
     return source.spans[around].tag != "objects"
 
 
-@rule("OSIM703", "missing-data-file", severity=ERROR)
+@rule("OSIM703", "missing-data-file", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_missing_data_file(subject: Subject, report: FindingCollector) -> None:
     """A file of measured loads, of controls or of a table does not exist.
 
@@ -229,12 +229,15 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
         if name and any(folders.has(folder_path, name) for folder_path in folder_paths):
             continue
         twin = folders.find_other_case(folder_paths, name)
-        consequence = (
-            "it has no controls" if cls == "ControlSetController" else "OpenSim rejects the model"
+        description, consequence = (
+            ("it has no controls", RUNS)
+            if cls == "ControlSetController"
+            else ("OpenSim rejects the model", REFUSES)
         )
         report(
-            f"the file '{name}' of {describe_object(item)} does not exist: {consequence}",
+            f"the file '{name}' of {describe_object(item)} does not exist: {description}",
             item,
+            consequence=consequence,
             tag=tag,
             suggestion=twin,
         )

@@ -8,7 +8,8 @@ from typing import Final, cast
 
 from osimlite.base.text import format_count
 from osimlite.lint.axes import list_axes
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.diagnostic import Consequence
+from osimlite.lint.registry import ERROR, FAILS, NAN, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Component, Object
@@ -33,7 +34,7 @@ from osimlite.schema.sets import Controller
 Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 
 
-@rule("OSIM601", "unsorted-abscissae", severity=ERROR)
+@rule("OSIM601", "unsorted-abscissae", severity=ERROR, consequences=(REFUSES, FAILS, RUNS))
 def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> None:
     """The x values of a function do not increase.
 
@@ -71,21 +72,20 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     and not rejected
                     and function.y[index - 1 : index] == function.y[index : index + 1]
                 )
-                consequence = (
-                    UNUSED
-                    if is_disabled
-                    else _describe_refusal(subject, function)
-                    if rejected
-                    else "the function is constant there"
+                description, consequence = (
+                    _describe_refusal(subject, function)
+                    if is_disabled or rejected
+                    else ("the function is constant there", RUNS)
                     if level
-                    else "the function values are wrong"
+                    else ("the function values are wrong", RUNS)
                 )
                 relation = "repeats" if current_x == previous_x else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
                 report(
                     f"x of {subject.describe_part(function)}: number {index + 1}, "
-                    f"{format_quantity(current_x)}, {relation} the one before; {consequence}",
+                    f"{format_quantity(current_x)}, {relation} the one before; {description}",
                     function,
+                    consequence=consequence,
                     tag="x",
                     word=word,
                     nth=nth,
@@ -97,7 +97,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     break
 
 
-@rule("OSIM602", "unequal-points", severity=ERROR)
+@rule("OSIM602", "unequal-points", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
     """A function has different numbers of x and y values.
 
@@ -120,22 +120,23 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
         if xs == ys:
             continue
         is_disabled = is_unused(subject, function)
-        consequence = (
-            UNUSED
-            if is_disabled
-            else "OpenSim reads beyond the end of the list"
+        description, consequence = (
+            _describe_refusal(subject, function)
+            if is_disabled or (ys < xs and isinstance(function, GCVSpline))
+            else ("OpenSim reads beyond the end of the list", None)
             if ys < xs
-            else "the extra values are ignored"
+            else ("the extra values are ignored", RUNS)
         )
         report(
-            f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {consequence}",
+            f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {description}",
             function,
+            consequence=consequence,
             tag="y",
             severity=WARNING if is_disabled or ys > xs else None,
         )
 
 
-@rule("OSIM603", "too-few-points", severity=ERROR)
+@rule("OSIM603", "too-few-points", severity=ERROR, consequences=(REFUSES, FAILS, NAN))
 def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     """A function has too few points.
 
@@ -166,28 +167,32 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
                 if "half_order" in function.model_fields_set
                 else "not given"
             )
-            consequence = _describe_refusal(subject, function)
+            description, consequence = _describe_refusal(subject, function)
             report(
-                f"half_order of {subject.describe_part(function)} is {given_text}: {consequence}; 2 is a "
+                f"half_order of {subject.describe_part(function)} is {given_text}: {description}; 2 is a "
                 "cubic spline",
                 function,
+                consequence=consequence,
                 tag="half_order",
                 severity=severity,
             )
         elif len(function.x) < min_count:
-            consequence = "it has no value"
+            description, consequence = "it has no value", None
             if is_disabled or isinstance(function, GCVSpline):
-                consequence = _describe_refusal(subject, function)
+                description, consequence = _describe_refusal(subject, function)
+            elif isinstance(function, SimmSpline):
+                consequence = NAN
             given_text = format_count(len(function.x), "point")
             report(
-                f"{subject.describe_part(function)} has {given_text} and needs {min_count}: {consequence}",
+                f"{subject.describe_part(function)} has {given_text} and needs {min_count}: {description}",
                 function,
+                consequence=consequence,
                 tag="x",
                 severity=severity,
             )
 
 
-@rule("OSIM604", "coefficient-count", severity=WARNING)
+@rule("OSIM604", "coefficient-count", severity=WARNING, consequences=(FAILS, RUNS))
 def report_coefficient_count(subject: Subject, report: FindingCollector) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
@@ -217,6 +222,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             report(
                 f"{subject.describe_part(function)} has no coefficients: {consequence}",
                 function,
+                consequence=FAILS,
                 tag="coefficients",
                 severity=WARNING if is_disabled else ERROR,
             )
@@ -240,6 +246,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
                 f"{subject.describe_part(polynomial)} has {format_count(coefficient_count, 'coefficient')}; "
                 f"{format_count(dimension, 'variable')} to order {order} need {expected_count}: {consequence}",
                 polynomial,
+                consequence=FAILS,
                 tag="coefficients",
                 severity=WARNING if is_disabled else ERROR,
             )
@@ -267,7 +274,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             )
 
 
-@rule("OSIM607", "function-of-several", severity=ERROR)
+@rule("OSIM607", "function-of-several", severity=ERROR, consequences=(RUNS,))
 def report_function_of_several(subject: Subject, report: FindingCollector) -> None:
     """A function of one variable is given several coordinates.
 
@@ -327,7 +334,7 @@ _REQUIRED_FUNCTIONS: Final = {
 """Properties that may be empty by OpenSim's declarations, and without which it cannot compute."""
 
 
-@rule("OSIM605", "missing-function", severity=ERROR)
+@rule("OSIM605", "missing-function", severity=ERROR, consequences=(REFUSES, FAILS))
 def report_missing_function(subject: Subject, report: FindingCollector) -> None:
     """A required function is missing.
 
@@ -358,27 +365,34 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
                     f"{name} of {describe_object(force)} has {count_text}, not three or none: OpenSim "
                     "rejects the file",
                     functions,
+                    consequence=REFUSES,
                 )
     # An unknown class may be a function that stands where the property seems empty.
     if subject.has_unknown:
         return
     for kind, properties in _REQUIRED_FUNCTIONS.items():
-        rejected = (
-            "OpenSim rejects the model"
+        description, consequence = (
+            ("OpenSim rejects the model", REFUSES)
             if len(properties) == 1
-            else "OpenSim fails when it needs a value"
+            else ("OpenSim fails when it needs a value", FAILS)
         )
         for item in subject.find_by_class(kind):
             for name in properties:
                 if getattr(item, name) is None:
-                    report(f"{describe_object(item)} has no {name}: {rejected}", item, tag=name)
+                    report(
+                        f"{describe_object(item)} has no {name}: {description}",
+                        item,
+                        tag=name,
+                        consequence=consequence,
+                    )
     for function in subject.find_instances(MultiplierFunction):
         if function.function is None:
             is_disabled = is_unused(subject, function)
-            consequence = UNUSED if is_disabled else "OpenSim fails when it needs a value"
+            description = UNUSED if is_disabled else "OpenSim fails when it needs a value"
             report(
-                f"{subject.describe_part(function)} has no function to multiply: {consequence}",
+                f"{subject.describe_part(function)} has no function to multiply: {description}",
                 function,
+                consequence=FAILS,
                 severity=WARNING if is_disabled else None,
             )
 
@@ -466,14 +480,18 @@ def _find_force_or_controller(subject: Subject, part: Object) -> Force | Control
     return component
 
 
-def _describe_refusal(subject: Subject, function: Object) -> str:
-    """Return the consequence, in findings, of a spline that OpenSim cannot make."""
+def _describe_refusal(subject: Subject, function: Object) -> tuple[str, Consequence]:
+    """Return what OpenSim does with a spline that it cannot make, in words and as declared."""
     if is_unused(subject, function):
-        return UNUSED
+        return UNUSED, RUNS
     # Functions of forces and controllers are made at the first acceleration, those of coordinates
     # with the system.
     is_late = _find_force_or_controller(subject, function) is not None
-    return "OpenSim fails when it needs a value" if is_late else "OpenSim rejects it"
+    return (
+        ("OpenSim fails when it needs a value", FAILS)
+        if is_late
+        else ("OpenSim rejects it", REFUSES)
+    )
 
 
 def _find_tabulated(subject: Subject) -> Iterator[Tabulated]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from osimlite.base.text import format_count, join_words
 from osimlite.lint.axes import list_axis_names, list_coordinates, refuses_axes
 from osimlite.lint.placement import find_rotation_axes
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, NAN, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.skeleton import build_skeleton, find_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import add_article, describe_object
@@ -15,7 +15,7 @@ from osimlite.schema.frames import Ground
 from osimlite.schema.joints import EllipsoidJoint, Joint
 
 
-@rule("OSIM402", "joint-to-itself", severity=ERROR)
+@rule("OSIM402", "joint-to-itself", severity=ERROR, consequences=(REFUSES,))
 def report_joint_to_itself(subject: Subject, report: FindingCollector) -> None:
     """A joint connects a body to itself.
 
@@ -43,7 +43,7 @@ def report_joint_to_itself(subject: Subject, report: FindingCollector) -> None:
             )
 
 
-@rule("OSIM405", "wrong-coordinate-count", severity=ERROR)
+@rule("OSIM405", "wrong-coordinate-count", severity=ERROR, consequences=(REFUSES,))
 def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) -> None:
     """A joint has the wrong number of coordinates.
 
@@ -120,7 +120,7 @@ def _declares_none(subject: Subject, joint: Joint) -> bool:
     )
 
 
-@rule("OSIM406", "shared-coordinate-name", severity=ERROR)
+@rule("OSIM406", "shared-coordinate-name", severity=ERROR, consequences=(RUNS,))
 def report_shared_coordinate_name(subject: Subject, report: FindingCollector) -> None:
     """Two joints have a coordinate of the same name.
 
@@ -201,7 +201,7 @@ def report_ground_as_child(subject: Subject, report: FindingCollector) -> None:
             )
 
 
-@rule("OSIM409", "stray-joint-frame", severity=WARNING)
+@rule("OSIM409", "stray-joint-frame", severity=WARNING, consequences=(REFUSES,))
 def report_stray_joint_frame(subject: Subject, report: FindingCollector) -> None:
     """A joint contains an unrelated frame.
 
@@ -256,7 +256,7 @@ _LOCKED = 1e-8
 """Sine of the angle between an axis and the plane of the others; below it OpenSim 4.6 computes NaN (measured)."""
 
 
-@rule("OSIM416", "gimbal-lock", severity=ERROR)
+@rule("OSIM416", "gimbal-lock", severity=ERROR, consequences=(NAN,))
 def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
     """A joint is in gimbal lock in the default pose.
 

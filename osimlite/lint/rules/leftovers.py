@@ -12,7 +12,7 @@ from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_comments
 from osimlite.lint.fixes import remove_attribute, remove_element, remove_text
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component
@@ -21,7 +21,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.specs import get_field_specs
 
 
-@rule("OSIM105", "unknown-attribute", severity=ERROR, fixes="safe")
+@rule("OSIM105", "unknown-attribute", severity=ERROR, fixes="safe", consequences=(RUNS,))
 def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None:
     """An element has an attribute without meaning.
 
@@ -186,7 +186,7 @@ def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
             text_start = next_start
 
 
-@rule("OSIM110", "defaults", severity=WARNING, fixes="safe")
+@rule("OSIM110", "defaults", severity=WARNING, fixes="safe", consequences=(REFUSES,))
 def report_defaults_block(subject: Subject, report: FindingCollector) -> None:
     """The file has a `<defaults>` block.
 
@@ -266,7 +266,7 @@ def report_force_outside_set(subject: Subject, report: FindingCollector) -> None
         )
 
 
-@rule("OSIM112", "not-upgradable", severity=ERROR)
+@rule("OSIM112", "not-upgradable", severity=ERROR, consequences=(REFUSES,))
 def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
     """OpenSim cannot upgrade an old document.
 

@@ -8,7 +8,7 @@ from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_comments
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.fixes import remove_text, replace_text
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 
 _CONTROLS = re.compile("[\f\v]")
@@ -18,7 +18,7 @@ _BLANK_IN_CLOSING = re.compile(r"</[^<>\s]+(\s+)>")
 _NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
 
-@rule("OSIM008", "character-reference", severity=ERROR, fixes="safe")
+@rule("OSIM008", "character-reference", severity=ERROR, fixes="safe", consequences=(RUNS,))
 def report_character_reference(subject: Subject, report: FindingCollector) -> None:
     """A numeric character reference stands for a character beyond ASCII.
 
@@ -152,7 +152,7 @@ def _find_control_character(source: Source, start: int) -> int:
     return match.start() if match is not None else start
 
 
-@rule("OSIM011", "text-outside-root", severity=ERROR, fixes="safe")
+@rule("OSIM011", "text-outside-root", severity=ERROR, fixes="safe", consequences=(REFUSES,))
 def report_text_outside_root(subject: Subject, report: FindingCollector) -> None:
     """There is text before or after the root element.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.base.text import join_words
 from osimlite.lint.measures import MEASURES, MovingPoint, get_measures
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.registry import ERROR, INFO, RUNS, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 
@@ -121,7 +121,7 @@ def report_path_jump(subject: Subject, report: FindingCollector) -> None:
         report(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {reason}", owner)
 
 
-@rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES)
+@rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES, consequences=(RUNS,))
 def report_length_of_wrap(subject: Subject, report: FindingCollector) -> None:
     """OpenSim computes a negative path length on a surface, or finds no path.
 

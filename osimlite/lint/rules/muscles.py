@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 from osimlite.lint.placement import compute_default_poses, locate_frame
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.registry import ERROR, REFUSES, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.mechanics.laws.vectors import Vector
@@ -67,7 +67,7 @@ def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
                 )
 
 
-@rule("OSIM622", "control-below-activation", severity=ERROR)
+@rule("OSIM622", "control-below-activation", severity=ERROR, consequences=(REFUSES,))
 def report_control_below_activation(subject: Subject, report: FindingCollector) -> None:
     """The minimum control of a muscle is below its minimum activation.
 

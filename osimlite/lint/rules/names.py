@@ -6,7 +6,7 @@ from osimlite.base.text import format_count, join_words
 from osimlite.io.document.notes import NoteKind
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import Span
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, WARNING, FindingCollector, rule
 from osimlite.lint.rules.references import BrokenReference, find_broken_references
 from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.words import describe_object
@@ -69,7 +69,7 @@ def report_duplicate_name(subject: Subject, report: FindingCollector) -> None:
         report(message, item, attribute="name", suggestion=None)
 
 
-@rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING))
+@rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING), consequences=(REFUSES,))
 def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     r"""The name of a component contains an illegal character.
 

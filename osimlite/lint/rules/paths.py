@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import pi, radians
 
 from osimlite.base.text import format_count
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Object
@@ -18,7 +18,7 @@ from osimlite.schema.states import list_motions
 from osimlite.schema.wrapping import WrapObject
 
 
-@rule("OSIM611", "short-path", severity=ERROR)
+@rule("OSIM611", "short-path", severity=ERROR, consequences=(REFUSES,))
 def report_short_path(subject: Subject, report: FindingCollector) -> None:
     """A path has fewer than two points.
 
@@ -239,7 +239,7 @@ def report_unused_wrap_object(subject: Subject, report: FindingCollector) -> Non
             report(f"no path wraps around {describe_object(surface)}", surface, attribute="name")
 
 
-@rule("OSIM615", "moving-point-coordinates", severity=ERROR)
+@rule("OSIM615", "moving-point-coordinates", severity=ERROR, consequences=(REFUSES,))
 def report_moving_point_coordinates(subject: Subject, report: FindingCollector) -> None:
     """The location of a moving path point depends on more than one coordinate.
 

@@ -9,7 +9,7 @@ from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.source import Source
 from osimlite.lint.axes import find_made_up_paths, refuses_axes
 from osimlite.lint.fixes import replace_text
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.words import add_article, describe_object, find_nearest_name, pick_closest
 from osimlite.schema.base import Component, Object, Unknown
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint
 
 
-@rule("OSIM301", "unresolved-reference", severity=ERROR, fixes="both")
+@rule("OSIM301", "unresolved-reference", severity=ERROR, fixes="both", consequences=(REFUSES, RUNS))
 def report_unresolved_reference(subject: Subject, report: FindingCollector) -> None:
     """A component names another component that does not exist.
 
@@ -55,7 +55,13 @@ def report_unresolved_reference(subject: Subject, report: FindingCollector) -> N
         _report_broken(subject, report, broken, message)
 
 
-@rule("OSIM302", "reference-to-wrong-type", severity=ERROR, fixes="unsafe")
+@rule(
+    "OSIM302",
+    "reference-to-wrong-type",
+    severity=ERROR,
+    fixes="unsafe",
+    consequences=(REFUSES, RUNS),
+)
 def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
@@ -87,7 +93,7 @@ def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -
         _report_broken(subject, report, broken, message)
 
 
-@rule("OSIM303", "missing-reference", severity=ERROR)
+@rule("OSIM303", "missing-reference", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_missing_reference(subject: Subject, report: FindingCollector) -> None:
     """A required reference is empty.
 
@@ -110,6 +116,7 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
                 f"{add_article(use.reference.target)}; OpenSim disables the whole probe",
                 use.holder,
                 attribute="name",
+                consequence=RUNS,
             )
             continue
         is_given = use.spec.name in use.holder.model_fields_set
@@ -118,11 +125,12 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
             f"{use.spec.tag} of {_describe_holder(subject, use)} {state}, expected the name of "
             f"{add_article(use.reference.target)}",
             use.holder,
+            consequence=REFUSES,
             tag=use.spec.tag,
         )
 
 
-@rule("OSIM304", "reference-form", severity=ERROR, fixes="both")
+@rule("OSIM304", "reference-form", severity=ERROR, fixes="both", consequences=(REFUSES, RUNS))
 def report_reference_form(subject: Subject, report: FindingCollector) -> None:
     """A reference has the wrong form: a path instead of a name, or a name instead of a path.
 
@@ -165,6 +173,7 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
                 "4: OpenSim 4.6 finds nothing there and rejects the model; `osimlite upgrade` "
                 "rewrites the path",
                 at=position,
+                consequence=REFUSES,
             )
 
 
@@ -188,7 +197,7 @@ def _is_repeated(source: Source, number: int) -> bool:
     return False
 
 
-@rule("OSIM305", "reference-case", severity=ERROR, fixes="safe")
+@rule("OSIM305", "reference-case", severity=ERROR, fixes="safe", consequences=(REFUSES, RUNS))
 def report_reference_case(subject: Subject, report: FindingCollector) -> None:
     """A reference differs from a name in letter case only.
 
@@ -480,5 +489,6 @@ def _report_broken(
         nth=nth,
         suggestion=broken.suggestion,
         severity=severity,
+        consequence=RUNS if by_name else REFUSES,
         fix=replace_text(subject.source, position, broken.suggestion, safe=certain),
     )

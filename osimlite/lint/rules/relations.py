@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from osimlite.base.text import format_count
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, REFUSES, WARNING, FindingCollector, rule
 from osimlite.lint.rules.domains import find_outside_domain
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
@@ -38,7 +38,7 @@ from osimlite.schema.functions import (
 from osimlite.schema.tree import is_a
 
 
-@rule("OSIM209", "contradicting-values", severity=ERROR)
+@rule("OSIM209", "contradicting-values", severity=ERROR, consequences=(REFUSES,))
 def report_contradicting_values(subject: Subject, report: FindingCollector) -> None:
     """Numbers of one object contradict each other.
 

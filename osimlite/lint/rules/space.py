@@ -9,7 +9,16 @@ from itertools import combinations
 
 from osimlite.base.text import join_words
 from osimlite.lint.placement import FramePose, compute_default_poses, locate_frame, make_offset
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.registry import (
+    ERROR,
+    INFO,
+    NAN,
+    REFUSES,
+    WARNING,
+    FindingCollector,
+    Threshold,
+    rule,
+)
 from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
@@ -26,7 +35,7 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 """Sockets of a frame laid through stations."""
 
 
-@rule("OSIM411", "degenerate-frame", severity=ERROR)
+@rule("OSIM411", "degenerate-frame", severity=ERROR, consequences=(REFUSES,))
 def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
     """The points of a frame do not define a frame.
 
@@ -277,7 +286,7 @@ def _list_lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
     )
 
 
-@rule("OSIM415", "no-direction", severity=ERROR)
+@rule("OSIM415", "no-direction", severity=ERROR, consequences=(NAN,))
 def report_no_direction(subject: Subject, report: FindingCollector) -> None:
     """A direction vector is zero.
 

@@ -14,7 +14,7 @@ from osimlite.io.document.source import Source
 from osimlite.lint.diagnostic import Fix, Severity
 from osimlite.lint.fixes import comment_out, remove_element, rename_tag
 from osimlite.lint.old_tags import Successor, is_comment, reason_unused, successor
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.rules.classes import find_part, find_set, find_wrapper
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import add_article, describe_object, format_value
@@ -25,7 +25,7 @@ from osimlite.schema.registry import find_classes_mentioning
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 
-@rule("OSIM101", "unknown-tag", severity=ERROR, fixes="both")
+@rule("OSIM101", "unknown-tag", severity=ERROR, fixes="both", consequences=(RUNS,))
 def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
     """An element is not a property of its object.
 
@@ -221,7 +221,7 @@ def _report_old(
     )
 
 
-@rule("OSIM104", "duplicate-tag", severity=ERROR, fixes="safe")
+@rule("OSIM104", "duplicate-tag", severity=ERROR, fixes="safe", consequences=(RUNS,))
 def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
     """A property is given twice.
 
@@ -259,7 +259,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-@rule("OSIM107", "element-in-value", severity=ERROR)
+@rule("OSIM107", "element-in-value", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
     """A value contains an element.
 
@@ -285,6 +285,7 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
                 f"there is {interruption} in the middle of {subject.describe_property(owner, note.spec)}: "
                 "OpenSim rejects the file",
                 owner,
+                consequence=REFUSES,
                 number=note.number,
             )
             continue
@@ -292,6 +293,7 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
             f"<{note.spec.tag}> of {describe_object(owner)} is a value and cannot hold "
             f"<{note.word}>: OpenSim rejects the file",
             owner,
+            consequence=REFUSES,
             number=note.number,
         )
     source = subject.source
@@ -336,7 +338,9 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
     # A value of several pieces is rejected, whatever the pieces are.
     if len(texts) + len(sections) > 1:
         report(
-            "a CDATA section is only a part of this value: OpenSim rejects the file", at=position
+            "a CDATA section is only a part of this value: OpenSim rejects the file",
+            at=position,
+            consequence=REFUSES,
         )
     elif sections and not texts and sections[0] != sections[0].strip():
         if isinstance(spec.kind, Reference) and spec.kind.shape != "list":
@@ -344,6 +348,7 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
                 "OpenSim takes the white space in this CDATA section for a part of the name, and "
                 "rejects the model",
                 at=position,
+                consequence=REFUSES,
             )
         elif (
             isinstance(spec.kind, Value)

@@ -8,7 +8,7 @@ from typing import Final
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.io.document.source import Source
 from osimlite.lint.fixes import rename_tag
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -94,7 +94,7 @@ def report_unused_ignore(subject: Subject, report: FindingCollector) -> None:
     # The engine knows what was ignored, and reports it in the name of this rule.
 
 
-@rule("OSIM002", "encoding", severity=WARNING)
+@rule("OSIM002", "encoding", severity=WARNING, consequences=(REFUSES,))
 def report_encoding(subject: Subject, report: FindingCollector) -> None:
     """The bytes are not in the encoding that the file declares.
 
@@ -180,7 +180,7 @@ def report_not_a_model(subject: Subject, report: FindingCollector) -> None:
         report(message, at=subject.source.locate_tag(number), suggestion=fault.meant, fix=fix)
 
 
-@rule("OSIM004", "document-version", severity=ERROR)
+@rule("OSIM004", "document-version", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_document_version(subject: Subject, report: FindingCollector) -> None:
     """The document has no version or an unsupported one.
 
@@ -215,6 +215,7 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
             f"{subject.version} and "
             f'rejects it; put it into <OpenSimDocument Version="{CURRENT_VERSION}">, as `osimlite upgrade` does',
             number=0,
+            consequence=REFUSES,
         )
         return
     if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
@@ -224,6 +225,7 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
             f"version {subject.version} is too old for OpenSim 4.6, which rejects it{advice}",
             number=0,
             attribute="Version",
+            consequence=REFUSES,
         )
     if late:
         report(
@@ -283,7 +285,7 @@ def report_merge_conflict(subject: Subject, report: FindingCollector) -> None:
             )
 
 
-@rule("OSIM006", "duplicate-attribute", severity=ERROR)
+@rule("OSIM006", "duplicate-attribute", severity=ERROR, consequences=(RUNS,))
 def report_duplicate_attribute(subject: Subject, report: FindingCollector) -> None:
     """An element has the same attribute twice.
 
@@ -305,7 +307,7 @@ def report_duplicate_attribute(subject: Subject, report: FindingCollector) -> No
             )
 
 
-@rule("OSIM007", "second-object", severity=ERROR)
+@rule("OSIM007", "second-object", severity=ERROR, consequences=(RUNS,))
 def report_second_object(subject: Subject, report: FindingCollector) -> None:
     """The document contains more than one object.
 

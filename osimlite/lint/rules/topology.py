@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.diagnostic import Consequence
+from osimlite.lint.registry import ERROR, NAN, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.skeleton import (
     JointLink,
     Skeleton,
@@ -22,7 +23,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.joints import FreeJoint, Joint, WeldJoint
 
 
-@rule("OSIM401", "unconnected-body", severity=ERROR)
+@rule("OSIM401", "unconnected-body", severity=ERROR, consequences=(REFUSES,))
 def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     """A body is not connected to ground.
 
@@ -79,7 +80,7 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-@rule("OSIM403", "closed-loop", severity=ERROR)
+@rule("OSIM403", "closed-loop", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_closed_loop(subject: Subject, report: FindingCollector) -> None:
     """Joints form a closed loop.
 
@@ -118,15 +119,17 @@ def report_closed_loop(subject: Subject, report: FindingCollector) -> None:
                 if first_joint is not None
                 else ""
             )
+            description, consequence = _describe_loop(bones, link)
             report(
                 f"{describe_object(link.joint)} closes a loop at "
-                f"{describe_object(link.child_base)}{other}; {_describe_loop(bones, link)}",
+                f"{describe_object(link.child_base)}{other}; {description}",
                 link.joint,
+                consequence=consequence,
                 tag="socket_child_frame",
             )
 
 
-@rule("OSIM404", "parallel-joints", severity=ERROR)
+@rule("OSIM404", "parallel-joints", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_parallel_joints(subject: Subject, report: FindingCollector) -> None:
     """Two joints connect the same two bodies.
 
@@ -159,15 +162,17 @@ def report_parallel_joints(subject: Subject, report: FindingCollector) -> None:
             first.setdefault(_make_pair(link), link.joint)
     for link in loops:
         if (before := first.setdefault(_make_pair(link), link.joint)) is not link.joint:
+            description, consequence = _describe_loop(bones, link)
             report(
                 f"{describe_object(link.joint)} connects the same two bodies as "
-                f"{describe_object(before)}; {_describe_loop(bones, link)}",
+                f"{describe_object(before)}; {description}",
                 link.joint,
+                consequence=consequence,
                 attribute="name",
             )
 
 
-@rule("OSIM407", "massless-leaf", severity=ERROR)
+@rule("OSIM407", "massless-leaf", severity=ERROR, consequences=(REFUSES, NAN))
 def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
     """A body without mass is the last of its chain.
 
@@ -192,10 +197,15 @@ def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
             if members
             else ""
         )
-        consequence = "computes NaN" if isinstance(joint, CustomJoint) else "rejects the model"
+        description, consequence = (
+            ("computes NaN", NAN)
+            if isinstance(joint, CustomJoint)
+            else ("rejects the model", REFUSES)
+        )
         report(
-            f"{describe_object(body)}{welded} is massless and the end of its chain: OpenSim {consequence}",
+            f"{describe_object(body)}{welded} is massless and the end of its chain: OpenSim {description}",
             body,
+            consequence=consequence,
             tag="mass",
         )
 
@@ -204,20 +214,31 @@ def _make_pair(link: JointLink) -> frozenset[int]:
     return frozenset((id(link.parent_base), id(link.child_base)))
 
 
-def _describe_loop(bones: Skeleton, link: JointLink) -> str:
-    """Return what OpenSim does with a joint between bodies that other joints already connect."""
+def _describe_loop(bones: Skeleton, link: JointLink) -> tuple[str, Consequence | None]:
+    """Return what OpenSim does with a joint between bodies that other joints already connect.
+
+    Returns:
+        Description and consequence; None if that depends on the default pose.
+    """
     kind = type(link.joint)
     # These cases are measured with OpenSim 4.6.
     to_ground = link.parent_base is bones.ground and issubclass(kind, WeldJoint | FreeJoint)
     if to_ground or link.child_base is bones.ground or issubclass(kind, CustomJoint):
-        return "OpenSim rejects the model"
+        return "OpenSim rejects the model", REFUSES
     if issubclass(kind, WeldJoint):
-        return "OpenSim replaces it by a constraint, and counts the mass of the child twice"
+        return (
+            "OpenSim replaces it by a constraint, and counts the mass of the child twice",
+            RUNS,
+        )
     if issubclass(kind, FreeJoint):
-        return "OpenSim counts the mass of the child twice, and the copy moves independently"
+        return (
+            "OpenSim counts the mass of the child twice, and the copy moves independently",
+            RUNS,
+        )
     return (
         "OpenSim splits the child, gives the halves another inertia, and welds them with a "
-        "constraint; or rejects the model where they do not meet in the default pose"
+        "constraint; or rejects the model where they do not meet in the default pose",
+        None,
     )
 
 

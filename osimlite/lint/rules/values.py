@@ -15,8 +15,9 @@ from osimlite.io.document.lexical import (
     split_words,
 )
 from osimlite.io.document.notes import Note
+from osimlite.lint.diagnostic import Consequence
 from osimlite.lint.fixes import replace_text
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, FAILS, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_value
 from osimlite.schema.base import Object
@@ -31,7 +32,7 @@ _SEPARATORS = ",;"
 _ONE_NUMBER = real()
 
 
-@rule("OSIM201", "unreadable-value", severity=ERROR, fixes="safe")
+@rule("OSIM201", "unreadable-value", severity=ERROR, fixes="safe", consequences=(REFUSES, RUNS))
 def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
     """A value has a form that OpenSim cannot read.
 
@@ -64,6 +65,7 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
             owner,
             number=note.number,
             word=note.word,
+            consequence=_get_consequence(note, spec, kind),
             suggestion=better,
             fix=replace_text(subject.source, subject.position(owner, tag=spec.tag), better)
             # A value of several lines may hold comments, which a replacement would lose.
@@ -74,7 +76,7 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-@rule("OSIM202", "wrong-count", severity=ERROR)
+@rule("OSIM202", "wrong-count", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_wrong_count(subject: Subject, report: FindingCollector) -> None:
     """A value has too many or too few numbers.
 
@@ -98,10 +100,11 @@ def report_wrong_count(subject: Subject, report: FindingCollector) -> None:
             f"{_describe_kept_value(note, owner, spec, kind)}",
             owner,
             tag=spec.tag,
+            consequence=_get_consequence(note, spec, kind),
         )
 
 
-@rule("OSIM203", "cut-number", severity=ERROR, fixes="unsafe")
+@rule("OSIM203", "cut-number", severity=ERROR, fixes="unsafe", consequences=(RUNS,))
 def report_cut_number(subject: Subject, report: FindingCollector) -> None:
     """OpenSim reads only the beginning of a number.
 
@@ -135,7 +138,7 @@ def report_cut_number(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-@rule("OSIM204", "empty-value", severity=ERROR)
+@rule("OSIM204", "empty-value", severity=ERROR, consequences=(REFUSES, RUNS, FAILS))
 def report_empty_value(subject: Subject, report: FindingCollector) -> None:
     """An element that should hold a value is empty.
 
@@ -161,6 +164,7 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
                 f"{_describe_kept_value(note, owner, spec, kind)}",
                 owner,
                 number=note.number,
+                consequence=REFUSES,
                 # OpenSim keeps the default of most values without a message.
                 severity=ERROR if _is_refused(note, spec, kind) else WARNING,
             )
@@ -177,6 +181,7 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
                 f"{note_spec.accepts.tag} there, not even the default, and fails where it needs one; "
                 "leave the element out",
                 note.owner,
+                consequence=FAILS,
                 number=note.number,
             )
 
@@ -231,6 +236,11 @@ def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
     return note.value is None and (
         kind.legacy or (spec.tag == "mass" and spec.default != spec.default)
     )
+
+
+def _get_consequence(note: Note, spec: FieldSpec, kind: Value) -> Consequence:
+    """Return what OpenSim does because of a value that it cannot read."""
+    return REFUSES if _is_refused(note, spec, kind) else RUNS
 
 
 def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:

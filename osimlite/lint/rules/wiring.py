@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from osimlite.base.text import find_nearest, format_count
 from osimlite.lint.fixes import replace_text
-from osimlite.lint.registry import ERROR, FindingCollector, rule
+from osimlite.lint.registry import ERROR, REFUSES, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import add_article, describe_object
 from osimlite.schema.base import Component, Unknown
@@ -18,7 +18,7 @@ from osimlite.schema.states import list_outputs
 from osimlite.schema.tree import Use
 
 
-@rule("OSIM331", "control-function-count", severity=ERROR)
+@rule("OSIM331", "control-function-count", severity=ERROR, consequences=(REFUSES,))
 def report_control_function_count(subject: Subject, report: FindingCollector) -> None:
     """A prescribed controller has a different number of functions and actuators.
 
@@ -61,7 +61,7 @@ def report_control_function_count(subject: Subject, report: FindingCollector) ->
             )
 
 
-@rule("OSIM332", "broken-input", severity=ERROR, fixes="unsafe")
+@rule("OSIM332", "broken-input", severity=ERROR, fixes="unsafe", consequences=(REFUSES,))
 def report_broken_input(subject: Subject, report: FindingCollector) -> None:
     """An input refers to an output that does not exist.
 
@@ -98,7 +98,7 @@ def report_broken_input(subject: Subject, report: FindingCollector) -> None:
         )
 
 
-@rule("OSIM333", "connected-twice", severity=ERROR)
+@rule("OSIM333", "connected-twice", severity=ERROR, consequences=(REFUSES,))
 def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
     """A list of sockets names the same component twice.
 

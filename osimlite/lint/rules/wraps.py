@@ -6,7 +6,7 @@ import math
 
 from osimlite.base.text import format_count
 from osimlite.lint.placement import FramePose, locate_frame, make_offset
-from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.registry import ERROR, FAILS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import Vector
@@ -70,7 +70,7 @@ def report_swallowed_point(subject: Subject, report: FindingCollector) -> None:
                     )
 
 
-@rule("OSIM617", "wrap-range", severity=WARNING)
+@rule("OSIM617", "wrap-range", severity=WARNING, consequences=(FAILS,))
 def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
     """The range of a wrap contains no segment of the path.
 
