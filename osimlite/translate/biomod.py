@@ -282,7 +282,9 @@ def _format_muscles(
             "maximalforce": [muscle.max_isometric_force],
             "tendonslacklength": [muscle.tendon_slack_length],
             "pennationangle": [muscle.pennation_angle_at_optimal],
-            "maxvelocity": [muscle.max_contraction_velocity],
+            # biorbd ignores attributes that it does not know, such as the "maxvelocity" of older
+            # files; its speed is in optimal lengths per second, as OpenSim's.
+            "maxshorteningspeed": [muscle.max_contraction_velocity],
         }
         yield from (
             f"\t{attribute} {_format_numbers(values)}" for attribute, values in numbers.items()

@@ -33,6 +33,12 @@ import biorbd
 path, states = json.load(sys.stdin)
 model = biorbd.Model(path)
 names = [model.segment(index).name().to_string() for index in range(model.nbSegment())]
+characteristics = [model.muscle(k).characteristics() for k in range(model.nbMuscles())]
+numbers = [
+    [each.forceIsoMax(), each.optimalLength(), each.tendonSlackLength(), each.pennationAngle(),
+     each.maxShorteningSpeed()]
+    for each in characteristics
+]
 result = []
 for state in states:
     q = biorbd.GeneralizedCoordinates(np.array(state, float))
@@ -43,6 +49,8 @@ for state in states:
         "mass": model.massMatrix(q).to_array().tolist(),
         "markers": [marker.to_array().tolist() for marker in model.markers(q)],
         "lengths": [model.muscle(k).musculoTendonLength(model, q, False) for k in range(model.nbMuscles())],
+        "arms": model.musclesLengthJacobian(q).to_array().tolist() if model.nbMuscles() else [],
+        "muscles": numbers,
     })
 os.write(1, b"\\nANSWER" + json.dumps(result).encode() + b"\\n")
 """
@@ -98,6 +106,23 @@ def test_biorbd_computes_the_same(tmp_path: Path, make: Callable[[], osimlite.Mo
         wrapped = {record.component for record in made.fidelity if record.kind == "path"}
         lengths = paths.lengths(q)
         muscles = [each for each in model.components(osimlite.Muscle)]
-        for muscle, length in zip(muscles, result["lengths"], strict=True):
-            if muscle.path not in wrapped:
-                assert length == pytest.approx(lengths[muscle.path], abs=1e-9)
+        moment_arms = paths.moment_arms(q)
+        for k, (muscle, length) in enumerate(zip(muscles, result["lengths"], strict=True)):
+            characteristics = [
+                muscle.max_isometric_force,
+                muscle.optimal_fiber_length,
+                muscle.tendon_slack_length,
+                muscle.pennation_angle_at_optimal,
+                muscle.max_contraction_velocity,
+            ]
+            assert result["muscles"][k] == pytest.approx(characteristics, abs=1e-12)
+            if muscle.path in wrapped:
+                continue
+            assert length == pytest.approx(lengths[muscle.path], abs=1e-9)
+            if len(indices) == len(order):
+                arms = [
+                    moment_arms[muscle.path].get(mechanism.coordinates[index].path, 0.0)
+                    for index in indices
+                ]
+                # OpenSim's moment arm is the negative derivative of the length.
+                np.testing.assert_allclose(-np.array(result["arms"][k]), arms, atol=1e-9)

@@ -35,7 +35,9 @@ def make_tilted() -> osimlite.Model:
     )
     model.add(joint.between(model["/bodyset/pelvis"], tail, at=(-0.1, 0.0, 0.0)))
     model.add(osimlite.Marker(name="tip", socket_parent_frame=tail, location=(0.1, 0.2, 0.3)))
-    muscle = osimlite.Thelen2003Muscle(name="wagger", max_isometric_force=200.0)
+    muscle = osimlite.Thelen2003Muscle(
+        name="wagger", max_isometric_force=200.0, max_contraction_velocity=7.5
+    )
     muscle.geometry_path.add_point(model["/bodyset/pelvis"], (0.0, 0.1, 0.0))
     muscle.geometry_path.add_point(model["/bodyset/pelvis"], (-0.05, 0.1, 0.0))
     muscle.geometry_path.add_point(tail, (-0.2, 0.0, 0.05))
@@ -92,6 +94,28 @@ def test_markers_and_muscles_are_written() -> None:
     assert "viapoint wagger_1\n\tparent pelvis\n\tmuscle wagger\n" in made.text
     kinds = {record.kind for record in made.fidelity}
     assert {"muscle-law", "constraint"} <= kinds
+
+
+READ_ATTRIBUTES = {
+    "segment": {"parent", "rtinmatrix", "rt", "translations", "rotations", "rangesq", "mass",
+                "inertia", "com"},
+    "marker": {"parent", "position", "technical"},
+    "musclegroup": {"originparent", "insertionparent"},
+    "muscle": {"type", "musclegroup", "originposition", "insertionposition", "optimallength",
+               "maximalforce", "tendonslacklength", "pennationangle", "maxshorteningspeed"},
+    "viapoint": {"parent", "muscle", "musclegroup", "position"},
+}  # fmt: skip
+"""Attributes that biorbd 1.12.4 reads (`ModelReader.cpp`) and that are written; it ignores others."""
+
+
+def test_biorbd_knows_all_attributes() -> None:
+    text = to_biomod(make_tilted()).text
+    used: dict[str, set[str]] = {}
+    for element, body in re.findall(r"^(\w+) \S+\n((?:\t.*\n)+)end\1$", text, re.M):
+        used.setdefault(element, set()).update(re.findall(r"^\t([a-zA-Z]\w*)", body, re.M))
+    assert {element: {name.lower() for name in names} for element, names in used.items()} == (
+        READ_ATTRIBUTES
+    )
 
 
 def test_the_command_writes_all_files(tmp_path: Path) -> None:
