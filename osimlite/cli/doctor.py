@@ -234,7 +234,7 @@ def list_purposes(requirements: dict[str, list[str]]) -> dict[str, list[str]]:
 
 
 def find_extra(module: str | None, use: str = "") -> str | None:
-    """Return the first extra that provides a module; None without one.
+    """Return the first extra that provides a module; None without one, or in a source tree that is not installed.
 
     Args:
         module: name of the missing module.
@@ -242,14 +242,15 @@ def find_extra(module: str | None, use: str = "") -> str | None:
     """
     # The names of modules that differ from those of their packages.
     name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
+    try:
+        requirements = list_requirements()
+    except metadata.PackageNotFoundError:
+        # The missing module is what the user has to hear about.
+        return None
     if name in NEEDS.get(use, ()):
-        return next(
-            (extra for extra, uses in list_purposes(list_requirements()).items() if use in uses),
-            None,
-        )
-    return next(
-        (extra for extra, names in list_requirements().items() if extra and name in names), None
-    )
+        purposes = list_purposes(requirements)
+        return next((extra for extra, uses in purposes.items() if use in uses), None)
+    return next((extra for extra, names in requirements.items() if extra and name in names), None)
 
 
 def examine_package(name: str) -> Package:

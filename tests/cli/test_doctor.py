@@ -25,6 +25,7 @@ from osimlite.cli.doctor import (
     Package,
     doctor,
     examine_package,
+    find_extra,
     list_purposes,
     list_requirements,
 )
@@ -254,3 +255,11 @@ def test_an_interrupt_does_not_wait_for_packages(
     started = time.monotonic()
     assert examine_package("lxml").name == "lxml"
     assert time.monotonic() - started < 10.0
+
+
+def test_a_source_tree_that_is_not_installed_knows_no_extra(monkeypatch):
+    def requires(name: str) -> None:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("osimlite.cli.doctor.metadata.requires", requires)
+    assert find_extra("lxml") is None and find_extra("matplotlib", "plot") is None
