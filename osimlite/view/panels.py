@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
@@ -47,6 +46,24 @@ EXPONENTS = (-4, 6)
 """Powers of ten of ordinates beyond which a common power is written above the axis."""
 DPI = 110
 """Resolution of the pages, dots per inch: a page of twelve panels has 1,210 by 1,050 pixels."""
+FORCE_UNITS = frozenset({"N", "N·m", "W"})
+"""Units in which one table has sums of large terms, whose rounding errors are no curves."""
+NOISE = 1e-9
+"""Force, moment or power that counts as zero, relative to the largest one of a table."""
+
+# Places on a page, inches. Matplotlib could find them by measuring all its labels, which takes
+# longer than drawing them; the labels of all pages have the same sizes, so that nothing is gained.
+TITLE_HEIGHT_IN = 0.5
+PANEL_HEIGHT_IN = 2.15
+PANEL_WIDTH_IN = 3.6
+PANEL_MARGINS_IN = {"left": 0.62, "right": 0.1, "bottom": 0.26, "top": 0.34}
+"""Room around the axes of a panel for ticks, label and title."""
+LABEL_HEIGHT_IN = 0.16
+"""Room for the label of the abscissa, which only the lowest panel of a column has."""
+NOTE_LINE_IN = 0.15
+"""Height of a line of the note."""
+LETTERS_PER_INCH = 12.0
+"""Letters of a title of 10 points in an inch."""
 
 _SIDE_TOKENS = (
     (re.compile(r"(?:^|(?<=[._/ ]))[rl](?=[._/ ]|$)"), {"r": "l", "l": "r"}),
@@ -105,6 +122,21 @@ class Panel(NamedTuple):
     section: str = ""
     limits: tuple[float, ...] = ()
     band: Band | None = None  # reference, drawn where the abscissa is the gait cycle
+
+
+class Page(NamedTuple):
+    """Panels of one picture, in rows."""
+
+    title: str  # "" for none
+    rows: list[list[Panel]]
+    abscissa: str  # label of the abscissa
+    note: str = ""  # sentences below the panels
+    section: str = ""  # section of the panels
+    cyclic: bool = False  # whether curves are drawn over the gait cycle
+
+    def draw(self) -> Any:
+        """Return the figure of the page."""
+        return _draw_page(self)
 
 
 def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -196,16 +228,26 @@ def group_columns(
     sides = split_sides(column.name for column in all_columns)
     panels: dict[tuple[str, str, str], Panel] = {}
     constant = []
+    largest = _find_largest(all_columns)
     for column in all_columns:
         base_name, side = sides[column.name]
         values = np.asarray(column.values, dtype=float)
+        if column.unit in FORCE_UNITS:
+            values = np.where(np.abs(values) <= NOISE * largest[column.unit], 0.0, values)
         if is_constant(values):
             constant.append(_describe_constant(column, values))
             continue
         # A quantity without a curve on the other side keeps its name.
         panel = panels.setdefault(
             (base_name, column.unit, column.section),
-            Panel(base_name, column.unit, [], column.group, column.section, column.limits),
+            Panel(
+                base_name,
+                column.unit,
+                [],
+                column.group,
+                column.section,
+                column.limits,
+            ),
         )
         panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
     # Panels of a group stay together.
@@ -213,6 +255,16 @@ def group_columns(
     for panel in panels.values():
         groups.setdefault((panel.section, panel.group), []).append(panel)
     return [panel for group in groups.values() for panel in group], _describe_constants(constant)
+
+
+def _find_largest(columns: Iterable[Column]) -> dict[str, float]:
+    """Return the largest absolute value of each unit."""
+    largest: dict[str, float] = {}
+    for column in columns:
+        values = np.abs(np.asarray(column.values, dtype=float))
+        value = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+        largest[column.unit] = max(largest.get(column.unit, 0.0), value)
+    return largest
 
 
 def _describe_constant(column: Column, values: Array) -> str:
@@ -254,38 +306,44 @@ def merge_panels(panels: Iterable[Panel]) -> list[Panel]:
 def draw_pages(
     title: str, panels: Sequence[Panel], *, abscissa: str = "time (s)", note: str = ""
 ) -> Iterator[Any]:
-    """Yield the figures of panels, at most `MAX_PANELS` on each.
+    """Yield the figures of the pages that `plan_pages` returns for the same arguments."""
+    for page in plan_pages(title, panels, abscissa=abscissa, note=note):
+        yield page.draw()
+
+
+def plan_pages(
+    title: str, panels: Sequence[Panel], *, abscissa: str = "time (s)", note: str = ""
+) -> list[Page]:
+    """Divide panels into pages, with at most `MAX_PANELS` on each.
 
     Curves are drawn over the gait cycle if there is a complete cycle for each of them, otherwise
     over time, with lines at the strikes of the feet.
 
     Args:
-        title: title of the figures; "" for none.
-        panels: what to draw; without any panel there is no figure.
+        title: title of the pages; "" for none.
+        panels: what to draw; without any panel there is no page.
         abscissa: label of the abscissa, where it is not the gait cycle.
         note: sentence below the panels of the last page.
+
+    Returns:
+        The pages of each section, one after the other.
     """
     cyclic = has_cycles(panels)
     sections: dict[str, list[Panel]] = {}
     for panel in panels:
         sections.setdefault(panel.section, []).append(panel)
-    pages = [
-        (section, number, page)
-        for section, section_panels in sections.items()
-        for number, page in enumerate(_divide_into_pages(section_panels), 1)
-    ]
-    counts = Counter(section for section, _, _ in pages)
-    for index, (section, number, page) in enumerate(pages, 1):
-        page_title = f"{title}: {section}" if title and section else title
-        if page_title and counts[section] > 1:
-            page_title += f" ({number} of {counts[section]})"
-        yield _draw_page(
-            page_title,
-            page,
-            "gait cycle (%)" if cyclic else abscissa,
-            note if index == len(pages) else "",
-            cyclic=cyclic,
-        )
+    pages = []
+    for section, section_panels in sections.items():
+        section_pages = list(_divide_into_pages(section_panels))
+        for number, rows in enumerate(section_pages, 1):
+            page_title = f"{title}: {section}" if title and section else title
+            if page_title and len(section_pages) > 1:
+                page_title += f" ({number} of {len(section_pages)})"
+            label = "gait cycle (%)" if cyclic else abscissa
+            pages.append(Page(page_title, rows, label, section=section, cyclic=cyclic))
+    if pages:
+        pages[-1] = pages[-1]._replace(note=note)
+    return pages
 
 
 def has_cycles(panels: Iterable[Panel]) -> bool:
@@ -314,45 +372,73 @@ def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
     count = len(panels)
     # Four panels are two rows of two.
     width = count if count < MAX_COLUMNS else 2 if count == 4 else MAX_COLUMNS
-    rows: list[list[Panel]] = []
     groups: dict[str, list[Panel]] = {}
     for panel in panels:
         groups.setdefault(panel.group, []).append(panel)
-    for group in groups.values():
-        for index, panel in enumerate(group):
-            free_columns = width - len(rows[-1]) if rows else 0
-            splits = index == 0 and len(group) > 1 and free_columns < len(group) <= width
-            # A group that fits in a row is not divided.
-            if not free_columns or splits:
-                rows.append([])
-            rows[-1].append(panel)
+    rows = _fill_rows(groups.values(), width)
     height = MAX_PANELS // MAX_COLUMNS
     pages = ceil(len(rows) / height)
     for first in range(0, len(rows), size := ceil(len(rows) / max(1, pages)) or 1):
         yield rows[first : first + size]
 
 
-def _draw_page(
-    title: str, rows: Sequence[Sequence[Panel]], abscissa: str, note: str, *, cyclic: bool
-) -> Any:
+def _fill_rows(groups: Iterable[Sequence[Panel]], width: int) -> list[list[Panel]]:
+    """Return rows in which no group is divided that fits in one."""
+    rows: list[list[Panel]] = []
+    for group in groups:
+        for index, panel in enumerate(group):
+            free_columns = width - len(rows[-1]) if rows else 0
+            splits = index == 0 and len(group) > 1 and free_columns < len(group) <= width
+            if not free_columns or splits:
+                rows.append([])
+            rows[-1].append(panel)
+    return rows
+
+
+def _draw_page(page: Page) -> Any:
     """Draw the rows of one page."""
-    columns = max(len(row) for row in rows)
-    width = 11.0 if columns == MAX_COLUMNS else 4.5 + 4.0 * (columns - 1)
-    figure = make_figure(title, (width, 0.75 + 2.35 * len(rows) + (0.25 if note else 0.0)))
-    axes = figure.subplots(len(rows), columns, squeeze=False)
-    for row, row_axes in zip(rows, axes, strict=True):
-        for panel, panel_axes in zip(row, row_axes, strict=False):
-            draw_panel(panel_axes, panel, abscissa, cyclic=cyclic)
-        for panel_axes in row_axes[len(row) :]:
-            panel_axes.remove()
-    add_legend(figure, [curve for row in rows for panel in row for curve in panel.curves])
+    columns = max(len(row) for row in page.rows)
+    # A page of one panel has room for its title.
+    panel_width = PANEL_WIDTH_IN if columns > 1 else 1.5 * PANEL_WIDTH_IN
+    width = columns * panel_width
+    note = "\n".join(
+        textwrap.fill(line, round(13 * width), break_on_hyphens=False)
+        for line in page.note.split("\n")
+    )
+    top = TITLE_HEIGHT_IN
+    curves = [curve for row in page.rows for panel in row for curve in panel.curves]
+    # Panels with one abscissa have its numbers once, below each column.
+    is_shared = page.cyclic or len({_get_ends(curve) for curve in curves}) == 1
+    bottom = LABEL_HEIGHT_IN + (NOTE_LINE_IN * (note.count("\n") + 1.5) if note else 0.0)
+    height = top + PANEL_HEIGHT_IN * len(page.rows) + bottom
+    figure = make_figure(page.title, (width, height), layout=None)
+    margins = PANEL_MARGINS_IN
+    for row_index, row in enumerate(page.rows):
+        for column_index, panel in enumerate(row):
+            lower_end = height - top - (row_index + 1) * PANEL_HEIGHT_IN
+            panel_axes = figure.add_axes(
+                (
+                    (column_index * panel_width + margins["left"]) / width,
+                    (lower_end + margins["bottom"]) / height,
+                    (panel_width - margins["left"] - margins["right"]) / width,
+                    (PANEL_HEIGHT_IN - margins["bottom"] - margins["top"]) / height,
+                )
+            )
+            is_lowest = all(len(lower) <= column_index for lower in page.rows[row_index + 1 :])
+            draw_panel(panel_axes, panel, page.abscissa if is_lowest else "", cyclic=page.cyclic)
+            if is_shared and not is_lowest:
+                panel_axes.tick_params(axis="x", labelbottom=False)
+    add_legend(figure, curves)
     if note:
-        text = "\n".join(
-            textwrap.fill(line, round(13 * width), break_on_hyphens=False)
-            for line in note.split("\n")
+        figure.supxlabel(
+            note, fontsize=8, color="0.35", x=0.12 / width, y=0.06 / height, ha="left", va="bottom"
         )
-        figure.supxlabel(text, fontsize=8, color="0.35", x=0.02, ha="left")
     return figure
+
+
+def _get_ends(curve: PanelCurve) -> tuple[float, float]:
+    """Return the ends of the abscissa of a curve."""
+    return float(curve.times[0]), float(curve.times[-1])
 
 
 def draw_panel(panel_axes: Any, panel: Panel, abscissa: str, *, cyclic: bool = False) -> None:
@@ -371,9 +457,11 @@ def draw_panel(panel_axes: Any, panel: Panel, abscissa: str, *, cyclic: bool = F
     title = panel.title.replace("_", " ")
     unit = f" ({panel.unit})" if panel.unit else ""
     height = find_title_height(panel_axes)
-    panel_axes.set_title(f"{title}{unit}", fontsize=10, loc="left", y=height)
+    letters = LETTERS_PER_INCH * (PANEL_WIDTH_IN - PANEL_MARGINS_IN["left"])
+    size = 10.0 * max(0.6, min(1.0, letters / len(title + unit)))
+    panel_axes.set_title(f"{title}{unit}", fontsize=size, loc="left", y=height)
     group = panel.group.replace("_", " ")
-    if group and group not in title and len(title + unit + group) < 40:
+    if group and group not in title and len(title + unit + group) < letters:
         panel_axes.set_title(group, fontsize=8, loc="right", color="0.5", y=height)
 
 
@@ -422,7 +510,7 @@ def _draw_curve(panel_axes: Any, curve: PanelCurve, *, cyclic: bool) -> None:
 
 
 def add_legend(figure: Any, curves: Sequence[PanelCurve]) -> None:
-    """Add a legend of sides and trials at the top of a figure."""
+    """Add a legend of sides and trials at the top right of a figure."""
     from matplotlib.lines import Line2D
 
     sides = [
@@ -438,7 +526,7 @@ def add_legend(figure: Any, curves: Sequence[PanelCurve]) -> None:
     )
     if sides or styles:
         figure.legend(
-            handles=[*sides, *styles], loc="outside upper right", ncols=6, frameon=False, fontsize=9
+            handles=[*sides, *styles], loc="upper right", ncols=6, frameon=False, fontsize=9
         )
 
 
@@ -471,12 +559,15 @@ def find_title_height(panel_axes: Any) -> float | None:
     )
 
 
-def make_figure(title: str, size: tuple[float, float]) -> Any:
+def make_figure(
+    title: str, size: tuple[float, float], *, layout: str | None = "constrained"
+) -> Any:
     """Return an empty figure of matplotlib.
 
     Args:
         title: bold title at the top left.
         size: width and height, inches.
+        layout: how matplotlib places the axes; None if they have places.
 
     Raises:
         MissingDependency: matplotlib is not installed.
@@ -484,8 +575,14 @@ def make_figure(title: str, size: tuple[float, float]) -> Any:
     # Figures without pyplot: no global state, and no window.
     figures = require("matplotlib.figure", extra="plot", purpose="a picture")
     require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
-    figure = figures.Figure(figsize=size, layout="constrained")
-    figure.suptitle(title, fontsize=13, x=0.02, ha="left", fontweight="bold")
+    figure = figures.Figure(figsize=size, layout=layout)
+    if layout is None:
+        width, height = size
+        figure.suptitle(
+            title, fontsize=13, x=0.12 / width, y=1.0 - 0.1 / height, ha="left", fontweight="bold"
+        )
+    else:
+        figure.suptitle(title, fontsize=13, x=0.02, ha="left", fontweight="bold")
     return figure
 
 
