@@ -174,11 +174,15 @@ def _explain_failure(path: Path, message: str) -> DocumentError:
     line = re.search(r"line (\d+)", message)
     text = re.sub(r"\s*\n\s*", "; ", message.strip()) or "it gives no reason"
     text = text.removeprefix("XML Error: ").removeprefix("Error: ")
+    # MuJoCo gives elements of included files the line 0.
+    text = text.removesuffix(", line 0")
     hint = ""
     if "opening file" in text:
         hint = "; included files and meshes must be where the file names them"
+    elif "mujocoinclude" in text:
+        hint = "; it is a part of other files: convert the file that includes it"
     return DocumentError(
         f"MuJoCo rejects the file: {text}{hint}",
         file=str(path),
-        line=int(line[1]) if line else None,
+        line=(int(line[1]) or None) if line else None,
     )

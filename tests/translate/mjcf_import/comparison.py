@@ -118,6 +118,8 @@ def mass_errors(path: Path, made: Osim, count: int) -> float:
             first = model.jnt_dofadr[joint]
             model.dof_armature[first : first + 6 - 3 * int(model.jnt_type[joint])] = 0.0
     data, mechanism = mujoco.MjData(model), osimlite.mechanism(made.model)
+    # Free bodies have a constant inertia, which the compiler computed with the armature.
+    mujoco.mj_setConst(model, data)
     across = projection(made, list(mechanism.coordinate_names))
     worst = 0.0
     for qpos in random_qpos(model, count):

@@ -116,6 +116,16 @@ def test_wrong_words_and_files_are_refused(mechanism, tmp_path):
     broken = models.write_mjcf(tmp_path, models.MECHANISM.replace("slide", "glide", 1), "b.xml")
     with pytest.raises(OsimliteError, match=r"b.xml:\d+: MuJoCo rejects the file: .*glide"):
         osimlite.from_mjcf(broken)
+    part = models.write_mjcf(tmp_path, "<mujocoinclude/>", "part.xml")
+    with pytest.raises(OsimliteError, match="convert the file that includes it"):
+        osimlite.from_mjcf(part)
+    # The line 0 of an element of an included file is no position.
+    (tmp_path / "bad.stl").write_bytes(b"solid")
+    mesh = '<mujocoinclude><asset><mesh file="bad.stl"/></asset></mujocoinclude>'
+    models.write_mjcf(tmp_path, mesh, "mesh.xml")
+    main = models.write_mjcf(tmp_path, '<mujoco><include file="mesh.xml"/></mujoco>', "main.xml")
+    with pytest.raises(OsimliteError, match=r"main.xml: MuJoCo rejects .*'bad', id 0$"):
+        osimlite.from_mjcf(main)
     empty = models.write_mjcf(tmp_path, "<mujoco/>", "empty.xml")
     with pytest.raises(OsimliteError, match="no bodies"):
         osimlite.from_mjcf(empty)
