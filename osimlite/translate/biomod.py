@@ -24,15 +24,21 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 from osimlite.schema.sets import Constraint
+from osimlite.simulation.paths import Paths
 from osimlite.simulation.robot.build import build_robot
 from osimlite.simulation.robot.names import UniqueNames, legal, legal_names
 from osimlite.simulation.robot.robot import Robot, RobotJoint
-from osimlite.translate.fidelity import LEFT_OUT, Fidelity
+from osimlite.translate.fidelity import LEFT_OUT, Error, Fidelity
 from osimlite.translate.files import write_files
+from osimlite.translate.mjcf.poses import draw_poses, measure_arm_errors
+from osimlite.translate.mjcf.tendons import TendonSite, measure_tendon
 from osimlite.translate.sidecar import format_coordinates
 
 AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 """Words for the axes of a segment."""
+
+ERROR_POSES = 100
+"""Random poses in which the errors of paths are measured."""
 
 MUSCLE_TYPE = "hillthelen"
 """Class of biorbd's muscles that is nearest to those of OpenSim."""
@@ -199,13 +205,18 @@ def _make_rotation_to_axis(axis: Array) -> Array:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-def _place(station: Marker | PathPoint, robot: Robot, placements: Placements) -> tuple[str, Array]:
-    """Return the segment of a point, and its position there (3,), m."""
+def _locate(station: Marker | PathPoint, placements: Placements) -> tuple[str, Array]:
+    """Return the path of the body (or ground) of a point, and its position there (3,), m."""
     frame = placements.follow_socket(station, "socket_parent_frame")
     assert isinstance(frame, PhysicalFrame)
     base, matrix = placements.resolve_frame(frame)
+    return base, matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
+
+
+def _place(station: Marker | PathPoint, robot: Robot, placements: Placements) -> tuple[str, Array]:
+    """Return the segment of a point, and its position there (3,), m."""
+    base, point = _locate(station, placements)
     link, body = robot.link_of[base]
-    point = matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
     return link.name, body[:3, :3] @ point + body[:3, 3]
 
 
@@ -222,11 +233,63 @@ def _format_markers(
         yield from ("\ttechnical 1", "endmarker", "")
 
 
+def _list_fixed_points(path: GeometryPath) -> list[PathPoint]:
+    """Return the points of a path that do not move in their bodies, also conditional ones."""
+    return [point for point in path.path_point_set.objects if isinstance(point, PathPoint)]
+
+
+def _measure_path_errors(model: Model, placements: Placements) -> dict[str, dict[str, Error]]:
+    """Measure how far straight lines through the fixed points are from the paths of muscles.
+
+    Args:
+        model: the model.
+        placements: frames of the model.
+
+    Returns:
+        Errors of length and moment arms by the path of the muscle and the quantity, for muscles
+        that have other parts than fixed points.
+    """
+    inexact: dict[str, list[PathPoint]] = {}
+    for muscle in model.components(Muscle):
+        path = muscle.geometry_path
+        if not isinstance(path, GeometryPath):
+            continue
+        fixed_points = _list_fixed_points(path)
+        if len(fixed_points) > 1 and (
+            path.path_wrap_set.objects
+            or len(fixed_points) < len(path.path_point_set.objects)
+            or any(isinstance(point, ConditionalPathPoint) for point in fixed_points)
+        ):
+            inexact[muscle.path] = fixed_points
+    if not inexact:
+        return {}
+    paths = Paths(model)
+    mechanism = paths.mechanism
+    poses, samples = draw_poses(paths, ERROR_POSES)
+    # Ground is the last body of the poses.
+    bodies = {body.path: index for index, body in enumerate(mechanism.bodies)}
+    result = {}
+    for muscle_path, points in inexact.items():
+        sites = []
+        for point in points:
+            base, station = _locate(point, placements)
+            sites.append(TendonSite(bodies.get(base, len(bodies)), station))
+        # Without surfaces, lengths and moment arms are the same in all versions of MuJoCo.
+        lengths, arms = measure_tendon(tuple(sites), poses, version=4)
+        sample = samples[muscle_path]
+        result[muscle_path] = {"length": Error.measure(lengths - sample.lengths, "m")} | {
+            f"moment arm about {mechanism.coordinate_names[index]}": error
+            for index, error in measure_arm_errors(mechanism, arms, sample).items()
+        }
+    return result
+
+
 def _format_muscles(
     model: Model, robot: Robot, placements: Placements, fidelity: Fidelity
 ) -> Iterator[str]:
     """Yield the lines of all muscles, each with a group of its own."""
     names = UniqueNames()
+    errors = _measure_path_errors(model, placements)
     for muscle in model.components(Muscle):
         path = muscle.geometry_path
         if not isinstance(path, GeometryPath):
@@ -235,7 +298,7 @@ def _format_muscles(
             )
             # biorbd has no paths that are functions.
             continue
-        points = [point for point in path.path_point_set.objects if isinstance(point, PathPoint)]
+        points = _list_fixed_points(path)
         moving_count = len(path.path_point_set.objects) - len(points)
         conditional_count = sum(isinstance(point, ConditionalPathPoint) for point in points)
         wrap_count = len(path.path_wrap_set.objects)
@@ -252,7 +315,14 @@ def _format_muscles(
             ),
         ):
             if count:
-                fidelity.add("path", muscle.path, description, replacement, f"{count} in the path")
+                fidelity.add(
+                    "path",
+                    muscle.path,
+                    description,
+                    replacement,
+                    f"{count} in the path",
+                    errors.get(muscle.path),
+                )
         fidelity.add(
             "muscle-law",
             muscle.path,

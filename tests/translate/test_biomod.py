@@ -96,6 +96,27 @@ def test_markers_and_muscles_are_written() -> None:
     assert {"muscle-law", "constraint"} <= kinds
 
 
+def test_paths_that_biorbd_cannot_follow_have_measured_errors() -> None:
+    model = make_tilted()
+    muscle = osimlite.Thelen2003Muscle(name="turner")
+    pelvis, tail = model["/bodyset/pelvis"], model["/bodyset/tail"]
+    muscle.geometry_path.add_point(pelvis, (0.0, 0.1, 0.0))
+    # The range is never met: OpenSim's path is a straight line, biorbd's has a corner.
+    muscle.geometry_path.path_point_set.objects.append(
+        osimlite.ConditionalPathPoint(
+            name="corner", socket_parent_frame=pelvis, location=(0.0, 0.2, 0.0),
+            socket_coordinate="/jointset/tail/swing", range=(50.0, 51.0),
+        )
+    )  # fmt: skip
+    muscle.geometry_path.add_point(tail, (-0.2, 0.0, 0.05))
+    model.add(muscle)
+    (record,) = [record for record in to_biomod(model).fidelity if record.kind == "path"]
+    assert record.component == "/forceset/turner"
+    # The corner adds 0.1 m, and the rest of the path is longer by less.
+    assert 0.1 < record.errors["length"].rms < record.errors["length"].max < 0.2
+    assert "moment arm about swing" in record.errors
+
+
 READ_ATTRIBUTES = {
     "segment": {"parent", "rtinmatrix", "rt", "translations", "rotations", "rangesq", "mass",
                 "inertia", "com"},
