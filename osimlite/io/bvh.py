@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.files import read_file
-from osimlite.base.records import dataclass, field
+from osimlite.base.records import dataclass, field, replace
 from osimlite.errors import DocumentError
 from osimlite.io.tables.storage import format_number
 from osimlite.mechanics.multibody.spatial import Array
@@ -41,7 +41,7 @@ class BvhJoint:
         parent: index of the parent; -1 for a root.
         offset: position in the axes of the parent (3,), in the unit of the file.
         channels: names of the channels in the order of their numbers.
-        end: position of the end of a bone without further joints (3,); None if there are joints.
+        end: position of the first end site (3,); None if there is none.
     """
 
     name: str
@@ -300,23 +300,31 @@ def _read_joints(reader: _BvhReader, joints: list[BvhJoint]) -> None:
         parent = parents[-1] if parents else -1
         joints.append(BvhJoint(name or f"joint_{len(joints)}", parent, offset, channels))
         parents.append(len(joints) - 1)
-        if reader.peek().lower() == "end":
-            reader.take()
-            reader.take_name()
-            reader.take("{")
-            reader.take("OFFSET")
-            last = joints[-1]
-            joints[-1] = BvhJoint(
-                last.name, last.parent, last.offset, last.channels, reader.take_vector()
-            )
-            reader.take("}")
-        # Closing braces end joints; the next JOINT hangs on what is still open.
-        while parents and reader.peek() == "}":
-            reader.take()
-            parents.pop()
+        # Closing braces end joints; the next JOINT hangs on what is still open. Some programs write end
+        # sites after the children of a joint, or several of them.
+        while parents and (word := reader.peek().lower()) in ("}", "end"):
+            if word == "}":
+                reader.take()
+                parents.pop()
+            else:
+                end = _take_end_site(reader)
+                open_joint = joints[parents[-1]]
+                if open_joint.end is None:
+                    joints[parents[-1]] = replace(open_joint, end=end)
         if not parents:
             return
         reader.take("JOINT")
+
+
+def _take_end_site(reader: _BvhReader) -> Array:
+    """Read an end site, and return its position in the joint (3,)."""
+    reader.take()
+    reader.take_name()
+    reader.take("{")
+    reader.take("OFFSET")
+    end = reader.take_vector()
+    reader.take("}")
+    return end
 
 
 def _take_channel_count(reader: _BvhReader) -> int:

@@ -76,6 +76,20 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert again.joints[1].end is not None and again.joints[1].end.tolist() == [0.0, -40.0, 0.0]
 
 
+def test_end_sites_stand_anywhere_in_a_joint(tmp_path: Path) -> None:
+    end = "End Site { OFFSET 0 0 7 }\n"
+    # Before and after the children of a joint, twice in one joint, and after those of the root.
+    text = TEXT.replace("  JOINT Spine", end + end.replace("7", "8") + "  JOINT Spine")
+    text = text.replace("  }\n}\nMOTION", "  " + end + "  }\n" + end + "}\nMOTION")
+    motion, plain = read_bvh(write(tmp_path, text)), read_bvh(write(tmp_path, TEXT))
+    assert [(j.name, j.parent) for j in motion.joints] == [(j.name, j.parent) for j in plain.joints]
+    ends = [None if j.end is None else j.end.tolist() for j in motion.joints]
+    assert ends == [[0, 0, 7], [0, -40, 0], [0, 0, 7], [0, 10, 0]]
+    np.testing.assert_array_equal(motion.compute_poses()[1], plain.compute_poses()[1])
+    again = read_bvh(write(tmp_path, "".join(format_bvh(motion))))
+    assert [None if j.end is None else j.end.tolist() for j in again.joints] == ends
+
+
 def test_angles_are_those_of_rotations_and_do_not_jump() -> None:
     rng = np.random.default_rng(0)
     angles = np.cumsum(rng.uniform(-20.0, 20.0, (400, 3)), axis=0)
