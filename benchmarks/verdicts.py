@@ -38,26 +38,7 @@ LARGEST_BYTES = 400_000
 LINTER = """
 import json, sys
 from osimlite.lint import validate
-from osimlite.simulation.elements.geometries.paths import scholz2015_geometry_path as paths
 
-# The linter searches for the cable of a Scholz2015GeometryPath in Python, which takes seconds. Most
-# edits do not change the input of the search, so results are kept by their exact input.
-search, results = paths.cable_path, {}
-
-def search_once(ints, numbers, work, *others):
-    key = ints.tobytes(), numbers.tobytes()
-    if key not in results:
-        error = None
-        try:
-            search(ints, numbers, work, *others)
-        except ArithmeticError as failure:
-            error = failure
-        results[key] = ints.copy(), work.copy(), error
-    ints[:], work[:], error = results[key]
-    if error is not None:
-        raise error
-
-paths.cable_path = search_once
 for line in sys.stdin:
     try:
         report = validate(line.rstrip("\\n"), ignore="OSIM63")

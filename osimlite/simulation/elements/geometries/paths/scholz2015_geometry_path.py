@@ -14,7 +14,6 @@ import numpy as np
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.mechanics.kernels.cable_correction import solver_size
-from osimlite.mechanics.kernels.cable_paths import cable_path
 from osimlite.mechanics.kernels.cable_records import (
     CABLE,
     CABLE_POINT_WORK,
@@ -194,8 +193,12 @@ class Cable:
         ]
         _, path = self.make_records(Places(mechanism, {}, placements))
         ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.record_size)
+        # Only cables need the engines while a model is built. As Python the search takes seconds.
+        from osimlite.simulation.engines.linking import READY_CODE
+
+        find_path = READY_CODE.select_for([path.kernel]).get_entry(path.kernel)
         try:
-            cable_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
+            find_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
         except ArithmeticError:
             # As Python, kernels raise where machine code gets NaN: a path that is normal to a plane
             # at its hint has no direction on it.
