@@ -9,6 +9,7 @@ import pytest
 
 from osimlite import read
 from osimlite.mechanics.multibody.build import build_mechanism
+from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.paths import scholz2015_geometry_path as cables
 from osimlite.simulation.engines import linking, machine_code
@@ -21,11 +22,7 @@ def find_contacts():
     """Return the initial contacts of all cables of a model with their obstacles."""
     model = read(MODEL)
     builder = ElementBuilder(model, build_mechanism(model), Path())
-    owners = [
-        force
-        for force in model.force_set
-        if type(getattr(force, "geometry_path", None)).__name__ == "Scholz2015GeometryPath"
-    ]
+    owners = [item for item in model.walk() if isinstance(item, PathSpring)]
     return [
         element.begin
         for owner in owners
