@@ -3,7 +3,8 @@
 A tendon with one branch becomes a GeometryPath. For each segment that bends around a geom, the
 quadrant of the wrap surface is the one whose lengths are nearest to MuJoCo's in sampled poses.
 Tendons that bend inside of a geom, or have pulleys, become a FunctionBasedPath with a fitted
-polynomial of the coordinates, and so do tendons that no wrap follows well.
+polynomial of the coordinates, and so do tendons that no wrap follows well. Where no hinge or slide
+moves such a tendon, its path is straight.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import numpy as np
 from osimlite.base.progress import report_progress
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.functions import LinearFunction
-from osimlite.schema.paths import FunctionBasedPath
+from osimlite.schema.paths import FunctionBasedPath, GeometryPath
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.wrapping import norm
 from osimlite.translate.mjcf_import.draft import ConversionDraft, TendonPath
@@ -169,12 +171,19 @@ class _Selection:
                 continue
             report_progress("fitting paths", row, len(self.tendons))
             rms = _rms(errors[row]) if row in errors else np.inf
-            if rms > GOOD_WRAP_M:
-                path, fit_errors = self._fit(row)
+            joints = self._find_joints(self.tendons[row]) if rms > GOOD_WRAP_M else []
+            # The arguments of a polynomial are hinges and slides; balls and free joints are not.
+            if joints:
+                path, fit_errors = self._fit(row, joints)
                 # A polynomial needs many numbers, so it must be clearly better.
                 if _rms(fit_errors) < 0.5 * rms:
                     polynomials[row] = path, fit_errors
-        self._record(polynomials, routes, geodesics)
+        straight = {
+            row: _find_first_branch(tendon)
+            for row, tendon in enumerate(self.tendons)
+            if row not in routes and row not in polynomials and row not in geodesics
+        }
+        self._record(polynomials, routes, geodesics, straight)
         # Names of the trial surfaces are free again.
         draft.names.pop("wrap", None)
         draft.names.pop("obstacle", None)
@@ -188,6 +197,10 @@ class _Selection:
                     make_geodesic_path(
                         draft, draft.frames, obstacles, tendon.segments, geodesics[row]
                     )
+                )
+            elif row in straight:
+                draft.paths[tendon.number] = TendonPath(
+                    _make_straight_path(draft, draft.frames, surfaces, straight[row])
                 )
             else:
                 draft.paths[tendon.number] = TendonPath(
@@ -242,11 +255,18 @@ class _Selection:
         offset = self.poses.sites[:, segment.side] - self.poses.geoms[:, segment.geom]
         return bool(norm(offset).max() < float(model.geom_size[segment.geom, 0]))
 
-    def _fit(self, row: int) -> tuple[FunctionBasedPath, Array]:
-        """Fit a polynomial to the length of a tendon; return its path and errors in the check poses."""
+    def _fit(self, row: int, joints: list[int]) -> tuple[FunctionBasedPath, Array]:
+        """Fit a polynomial to the length of a tendon.
+
+        Args:
+            row: index of the tendon.
+            joints: the independent hinges and slides that the length depends on, one or more.
+
+        Returns:
+            The path, and its errors in the check poses, m.
+        """
         draft, source = self.draft, self.source
         tendon = self.tendons[row]
-        joints = self._find_joints(tendon)
         poses = place(source, sample_qpos(source, max(samples_for(len(joints)), 400), 2))
         lengths = tendon_lengths(source, [tendon], poses, self.version)[0]
         addresses = [int(draft.mj.jnt_qposadr[joint]) for joint in joints]
@@ -311,6 +331,7 @@ class _Selection:
         polynomials: dict[int, tuple[FunctionBasedPath, Array]],
         routes: dict[int, tuple[Quadrant | None, ...]],
         geodesics: dict[int, Hints],
+        straight: dict[int, tuple[TendonSegment, ...]],
     ) -> None:
         """Measure the selected paths, and record their deviations."""
         draft, model = self.draft, self.draft.mj
@@ -326,6 +347,8 @@ class _Selection:
                         draft, bench.frames, obstacles, tendon.segments, geodesics[row]
                     )
                 )
+            elif row in straight:
+                bench.add(_make_straight_path(draft, bench.frames, surfaces, straight[row]))
             else:
                 bench.add(
                     make_geometry_path(draft, bench.frames, surfaces, tendon.segments, routes[row])
@@ -346,16 +369,16 @@ class _Selection:
                 errors["moment arm"] = Error.measure(
                     arm_errors[:, worst], "m" if is_rotational[worst] else "1"
                 )
+            reason = (
+                "pulleys"
+                if tendon.has_pulley
+                else "a tendon that bends inside of a geom"
+                if row not in routes
+                else "a tendon that no wrap surface follows"
+            )
             if row in polynomials:
                 path = polynomials[row][0]
                 function = path.length_function
-                reason = (
-                    "pulleys"
-                    if tendon.has_pulley
-                    else "a tendon that bends inside of a geom"
-                    if row not in routes
-                    else "a tendon that no wrap surface follows"
-                )
                 draft.record(
                     "tendon",
                     tendon.number,
@@ -363,6 +386,17 @@ class _Selection:
                     "a FunctionBasedPath: a polynomial of the coordinates, fitted in sampled poses",
                     f"order {function.order} of {function.dimension} coordinates, not to be used "  # type: ignore[union-attr]
                     "outside of their ranges",
+                    errors,
+                )
+            elif row in straight:
+                draft.record(
+                    "tendon",
+                    tendon.number,
+                    reason,
+                    "a GeometryPath through the sites of the first branch, straight between them"
+                    if tendon.has_pulley
+                    else "a GeometryPath, straight between the sites",
+                    "no hinge or slide moves it, so that it has no polynomial of coordinates",
                     errors,
                 )
             elif errors["length"].max > EXACT_M and row in geodesics:
@@ -410,6 +444,31 @@ class _Selection:
 
 def _key(segment: TendonSegment) -> TendonSegment:
     return segment._replace(divisor=1.0)
+
+
+def _find_first_branch(tendon: Tendon) -> tuple[TendonSegment, ...]:
+    """Return the segments of a tendon up to its first pulley."""
+    last = next(
+        (
+            index
+            for index, (segment, following) in enumerate(
+                zip(tendon.segments, tendon.segments[1:], strict=False), 1
+            )
+            if segment.second != following.first or segment.divisor != following.divisor
+        ),
+        len(tendon.segments),
+    )
+    return tendon.segments[:last]
+
+
+def _make_straight_path(
+    draft: ConversionDraft,
+    frames: list[PhysicalFrame],
+    surfaces: Surfaces,
+    segments: tuple[TendonSegment, ...],
+) -> GeometryPath:
+    """Make a path through the sites of a branch that wraps around nothing."""
+    return make_geometry_path(draft, frames, surfaces, segments, (None,) * len(segments))
 
 
 def _rms(values: Array) -> float:

@@ -166,3 +166,49 @@ def test_sites_in_one_place_are_recorded(tmp_path):
 
     assert find(None) == ["'outer' and 'inner'"]
     assert find("apart") == []
+
+
+FLOATING = """<mujoco>
+  <worldbody>
+    <site name="a" pos="0.3 0.02 1"/>
+    <geom name="rod" type="cylinder" size="0.05 0.2" zaxis="0 1 0" pos="0 0 0.5"/>
+    <site name="side" pos="0 0 0.56"/>
+    <site name="inside" pos="0 0 0.5"/>
+    <body name="ball" pos="0 0 0.1">
+      <freejoint/>
+      <geom size="0.05"/>
+      <site name="b" pos="0 0 0.02"/>
+      <site name="c" pos="0.02 0 0.02"/>
+    </body>
+  </worldbody>
+  <tendon>
+    <spatial name="around"><site site="a"/><geom geom="rod" sidesite="side"/><site site="b"/></spatial>
+    <spatial name="within"><site site="a"/><geom geom="rod" sidesite="inside"/><site site="b"/></spatial>
+    <spatial name="branched">
+      <site site="a"/><site site="b"/><pulley divisor="2"/><site site="side"/><site site="c"/>
+    </spatial>
+  </tendon>
+  <actuator>
+    <motor name="m_around" tendon="around"/>
+    <motor name="m_within" tendon="within"/>
+    <motor name="m_branched" tendon="branched"/>
+  </actuator>
+</mujoco>
+"""
+"""Tendons that move with a free joint alone, so that they have no polynomial of coordinates."""
+
+
+def test_tendons_of_free_bodies_have_paths_without_polynomials(tmp_path):
+    made = osimlite.from_mjcf(models.write_mjcf(tmp_path, FLOATING), written_for=4)
+    records = {record.component: record for record in made.fidelity}
+    for name in ("around", "within", "branched"):
+        path = made.model[f"/forceset/m_{name}"].geometry_path
+        assert [point.name for point in path.path_point_set.objects] == ["a", "b"]
+    assert records["/tendon/within"].done == "a GeometryPath, straight between the sites"
+    assert records["/tendon/branched"].done == (
+        "a GeometryPath through the sites of the first branch, straight between them"
+    )
+    # The record says how far off such paths are.
+    assert 0.0 < records["/tendon/within"].errors["length"].max < 0.2
+    assert records["/tendon/branched"].errors["length"].max > 0.2
+    assert osimlite.read_text(made.text).name == made.model.name
