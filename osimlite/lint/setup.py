@@ -367,7 +367,7 @@ class Setup(Subject):
             is_own = os.path.dirname(target) == results_folder and os.path.basename(
                 target
             ).startswith(f"{top.name}_")
-            if is_own and not target.endswith(".osim"):
+            if is_own and _writes_own_tables(top, target):
                 files_by_name_length[len(top.name)] = file
             for item in top.walk():
                 for _, name in list_files(item, "output-file"):
@@ -378,6 +378,17 @@ class Setup(Subject):
                         return file
         # Of several names that fit, the longest is the most specific.
         return files_by_name_length[max(files_by_name_length)] if files_by_name_length else None
+
+
+def _writes_own_tables(tool: Object, path: str) -> bool:
+    """Return whether a tool may write a file whose name begins with the tool's name.
+
+    ScaleTool and InverseDynamicsTool write only files that they name. No tool writes measured
+    markers, and models have names of their own.
+    """
+    if is_a(tool, "ScaleTool") or is_a(tool, "InverseDynamicsTool"):
+        return False
+    return os.path.splitext(path)[1] in ("", ".sto", ".mot", ".xml")
 
 
 def is_given(name: str) -> bool:

@@ -41,7 +41,7 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     (project / "leg_no_knee.mot").unlink()
     (project / "leg_degrees.mot").unlink()
     assert validate_paths(["."], no_cache=True) == 0
-    assert capsys.readouterr().out.startswith("Nothing found in 12")
+    assert capsys.readouterr().out.startswith("No findings in 12")
     assert validate(".").checked == 12
     assert len(find_project_files([".", project / "ik.xml", "./../project"])) == 12
     # The name of a marker is changed in the model alone.
@@ -55,6 +55,25 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
         ("ik.xml", "OSIM841"),
         ("scale.xml", "OSIM831"),
     }
+
+
+@pytest.mark.parametrize(
+    ("missing", "writable"),
+    [("leg_walk.trc", False), ("leg_loads.mot", True), ("leg_states.sto", True)],
+)
+def test_only_files_that_a_tool_can_write_may_be_missing(project, missing, writable):
+    """A tool writes tables under its own name, but no measured markers; a ScaleTool writes none."""
+    for writer in ("ScaleTool", "AnalyzeTool"):
+        (project / "scale.xml").write_text(
+            f'<OpenSimDocument Version="40600"><{writer} name="leg"/></OpenSimDocument>'
+        )
+        ik = (
+            '<OpenSimDocument Version="40600"><InverseKinematicsTool name="ik"><model_file>leg.osim</model_file>'
+            f"<marker_file>{missing}</marker_file></InverseKinematicsTool></OpenSimDocument>"
+        )
+        (project / "ik.xml").write_text(ik)
+        codes = dict(check_files(["ik.xml"], Config()).codes)
+        assert ("OSIM821" in codes) == (writer == "ScaleTool" or not writable)
 
 
 def test_what_was_found_in_a_setup_is_found_again_when_its_model_changes(project):
