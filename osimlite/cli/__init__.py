@@ -54,7 +54,10 @@ def create_app(names: Sequence[str] = COMMANDS) -> Typer:
     def osimlite(
         version: bool = typer.Option(False, "--version", help="Print the version and stop."),
         verbose: bool = typer.Option(
-            False, "--verbose", "-v", help="With --version: say what runs the kernels."
+            False,
+            "--verbose",
+            "-v",
+            help="With --version: also show how the numerical code (the kernels) is compiled.",
         ),
     ) -> None:
         if version:
@@ -263,5 +266,5 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
         options = {word for parameter in context.command.params for word in parameter.opts}
         if synonym in options:
             error.possibilities = [synonym]  # type: ignore[attr-defined]
-    complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")
+    complain(f"{error.format_message().rstrip('.')}; '{path} --help' shows the usage")
     raise SystemExit(2) from None

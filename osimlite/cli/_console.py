@@ -102,8 +102,8 @@ def show_rows(
 ) -> None:
     """Print a table whose last column is text that is broken between words.
 
-    Where the other columns leave too little room, the text stands below each row. No word and no
-    path is ever broken.
+    Where the other columns leave too little room, the text stands below each row, and there are no
+    headings. No word and no path is ever broken.
 
     Args:
         headings: headings of the columns.
@@ -121,6 +121,8 @@ def show_rows(
     text_indent = indent if fits_beside else TEXT_INDENT
     bold, reset = ("\033[1m", "\033[0m") if wants_colour() else ("", "")
     for row_index, row in enumerate(all_rows):
+        if row_index == 0 and not fits_beside:
+            continue
         cells = [
             f"{cell:>{width}}" if index in right_aligned else f"{cell:{width}}"
             for index, (cell, width) in enumerate(zip(row[:last], widths, strict=True))

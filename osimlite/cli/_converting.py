@@ -86,7 +86,8 @@ class Request:
         source_format = find_format(file) if source is None else source
         if source_format is None:
             raise SettingError(
-                f"the format of '{file.name}' is unknown; name it with --from: {', '.join(sorted(sources))}"
+                f"the format of '{file.name}' is not one that 'convert' recognizes; name it with --from: "
+                f"{', '.join(sorted(sources))}"
             )
         targets = {OSIM, MARKERS, PROJECT, *(exporter.name for exporter in EXPORTERS)}
         if target is not None and target not in targets:
@@ -107,9 +108,7 @@ class Request:
                 if _get_suffix(target_format)
                 else "name a folder without a suffix"
             )
-            raise SettingError(
-                f"'{output.suffix}' is the suffix of no format that can be written; {advice}"
-            )
+            raise SettingError(f"'convert' cannot write '{output.suffix}' files; {advice}")
         if target_format is None:
             raise SettingError(
                 "the format to write is unknown; name a file with -o, such as robot.urdf, or a format with --to"
@@ -464,7 +463,7 @@ def report(request: Request, result: Conversion) -> None:
         print_table(tabulate(result.fidelity, request.target))
     exact_count, changed_count, dropped_count = result.fidelity.counts()
     say(
-        f"parts: {exact_count} exact, {changed_count} approximated or converted, {dropped_count} left out"
+        f"components: {exact_count} exact, {changed_count} approximated or converted, {dropped_count} left out"
     )
     say("wrote " + join_words([str(path) for path in result.files], max_count=4))
 

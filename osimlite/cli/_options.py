@@ -90,8 +90,9 @@ AppliedTo = Annotated[
     Option(
         "--applied-to",
         metavar="BODY=FORCE,POINT,MOMENT",
-        help="Columns of a table --external-loads that act on a body: the prefixes of their labels, f1_,p1_,m1_ "
-        "for the first plate of a .c3d, with + between several loads. Point and moment are optional.",
+        help="Columns of the table in --external-loads that act on a body: the prefixes of the labels of force, point "
+        "and moment, such as f1_,p1_,m1_ for the first plate of a .c3d. Point and moment are optional. Join several "
+        "loads with +.",
         show_default=False,
     ),
 ]
@@ -165,7 +166,8 @@ Everything = Annotated[
 OnlyOurs = Annotated[
     bool,
     Option(
-        "--skip-other-xml", help="Skip XML files that are not OpenSim's, also if they are named."
+        "--skip-other-xml",
+        help="Skip XML files that are not OpenSim's, even if the command line names them.",
     ),
 ]
 Folder = Annotated[
@@ -200,7 +202,7 @@ Geometry = Annotated[
     Option(
         "--geometry",
         metavar="FOLDER",
-        help="Also search mesh files here, after the model's folder and its subfolder Geometry; may be repeated. "
+        help="Also look here for mesh files, after the model's folder and its subfolder Geometry; may be repeated. "
         "The mesh-paths of the settings and the folders in the environment variable OSIMLITE_GEOMETRY, separated by "
         "colons, are searched last.",
     ),

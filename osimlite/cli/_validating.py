@@ -244,7 +244,9 @@ def _count_fixes(count: int) -> str:
 
 
 def _describe_unsafe_fixes(count: int) -> str:
-    return f"; --unsafe-fixes would apply {count} more" if count else ""
+    if not count:
+        return ""
+    return f"; {count} probable {'fix needs' if count == 1 else 'fixes need'} --unsafe-fixes"
 
 
 def _show_diff(path: str, config: Config, unsafe: bool) -> tuple[int, int, bool]:

@@ -16,7 +16,7 @@ def check_trial(
     paths: Annotated[
         list[str],
         Argument(
-            metavar="PATH...",
+            metavar="PATH",
             help="Folders with setups and their results, or setups of ScaleTool, InverseKinematicsTool, "
             "InverseDynamicsTool, RRATool, CMCTool and AnalyzeTool.",
             show_default=False,

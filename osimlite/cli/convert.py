@@ -79,7 +79,7 @@ def convert(
     overwrite: options.Overwrite = False,
     **option_values: Any,
 ) -> None:
-    """Convert a file: AddBiomechanics, MuJoCo, URDF, glTF and other formats from and to OpenSim's.
+    """Convert between OpenSim's files and AddBiomechanics, MuJoCo, URDF, glTF and other formats.
 
     Writes the converted files, fidelity.json, which lists what was translated, approximated or left
     out, and summary.json. --formats lists what can be read and written, and what each format carries.

@@ -172,13 +172,13 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
     result, sentences = [], []
     # The stack closes all simulations, also if the tour fails half-way.
     with ExitStack() as stack:
-        with tour.step("Make three models ready to move") as report_result:
+        with tour.step("Prepare three models for simulation") as report_result:
             ready = [
                 stack.enter_context(Simulation(make_model(motion.model), "compiled"))
                 for motion in MOTIONS
             ]
             report_result(
-                f"{join_words(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}"
+                f"{join_words(motion.model for motion in MOTIONS)}; engine: {ready[0].engine.version}"
             )
         for motion, simulation in zip(MOTIONS, ready, strict=True):
             with (
@@ -263,9 +263,9 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
         folder = tour.folder / f"{motion.model}-bullet"
         bullet.write(folder)
         report_result(
-            f"{simulation.engine.version}: in {motion.to:g} s no coordinate is ever farther than "
-            f"{compute_largest_difference(compiled, bullet):.1e} rad or m from the motion of the compiled engine; "
-            f"the integrator took {_count_steps(compiled)} steps there and {_count_steps(bullet)} here",
+            f"{simulation.engine.version}: over {motion.to:g} s, no coordinate differs by more than "
+            f"{compute_largest_difference(compiled, bullet):.1e} rad or m from the motion of osimlite's own engine; the "
+            f"integrator took {_count_steps(bullet)} steps with PyBullet and {_count_steps(compiled)} with the own engine",
             folder,
         )
 
@@ -297,7 +297,9 @@ def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
     from osimlite.models.walking import write_scenario
     from osimlite.studies.reflexes.scenario import Scenario
 
-    with tour.step("Have a human walk for ten seconds, by reflexes of 16 muscles") as report_result:
+    with tour.step(
+        "Let a human model walk for ten seconds by the reflexes of 16 muscles"
+    ) as report_result:
         scenario = Scenario(write_scenario(tour.folder / "human-walks"))
         walked = scenario.walk(scenario.best())
         file = tour.folder / "human-walks" / "states.sto"
@@ -322,8 +324,9 @@ def _describe_fall(motion: Trajectory) -> str:
     knee = next(event["time_s"] for event in events if "Knee" in event["contact"])
     largest_difference = compute_distance_to_opensim(motion)
     return (
-        f"Released at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee touches the ground. It does the same in "
-        f"OpenSim: all coordinates differ from its converged motion by at most {largest_difference:.1e} rad or m."
+        f"Released at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee touches the ground. It falls in "
+        "the same way in OpenSim: no coordinate differs from OpenSim's most accurate motion by more than "
+        f"{largest_difference:.1e} rad or m."
     )
 
 
@@ -343,7 +346,7 @@ def _describe_walk(motion: Trajectory) -> str:
     return (
         "The same walker with two changes (the moment of inertia of its shanks is 0.0921 instead of 1 kg·m², and its feet are "
         f"7.4 cm further ahead) makes {len(steps)} steps in {motion.times[-1]:g} s, at {speed:.2f} m/s, "
-        "and goes on walking. No motor drives it, only gravity."
+        "and continues to walk. No motor drives it, only gravity."
     )
 
 
@@ -375,9 +378,9 @@ def _describe_jump(motion: Trajectory) -> str:
         motion.mechanism.total_mass,
     )
     return (
-        f"A human of {mass:.0f} kg jumps by 16 muscles, whose excitations a search found: the feet push with "
-        f"{peak_force / (9.80665 * mass):.1f} times the body weight, the mass center rises from {heights[0]:.2f} to "
-        f"{max(heights):.2f} m, and for {landing - take_off:.2f} s nothing touches the ground."
+        f"A human model of {mass:.0f} kg jumps with 16 muscles, whose excitations come from an optimization. The feet push with "
+        f"{peak_force / (9.80665 * mass):.1f} times the body weight, the mass centre rises from {heights[0]:.2f} to "
+        f"{max(heights):.2f} m, and nothing touches the ground for {landing - take_off:.2f} s."
     )
 
 

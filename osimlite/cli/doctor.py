@@ -1,4 +1,4 @@
-"""``osimlite doctor``: installed packages, what each extra adds, and where mesh files are searched."""
+"""``osimlite doctor``: installed packages, what each extra adds, and the folders in which it looks for mesh files."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "view --screenshot": ("numpy", "pillow"),
     "view --rerun": ("numpy", "rerun-sdk"),
     "simulate --animate": ("numpy", "pillow"),
-    "osimlite.studies.gym": ("gymnasium", "numpy"),
+    "osimlite.gym": ("gymnasium", "numpy"),
     "markers and forces of .c3d files": ("numpy", "ezc3d"),
-    "osimlite.translate.mjcf.driver, translate --check": ("mujoco", "numpy"),
+    "osimlite.mjcf.Driver, translate --check": ("mujoco", "numpy"),
     "osimlite.casadi": ("casadi", "numpy"),
     "models as YAML": ("pyyaml",),
     "trajectory.to_frame()": ("pandas",),
@@ -128,7 +128,7 @@ def doctor(
         ),
     ] = None,
 ) -> None:
-    """Show which packages are installed, what each extra adds, and where mesh files are searched.
+    """Show which packages are installed, what each extra adds, and in which folders mesh files are looked up.
 
     Exits with 1 if an installed package cannot be loaded.
 

@@ -24,7 +24,7 @@ def fit(
         Option(
             "--hold",
             metavar="NAME",
-            help="Keep this marker's position in the model; may be repeated. By default those that are fixed.",
+            help="Keep this marker's position in the model, as by default of markers that are fixed in it; may be repeated.",
         ),
     ] = None,
     weight: options.Weights = None,

@@ -40,8 +40,8 @@ def ik(
     Each frame is the pose with the smallest weighted mean of squared distances, solved exactly.
     Locked coordinates keep their defaults, clamped ones stay in their ranges. ik.mot is in degrees,
     like OpenSim's; marker_errors.sto has the distance of each marker from its measured position (m).
-    For a table of quaternions (orientations of sensors), the angles are minimized, and
-    orientation_errors.sto has them (rad).
+    If TRIAL has orientations of sensors (quaternions), the angles between measured and model
+    orientations are minimized, and written to orientation_errors.sto (rad).
 
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """

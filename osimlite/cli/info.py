@@ -277,8 +277,11 @@ def _describe_simulation(model: Model, folder: Path, text: str) -> tuple[str, bo
         mechanism.acceleration(*mechanism.default_state())
     except OsimliteError as error:
         return f"not possible: {error}", False
-    description = "possible, nothing is left out"
+    description = "possible, every force is supported"
     if forces.skipped:
-        description = f"not without leaving out (--skip-unsupported) {join_words(summarize_skipped(forces.skipped))}"
+        skipped_text = join_words(summarize_skipped(forces.skipped))
+        description = (
+            f"possible only without unsupported forces (--skip-unsupported): {skipped_text}"
+        )
     # An attribute ``file`` includes another file, which may change without this one.
     return description, not forces.reads_files and re.search(r"\sfile\s*=", text) is None

@@ -32,7 +32,7 @@ def muscles(
             "--muscle",
             metavar="NAME",
             help="Only this muscle; may be repeated.",
-            show_default="all that it moves",
+            show_default="all that the coordinate moves",
         ),
     ] = None,
     points: Annotated[
@@ -68,7 +68,7 @@ def muscles(
 ) -> None:
     """Compute lengths, moment arms, fiber lengths and forces of muscles over a coordinate, like OpenSim's plotter.
 
-    Fibers are in equilibrium with their tendons at the activation, and the model is at rest. Prints
+    Fibers are in equilibrium with their tendons at the activation of --activation, and the model is at rest. Prints
     the minimum and maximum for each muscle; -o writes every number.
 
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot

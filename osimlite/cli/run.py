@@ -91,7 +91,7 @@ def run(
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
 
     A setup and the files that it names are checked first, as by 'osimlite validate'; it does not run
-    if they have an error. Files are searched from the folder of the setup, then from the current
+    if they have an error. A file name is looked up in the folder of the setup, then in the current
     folder. 'run-tool' is another name of this command.
 
     A setup waits for the setups that write its input files. If one fails, only those that need it
@@ -305,7 +305,7 @@ def _print_outcome(setup: Path, outcome: Outcome) -> None:
         files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in unreported))
         facts.add(
             "check",
-            f"{format_count(hidden_count, 'warning')} more; see them with: osimlite validate {files}",
+            f"{format_count(hidden_count, 'more warning')}; see them with: osimlite validate {files}",
         )
     facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
     facts.show()
@@ -331,19 +331,19 @@ def _show_trials(trials: list[RunRecord]) -> None:
         visible_trials = worst[-MOST_ROWS:][::-1]
     rows = []
     for trial in visible_trials:
-        result_text = trial.message or "; ".join(f"{name} {fact}" for name, fact in trial.told[:2])
+        result_text = trial.message or "; ".join(f"{name}: {fact}" for name, fact in trial.told[:2])
         if trial.warnings:
             remark = (
-                f"; and {format_count(len(trial.warnings) - 1, 'warning')} more"
+                f"; and {format_count(len(trial.warnings) - 1, 'more warning')}"
                 if len(trial.warnings) > 1
                 else ""
             )
             result_text = f"{result_text}; {trial.warnings[0]}{remark}"
         # A setup that a former run did has no time of this run.
-        seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
+        seconds = "" if trial.was_done else f"{trial.seconds:.2f} s"
         status = trial.status + (", before" if trial.was_done else "")
         rows.append((trial.setup, status, seconds, result_text))
-    show_rows(("setup", "", "s", ""), rows, right_aligned=(2,))
+    show_rows(("setup", "state", "time", "result"), rows, right_aligned=(2,))
     counts = Counter(trial.status for trial in trials)
     status_text = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):

@@ -21,8 +21,8 @@ def scale(
         Option(
             "--distance",
             metavar="BODY=A:B",
-            help="Scale a body by the distance of markers A and B, or by the mean of several pairs (with commas). BODY.XZ "
-            "scales these axes only. May be repeated.",
+            help="Scale a body by the distance between the markers A and B: measured distance divided by that in the model. "
+            "With several pairs, separated by commas, by their mean. BODY.XZ scales these axes only. May be repeated.",
         ),
     ] = None,
     factor: Annotated[

@@ -13,7 +13,7 @@ def validate(
     paths: Annotated[
         list[str],
         Argument(
-            metavar="PATH...",
+            metavar="PATH",
             help="Files (.osim, .xml, .omoco, .sto, .mot, .trc), folders, or - for standard input.",
             show_default=False,
         ),
@@ -27,7 +27,7 @@ def validate(
         bool,
         Option(
             "--unsafe-fixes",
-            help="Also apply probable fixes; check them with --diff first.",
+            help="Apply the safe and the probable fixes; check them with --diff first.",
         ),
     ] = False,
     diff: Annotated[bool, Option("--diff", help="Show the fixes and write nothing.")] = False,
@@ -66,7 +66,7 @@ def validate(
         str | None,
         Option(
             metavar="FILE",
-            help="Check standard input as the future content of this file.",
+            help="Check standard input in place of this file, for editors with unsaved text.",
             show_default=False,
         ),
     ] = None,

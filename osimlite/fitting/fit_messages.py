@@ -28,18 +28,20 @@ def describe_fit(
     Args:
         motion: the motion.
         advice: limits of the root mean square and of the largest marker error that OpenSim's
-            documentation advises, m.
+            documentation recommends, m.
         marker_note: text that says for which markers the limits hold.
     """
     result = motion.summary
     if "rms_marker_error" in result:
         rms = result["rms_marker_error"]
         largest = result["largest_marker_error"]
-        limits_text = " and ".join(f"{100.0 * limit:g}" for limit in advice)
+        limits_text = (
+            f"{100.0 * advice[0]:g} cm (root mean square) and {100.0 * advice[1]:g} cm (largest)"
+        )
         advised = (
             ""
             if rms < advice[0] and largest < advice[1]
-            else f"; OpenSim advises less than {limits_text} cm{marker_note}"
+            else f"; OpenSim recommends less than {limits_text}{marker_note}"
         )
         # Errors of metres are typical of millimetres that are read as metres.
         advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""

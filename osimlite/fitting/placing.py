@@ -36,7 +36,7 @@ class MarkerPlacement:
 
     def describe_pose(self) -> Iterator[str]:
         """Yield messages about the pose, with OpenSim's limits for a static trial."""
-        return describe_fit(self.pose, (0.01, 0.02), " of markers on bones")
+        return describe_fit(self.pose, (0.01, 0.02), " for markers on bones")
 
 
 def place_markers(

@@ -188,7 +188,7 @@ class Report:
         ranked = sorted(self.findings, key=lambda finding: finding.severity.rank)
         lines += [_shorten_line(str(finding)) for finding in ranked[:MAX_LISTED]]
         if (hidden_count := len(ranked) - MAX_LISTED) > 0:
-            lines.append(f"... and {format_count(hidden_count, 'finding')} more")
+            lines.append(f"... and {format_count(hidden_count, 'more finding')}")
         return "\n".join(lines)
 
     @property

@@ -40,7 +40,7 @@ class RuleFault(NamedTuple):
         """Return the page of the fault; `group` is the code and the name of its rule."""
         reason = self.text.partition(". ")[2] or self.text
         return (
-            f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is "
+            f"{self.summary}\n\n## What it does\nReports every place where this happens. The rule is "
             f"one of the group `{group}`.\n\n## Why is this bad\n{reason}\n\n## "
             f"Example\n{self._format_example('+')}\n\n## Use instead\n{self._format_example('-')}"
         )

@@ -86,8 +86,8 @@ class IntegrationOptions:
     )
     integrator: str = define_option(
         MERSON,
-        "'merson' (OpenSim's), 'euler2' (SCONE's), 'adams' for smooth motion, as of few muscles, 'bdf' for stiff motion, "
-        "as of many, or 'rosenbrock' for stiff motion at loose accuracy.",
+        "'merson' (OpenSim's), 'euler2' (SCONE's), 'adams' for smooth motions (few muscles), 'bdf' for stiff motions "
+        "(many muscles), or 'rosenbrock' for stiff motions at loose accuracy.",
         shown="merson",
         type=str | None,
     )
@@ -232,7 +232,7 @@ class Options(IntegrationOptions):
     )
     wrapping: str = define_option(
         "opensim",
-        "How paths wrap: 'opensim', or 'geodesic', smoothly along shortest curves.",
+        "Wrapping of paths: 'opensim', or 'geodesic' (along the shortest curves).",
         more="Along a geodesic (where a side is asked for at least a stationary one), all surfaces of a path are taken "
         "together, so that speed and moment arms are derivatives of the length.",
     )

@@ -86,12 +86,20 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         for task in setup.ik_task_set.objects
         if task.apply and isinstance(task, IKMarkerTask)
     ]
-    for category, names in (
-        ("not fitted", [name for name in data.names if name not in motion.markers]),
-        ("not in the data", [name for name in requested if name not in data.names]),
+    for key, category, names in (
+        (
+            "not_fitted",
+            "markers not used",
+            [name for name in data.names if name not in motion.markers],
+        ),
+        (
+            "not_in_the_data",
+            "markers not in the data",
+            [name for name in requested if name not in data.names],
+        ),
     ):
         if names:
-            outcome.summary[category.replace(" ", "_")] = names
+            outcome.summary[key] = names
             outcome.add_message(category, join_words(names))
 
 

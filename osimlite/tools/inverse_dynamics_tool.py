@@ -82,7 +82,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     label = table.columns[column]
     unit = "N" if label.endswith("_force") else "N m"
     largest = f"{label}, {table.rows[row, column]:.6g} {unit} at {table.times[row]:g} s"
-    outcome.add_message("largest", largest)
+    outcome.add_message("largest value", largest)
     _report_residuals(outcome, recorded.mechanism, table)
 
 

@@ -66,7 +66,7 @@ class Outcome:
         lines += [f"{name}: {message}" for name, message in self.told[:MAX_LISTED]]
         lines += [str(path) for path in self.files[:MAX_LISTED]]
         if (omitted_count := len(self.files) - MAX_LISTED) > 0:
-            lines.append(f"... and {format_count(omitted_count, 'file')} more")
+            lines.append(f"... and {format_count(omitted_count, 'more file')}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -51,7 +51,7 @@ class FaultySetup(DocumentError):
     def __init__(self, report: Report) -> None:
         first_error, *other_errors = report.errors
         count_note = (
-            f"; and {format_count(len(other_errors), 'error')} more" if other_errors else ""
+            f"; and {format_count(len(other_errors), 'more error')}" if other_errors else ""
         )
         super().__init__(
             f"{first_error.message}{count_note}",

@@ -155,21 +155,21 @@ MJCF_CHOICES = (
     OptionSpec(
         "fit",
         str | None,
-        "'wraps' fits what tendons go around to the paths, 'force' muscles too (up to a minute).",
+        "'wraps' fits wrap surfaces to OpenSim's paths, 'force' muscles too (up to a minute).",
         shown="none",
         group="MJCF",
     ),
     OptionSpec(
         "spline",
         str | None,
-        "What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
+        "Joints that follow splines: a 'quartic', or 'series', a quartic of a quartic.",
         shown="series",
         group="MJCF",
     ),
     OptionSpec(
         "driver",
         bool | None,
-        "Write what osimlite.mjcf.Driver moves by OpenSim's own laws: the file itself has no forces.",
+        "Write a file without forces for osimlite.mjcf.Driver, which applies OpenSim's force laws.",
         group="MJCF",
         spelled=("--driver",),
     ),
@@ -179,7 +179,7 @@ MJCF_CHOICES = (
 BVH_SCALE = OptionSpec(
     "scale",
     float | None,
-    "Numbers of a BVH file per metre.",
+    "Units of length of the BVH file in one metre.",
     shown="100, centimetres",
     group="BVH",
 )

@@ -21,7 +21,7 @@ from osimlite.simulation.robot.couplings import Mimic, find_mimics, list_coupler
 from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
-COMPUTE_ADVICE = "compute its value by the file of coordinates"
+COMPUTE_ADVICE = "compute its value as .coordinates.json says"
 """Advice for a joint that the robot file leaves free."""
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
@@ -202,7 +202,7 @@ class _Survey:
                 self.note(
                     "massless-link",
                     path,
-                    "a joint with several axes, or one whose axis passes by the origin of the body it moves",
+                    "a joint with several axes, or with an axis that does not pass through the origin of its child body",
                     "a chain of one-axis joints with massless links between (1e-9 kg in MuJoCo)",
                     f"links {' '.join(middle_links)}",
                 )
@@ -231,7 +231,7 @@ class _Survey:
         if not driven_joints:
             self.fidelity.translated[path] = "fixed"
             value = f"{coordinate.default_value:g} {unit}"
-            self.note("locked", path, "that a joint is locked", "a fixed joint at its value", value)
+            self.note("locked", path, "a locked coordinate", "a fixed joint at its value", value)
             return
         self.fidelity.translated[path] = (
             f"joint {driven_joints[0].name}" if joint is None else f"joint {joint.name}"
@@ -245,12 +245,17 @@ class _Survey:
             self.note(
                 "locked",
                 path,
-                "that a joint is locked",
+                "a locked coordinate",
                 "a joint that moves: hold it in your program",
             )
         if coordinate.prescribed and coordinate.prescribed_function is not None:
             done = "a joint that moves: drive it in your program"
-            self.note("prescribed", path, "that a coordinate follows a function of time", done)
+            self.note(
+                "prescribed",
+                path,
+                "a prescribed coordinate, which follows a function of time",
+                done,
+            )
         self._record_start(coordinate, path, unit)
         self._record_functions(driven_joints, path)
 
@@ -263,12 +268,18 @@ class _Survey:
         self.note(
             "coordinate-range",
             path,
-            "a range that stops nothing (a URDF limit is a hard stop)",
+            "a coordinate range, which does not limit simulations (a URDF limit is a hard stop)",
             "written as a hard limit" if has_limit else "no limit written",
             text,
         )
         if coordinate.clamped:
-            self.note("clamped", path, "clamped range in user interfaces", "left out", text)
+            self.note(
+                "clamped",
+                path,
+                "a clamped coordinate, which tools and user interfaces keep in its range",
+                "left out",
+                text,
+            )
 
     def _record_start(self, coordinate: Coordinate, path: str, unit: str) -> None:
         """Record default values and speeds, which URDF lacks."""
@@ -277,7 +288,7 @@ class _Survey:
             self.note(
                 "default-pose",
                 path,
-                "a starting value: every joint starts at zero",
+                "a default value (in URDF every joint starts at zero)",
                 "left out: set the joint in your program",
                 f"{coordinate.default_value:g} {unit}",
             )
@@ -285,7 +296,7 @@ class _Survey:
             self.note(
                 "default-speed",
                 path,
-                "a starting speed",
+                "a default speed",
                 "left out: set it in your program",
                 f"{coordinate.default_speed_value:g} {unit}/s",
             )
@@ -299,8 +310,8 @@ class _Survey:
             self.note(
                 "coordinate-function",
                 path,
-                "a joint that moves by a function of a coordinate",
-                f"a free joint: {COMPUTE_ADVICE}"
+                "a joint that follows a function of a coordinate",
+                f"a joint of its own: {COMPUTE_ADVICE}"
                 if mimic is None
                 else "a joint that mimics another",
                 f"joint {robot_joint.name}" + ("" if mimic is None else f" follows {mimic.leader}"),
@@ -325,7 +336,7 @@ class _Survey:
                 "coupler",
                 coupler.name,
                 "a coordinate that is a function of others",
-                f"a free joint: {COMPUTE_ADVICE}"
+                f"a joint of its own: {COMPUTE_ADVICE}"
                 if leader is None
                 else "a joint that mimics another",
                 f"coordinate {name}" + ("" if leader is None else f" follows joint {leader}"),

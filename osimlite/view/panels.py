@@ -32,6 +32,8 @@ PERCENT = np.linspace(0.0, 100.0, 101)
 """Points of the gait cycle at which curves are drawn, %."""
 MAX_LIMIT_DISTANCE = 0.5
 """Largest distance of a limit from the curves that is drawn, relative to their range with zero."""
+STEP_NOTE = "Vertical lines: foot strikes (solid), toe-offs (dotted)"
+"""Note of pictures over time in which the steps of the feet are known."""
 MAX_CONSTANTS = 12
 """Constant curves that the note of a page names."""
 RELATIVE_CHANGE = 1e-9
@@ -317,7 +319,7 @@ def plan_pages(
     """Divide panels into pages, with at most `MAX_PANELS` on each.
 
     Curves are drawn over the gait cycle if there is a complete cycle for each of them, otherwise
-    over time, with lines at the strikes of the feet.
+    over time, with lines at foot strikes and toe-offs, which the note of each page explains.
 
     Args:
         title: title of the pages; "" for none.
@@ -332,6 +334,8 @@ def plan_pages(
     sections: dict[str, list[Panel]] = {}
     for panel in panels:
         sections.setdefault(panel.section, []).append(panel)
+    has_steps = not cyclic and any(curve.steps for panel in panels for curve in panel.curves)
+    step_note = STEP_NOTE if has_steps else ""
     pages = []
     for section, section_panels in sections.items():
         section_pages = list(_divide_into_pages(section_panels))
@@ -340,9 +344,12 @@ def plan_pages(
             if page_title and len(section_pages) > 1:
                 page_title += f" ({number} of {len(section_pages)})"
             label = "gait cycle (%)" if cyclic else abscissa
-            pages.append(Page(page_title, rows, label, section=section, cyclic=cyclic))
+            pages.append(
+                Page(page_title, rows, label, section=section, cyclic=cyclic, note=step_note)
+            )
     if pages:
-        pages[-1] = pages[-1]._replace(note=note)
+        last_note = ". ".join(filter(None, (note, step_note)))
+        pages[-1] = pages[-1]._replace(note=last_note)
     return pages
 
 

@@ -43,11 +43,11 @@ def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
         ),
         (("scale", "box.osim", "--preserve-masses"), "there is nothing to scale"),
         (("modify", "box.osim"), "there is nothing to replace; add --replace NAME=WORD"),
-        (("simulate", "box.osim", "--to"), "'osimlite simulate --help' lists what there is"),
-        (("validate", "--format"), "'osimlite validate --help' lists what there is"),
-        (("translate", "box.osim", "-o"), "'osimlite translate --help' lists what there is"),
-        (("run-tool", "setup.xml", "--workers"), "'osimlite run --help' lists what there is"),
-        (("--nothing",), "'osimlite --help' lists what there is"),
+        (("simulate", "box.osim", "--to"), "'osimlite simulate --help' shows the usage"),
+        (("validate", "--format"), "'osimlite validate --help' shows the usage"),
+        (("translate", "box.osim", "-o"), "'osimlite translate --help' shows the usage"),
+        (("run-tool", "setup.xml", "--workers"), "'osimlite run --help' shows the usage"),
+        (("--nothing",), "'osimlite --help' shows the usage"),
     ],
 )
 def test_errors_lead_on(box: Path, words: tuple[str, ...], said: str) -> None:

@@ -40,26 +40,26 @@ def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path,
         return list(own_cache.rglob("answers/*.json"))
 
     file.write_text(text)
-    assert said() == "possible, nothing is left out"
+    assert said() == "possible, every force is supported"
     (kept,) = answers()
     kept.write_text(kept.read_text().replace("possible", "known to be possible"))
-    assert said() == "known to be possible, nothing is left out"
+    assert said() == "known to be possible, every force is supported"
     for damage in ("[", "{}", "[1, 2]", "[" * 100_000):
         kept.write_text(damage)
-        assert said() == "possible, nothing is left out"
+        assert said() == "possible, every force is supported"
     file.write_text(text.replace("CoordinateLimitForce", "CoordinateLimitForse"))
-    assert said().startswith("not without leaving out")
+    assert said().startswith("possible only without unsupported forces")
     assert len(answers()) == 1
     # What stands in other files is looked at every time.
     start, end = text.index("<ForceSet"), text.index("</ForceSet>") + len("</ForceSet>")
     forces = f'<OpenSimDocument Version="40500">{text[start:end]}</OpenSimDocument>'
     file.write_text(f'{text[:start]}<ForceSet file="forces.xml"/>{text[end:]}')
     (tmp_path / "forces.xml").write_text(forces)
-    assert said() == "possible, nothing is left out"
+    assert said() == "possible, every force is supported"
     (tmp_path / "forces.xml").write_text(
         forces.replace("CoordinateLimitForce", "CoordinateLimitForse")
     )
-    assert said().startswith("not without leaving out")
+    assert said().startswith("possible only without unsupported forces")
     file.write_text(text.replace("<mass>", "<mass>nan "))
     assert said().startswith("not possible") and len(answers()) == 1 and "left out" not in said()
 
@@ -150,7 +150,7 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     assert "    m0     546 N     0.1 m     0.2 m  2 points" in lines
     facts = dict(line.split("  ", 1) for line in lines if "  " in line.strip())
     assert facts["wrap surfaces"].strip() == "1, used by 1 path wrap"
-    assert facts["simulation"].strip() == "possible, nothing is left out"
+    assert facts["simulation"].strip() == "possible, every force is supported"
     model.find("/forceset/m1").ignore_tendon_compliance = True
     osimlite.write(model, tmp_path / "m.osim")
     assert "not possible: the ignore_tendon_compliance of '/forceset/m1'" in " ".join(

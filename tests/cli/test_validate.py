@@ -136,10 +136,10 @@ def test_what_is_no_certain_mend_is_named(tmp_path):
     )
     shown = run("validate", path, "--fix", "--diff")
     assert shown.code == 0 and not shown.out
-    assert shown.err == "Would apply 0 fixes; --unsafe-fixes would apply 1 more.\n"
+    assert shown.err == "Would apply 0 fixes; 1 probable fix needs --unsafe-fixes.\n"
     mended = run("validate", path, "--fix")
-    assert mended.err == "Applied 0 fixes; --unsafe-fixes would apply 1 more.\n"
-    assert "1 can be fixed with --unsafe-fixes." in mended.out
+    assert mended.err == "Applied 0 fixes; 1 probable fix needs --unsafe-fixes.\n"
+    assert "1 has a probable fix (--unsafe-fixes)." in mended.out
     clean = run("validate", WALKER, "--diff")
     assert clean.code == 0 and clean.err == "Would apply 0 fixes.\n"
 
@@ -170,7 +170,7 @@ def test_a_baseline_lets_an_old_repository_begin(faulty):
     baseline = faulty.parent / "baseline.json"
     assert run("validate", faulty, "--write-baseline", baseline).code == 0
     done = run("validate", faulty, "--baseline", baseline)
-    assert done.code == 0 and done.out == "Nothing found in 1 file (3 more in the baseline).\n"
+    assert done.code == 0 and done.out == "No findings in 1 file (3 more in the baseline).\n"
 
 
 def test_settings_of_the_project_hold(faulty):

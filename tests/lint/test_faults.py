@@ -54,7 +54,7 @@ def test_the_walker_has_neither_errors_nor_warnings():
     assert report.ok and not report.warnings
     assert [finding.code for finding in report.infos] == ["OSIM508", "OSIM508", "OSIM521"]
     assert "-140 deg" in report.infos[0].message
-    assert "'RFootContact' starts 21.5694 mm deep" in report.infos[2].message
+    assert "'RFootContact' starts 21.6 mm inside" in report.infos[2].message
 
 
 def test_the_name_of_a_part_of_a_probe_may_not_be_blank():

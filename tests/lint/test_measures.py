@@ -125,7 +125,7 @@ def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
     (one, two) = validate(Source(text.encode())).findings
     # It comes in at 0.2 and goes at 1.
     assert (
-        "jumps by 18 mm at 'hip_flexion' = 11.46 deg, where 'b' appears or disappears"
+        "jumps by 18 mm at 'hip_flexion' = 11.46 deg, where the path starts or stops using 'b'"
         in one.message
     )
     assert "jumps by 98.7 mm at 'knee_angle' = -57.3 deg" in two.message

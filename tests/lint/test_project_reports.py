@@ -143,7 +143,7 @@ def test_mends_of_a_project(project):
     assert {path: path.read_bytes() for path in before} == before
     assert (
         command("validate", ".", "--fix").err
-        == "Applied 3 fixes; --unsafe-fixes would apply 1 more.\n"
+        == "Applied 3 fixes; 1 probable fix needs --unsafe-fixes.\n"
     )
     assert found()[0] == {("ik.xml", "OSIM831"), ("ik.xml", "OSIM841")}
     assert found("--unsafe-fixes") == (set(), 0)

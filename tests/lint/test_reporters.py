@@ -65,7 +65,7 @@ def test_full(report):
           = in /markerset/asis
 
         Found 2 errors, 1 warning in 1 file.
-        1 can be fixed with --fix, 1 more with --unsafe-fixes.
+        1 can be fixed with --fix. 1 more has a probable fix (--unsafe-fixes).
         """)
 
 

@@ -59,7 +59,7 @@ class Tabular(ABC):
                 for name, low, high, unit in rows
             ]
         if len(columns) > TEXT_ROWS:
-            lines.append(f"... and {format_count(len(columns) - TEXT_ROWS, 'column')} more")
+            lines.append(f"... and {format_count(len(columns) - TEXT_ROWS, 'more column')}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -74,7 +74,7 @@ class Tabular(ABC):
         )
         hidden_count = len(columns) - HTML_ROWS
         footer = (
-            f"<div>... and {format_count(hidden_count, 'column')} more</div>"
+            f"<div>... and {format_count(hidden_count, 'more column')}</div>"
             if hidden_count > 0
             else ""
         )

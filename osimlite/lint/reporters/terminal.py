@@ -51,7 +51,7 @@ def format_summary(report: Report, colour: bool = False) -> str:
     files = f"{report.checked} {_pluralize('file', report.checked)}"
     baseline_note = f" ({report.known} more in the baseline)" if report.known else ""
     if not parts:
-        return paint(f"Nothing found in {files}{baseline_note}.", "good", colour)
+        return paint(f"No findings in {files}{baseline_note}.", "good", colour)
     return f"Found {', '.join(parts)} in {files}{baseline_note}."
 
 
@@ -86,7 +86,7 @@ def describe_skipped(report: Report, everything: bool) -> str:
 
 
 def _pluralize(noun: str, count: int) -> str:
-    return noun if count == 1 or noun == "info" else f"{noun}s"
+    return noun if count == 1 else f"{noun}s"
 
 
 T = TypeVar("T")
@@ -278,11 +278,12 @@ def _describe_fixes(report: Report) -> str:
     """Return how many findings ``--fix`` fixes, and how many more ``--unsafe-fixes`` does."""
     safe = sum(finding.fixable for finding in report.findings)
     unsafe_count = sum(finding.fix is not None for finding in report.findings) - safe
-    parts = [f"{safe} can be fixed with --fix"] if safe else []
+    sentences = [f"{safe} can be fixed with --fix."] if safe else []
     if unsafe_count:
-        count_text = f"{unsafe_count} more" if safe else f"{unsafe_count} can be fixed"
-        parts.append(f"{count_text} with --unsafe-fixes")
-    return f"{', '.join(parts)}." if parts else ""
+        verb = "has a probable fix" if unsafe_count == 1 else "have a probable fix"
+        count_text = f"{unsafe_count} more" if safe else f"{unsafe_count}"
+        sentences.append(f"{count_text} {verb} (--unsafe-fixes).")
+    return " ".join(sentences)
 
 
 def _split_lines(report: Report, file: str | None, last: int) -> list[str] | None:

@@ -36,16 +36,22 @@ ANGLE = Threshold(
     "largest-angle",
     10 * math.pi,
     "rad",
-    "a coordinate that turns further is taken to be in degrees",
+    "larger angles of a coordinate are assumed to be in degrees",
 )
 UNBOUNDED = Threshold(
-    "unbounded-angle", 1000.0, "rad", "a bound of a range from which on it stands for none"
+    "unbounded-angle",
+    1000.0,
+    "rad",
+    "a bound of a range this large means no limit",
 )
 _ASSEMBLY_ACCURACY = 1e-10
 """Difference from the default value (rad or m) up to which OpenSim 4.6 takes a locked coordinate."""
 
 ORIENTATION = Threshold(
-    "largest-orientation", 2 * math.pi, "rad", "a larger angle of a frame is in degrees"
+    "largest-orientation",
+    2 * math.pi,
+    "rad",
+    "larger angles of a frame are assumed to be in degrees",
 )
 
 

@@ -54,8 +54,8 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
             None,
         )
         report(
-            f"the markers of a frame are spread over {usual * unit:.3g} m if the units are "
-            f"'{units.value.text}'",
+            f"the markers of one frame would be {float(f'{usual * unit:.3g}'):g} m apart in the "
+            f"units of the file, '{units.value.text}'",
             at=units.value.at,
             suggestion=likely_unit,
         )

@@ -12,7 +12,8 @@ OFF = Threshold(
     "off-equilibrium",
     0.1,
     "",
-    "of the optimal fiber length, and of the strength: so far may a muscle start off",
+    "largest accepted distance from equilibrium: fiber length in optimal lengths, tendon force "
+    "in max_isometric_force",
 )
 
 
@@ -22,8 +23,8 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
 
     Reports muscles with an elastic tendon whose fibers, in the default pose and at their default
     activation, start more than 0.1 optimal fiber lengths from their equilibrium length, or whose
-    tension is off by more than 0.1 `max_isometric_force`. A muscle without an equilibrium there is
-    a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle are
+    tension is off by more than 0.1 `max_isometric_force`. A muscle that has no equilibrium in the
+    default pose is reported as a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle are
     checked.
 
     OpenSim equilibrates muscles only on request (`solve_for_equilibrium_for_auxiliary_states` of
@@ -57,9 +58,9 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
             or abs(tension - settled_tension) > max_difference
         ):
             report(
-                f"{describe_object(muscle)} starts with fibers of {length:.3g} optimal lengths "
-                f"and a tension of {tension:.3g} max_isometric_force; in equilibrium these are "
-                f"{settled:.3g} and {settled_tension:.3g}",
+                f"{describe_object(muscle)} does not start in equilibrium: its fiber length is "
+                f"{length:.3g} optimal lengths (in equilibrium {settled:.3g}), its tendon force "
+                f"{tension:.3g} of max_isometric_force (in equilibrium {settled_tension:.3g})",
                 muscle,
                 tag="default_fiber_length" if hasattr(muscle, "default_fiber_length") else None,
             )
@@ -96,8 +97,8 @@ def report_fiber_limit(subject: Subject, report: FindingCollector) -> None:
             report(f"{describe_object(muscle)} has no equilibrium {reach.pose}", muscle)
         elif reach.is_active and reach.is_limit:
             report(
-                f"fully active, the fibers of {describe_object(muscle)} are as short as they can "
-                f"be, {lengths}, {reach.pose}",
+                f"the fully active fibers of {describe_object(muscle)} reach their minimum length, "
+                f"{lengths}, {reach.pose}",
                 muscle,
                 tag="tendon_slack_length",
             )

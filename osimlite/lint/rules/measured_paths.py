@@ -15,7 +15,7 @@ OFF = Threshold(
     "wrapping-error",
     0.001,
     "m",
-    "so far may OpenSim's length of a path be from that along geodesics",
+    "largest accepted difference between OpenSim's path length and that along geodesics",
 )
 
 
@@ -79,7 +79,10 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
 
 
 JUMP = Threshold(
-    "path-jump", 0.001, "m", "so far may a path jump; less than 0.001 is not looked for"
+    "path-jump",
+    0.001,
+    "m",
+    "largest accepted jump of a path length; jumps below 0.001 are never searched",
 )
 
 
@@ -88,7 +91,7 @@ def report_path_jump(subject: Subject, report: FindingCollector) -> None:
     """The length of a path jumps.
 
     Reports paths whose length jumps by a millimetre or more at a value of a coordinate within its
-    range, with the others at their defaults: because a conditional point appears or disappears, or
+    range, with the others at their defaults: because a conditional point starts or stops acting, or
     because OpenSim finds another route around a surface. Each path is reported once, with its
     greatest jump. The rule checks nine values of each coordinate, the ends of the ranges of
     conditional points, and intervals in which the length changes differently from the neighbouring
@@ -113,7 +116,7 @@ def report_path_jump(subject: Subject, report: FindingCollector) -> None:
         owner = subject.tree.find(jump.owner)
         changed_parts = join_words([f"'{part}'" for part in jump.parts])
         reason = (
-            f"{changed_parts} {'appear or disappear' if len(jump.parts) > 1 else 'appears or disappears'}"
+            f"the path starts or stops using {changed_parts}"
             if changed_parts
             else "its route changes"
         )
@@ -166,13 +169,13 @@ MADE_UP = Threshold(
     "made-up-path",
     0.001,
     "m",
-    "a moving point may move by so much where its functions are not given",
+    "largest accepted motion of a path point by extrapolated functions",
 )
 RATE = Threshold(
     "resting-point",
     0.005,
     "m per rad or m",
-    "a point that rests outside a range may be said to move so",
+    "largest accepted computed speed of a point that stays in place outside the range",
 )
 
 
@@ -232,9 +235,9 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
             )
         else:
             report(
-                f"outside the range of '{end.coordinate}', which nothing enforces, {names} stays "
-                f"in place, but OpenSim computes with a speed of {1000.0 * point.rate:.3g} mm per "
-                f"{end.unit or 'unit'} at {end}",
+                f"nothing keeps '{end.coordinate}' in its range: outside it, {names} stays in place, "
+                "but OpenSim computes path speeds and moment arms as if it still moved, by "
+                f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}",
                 owner,
                 severity=INFO,
             )

@@ -14,7 +14,10 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 
 PENNATION = Threshold(
-    "largest-pennation", math.pi / 2, "rad", "fibers that turn as far pull on nothing"
+    "largest-pennation",
+    math.pi / 2,
+    "rad",
+    "fibers with a larger pennation angle cannot pull on the tendon",
 )
 SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fiber starts shorter")
 LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber starts longer")

@@ -18,7 +18,12 @@ from osimlite.schema.joints import Joint
 from osimlite.schema.states import list_motions
 from osimlite.schema.tree import Use
 
-GRAVITY = Threshold("largest-gravity", 30.0, "m/s^2", "no planet that people walk on has more")
+GRAVITY = Threshold(
+    "largest-gravity",
+    30.0,
+    "m/s^2",
+    "a larger gravity is not that of a place where people walk",
+)
 BEYOND = Threshold(
     "limit-beyond-range",
     0.0,
@@ -32,7 +37,10 @@ INSIDE = Threshold(
     "share of the range by which a limit may lie inside it",
 )
 UNLIMITED = Threshold(
-    "unlimited-range", 4 * math.pi, "rad", "a wider range stands for none, or is in degrees"
+    "unlimited-range",
+    4 * math.pi,
+    "rad",
+    "a wider range means no limit, or is in degrees",
 )
 
 

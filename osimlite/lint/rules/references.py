@@ -29,7 +29,7 @@ def report_unresolved_reference(subject: Subject, report: FindingCollector) -> N
     """A component names another component that does not exist.
 
     Follows every reference by OpenSim's own rule for that property and reports unresolved
-    references, with the force, joint or other component that contains them and the find_nearest existing
+    references, with the force, joint or other component that contains them and the nearest existing
     name.
 
     OpenSim rejects the model when it is connected, and its message names neither the line nor, for

@@ -66,12 +66,12 @@ one row at the end of the data. Scaling measures in the first or the last frame:
 4.6 intends to use all data, but does not.
 - <marker_file>slow.trc</marker_file>
 + <marker_file>slow.trc</marker_file> <time_range>0 2.5</time_range>
-07 data-end-early, warning, in dynamics: The data end before the tool does. Some tools stop there without a message, others
-extrapolate a spline.
+07 data-end-early, warning, in dynamics: The data end before the last time of the tool. Some tools stop there without a message,
+others extrapolate a spline.
 - <time_range>0 9</time_range>
 + <time_range>0 0.5</time_range>
-08 data-begin-late, warning, in dynamics: The data begin after the tool does. Some tools begin there without a message,
-others extrapolate a spline.
+08 data-begin-late, warning, in dynamics: The data begin after the first time of the tool. Some tools begin there without a
+message, others extrapolate a spline.
 - <time_range>-1 0.5</time_range>
 + <time_range>0 0.5</time_range>
 """

@@ -88,9 +88,9 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
         ]
         if better and not low <= ratio * unit <= high:
             report(
-                f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the "
-                f"size that they have in the model if the units are '{units.value.text}', as the "
-                f"file says: are they in {better[0]}?",
+                f"in the units of '{user.marker_file}', '{units.value.text}', its markers are "
+                f"{float(f'{ratio * unit:.3g}'):g} times as far apart as in the model: are the "
+                f"numbers in {better[0]}?",
                 user,
                 tag="marker_file",
             )

@@ -214,10 +214,10 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
             report(
-                f"{describe_object(ball)} starts {format_quantity(1000 * depth, 'mm')} deep in "
-                f"{describe_object(against)} of {describe_object(force)}"
+                f"{describe_object(ball)} starts {1000 * depth:.3g} mm inside "
+                f"{describe_object(against)} ({describe_object(force)} acts between them)"
                 + (
-                    "; its middle is inside, its radius is "
+                    "; even its centre is inside: the radius is "
                     f"{format_quantity(1000 * ball.radius, 'mm')}"
                     if sunk
                     else ""

@@ -7,41 +7,113 @@ from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OSIMLITE, TRIAL, Tria
 
 _BOTH = f"{OPENSIM}; {HICKS}"
 FORCE_SHARE = Threshold(
-    "residual-force-share", 5.0, "%", "of the largest external force: a residual force at most"
+    "residual-force-share",
+    5.0,
+    "%",
+    "largest accepted residual force, as a share of the largest external force",
 )
-FORCE_GOOD = Threshold("residual-force-good", 10.0, "N", "residual force that is good")
-FORCE_BAD = Threshold("residual-force-bad", 25.0, "N", "and from which on it is bad")
+FORCE_GOOD = Threshold(
+    "residual-force-good",
+    10.0,
+    "N",
+    "a residual force up to this is good",
+)
+FORCE_BAD = Threshold(
+    "residual-force-bad",
+    25.0,
+    "N",
+    "a larger residual force is bad",
+)
 FORCE_RMS_GOOD = Threshold(
-    "residual-force-rms-good", 5.0, "N", "root mean square of a residual force that is good"
+    "residual-force-rms-good",
+    5.0,
+    "N",
+    "a root mean square of a residual force up to this is good",
 )
-FORCE_RMS_BAD = Threshold("residual-force-rms-bad", 10.0, "N", "and from which on it is bad")
+FORCE_RMS_BAD = Threshold(
+    "residual-force-rms-bad",
+    10.0,
+    "N",
+    "a larger root mean square of a residual force is bad",
+)
 MOMENT_SHARE = Threshold(
     "residual-moment-share",
     1.0,
     "%",
-    "of the largest external force times the height of the mass centre",
+    "largest accepted residual moment, as a share of the largest external force times the "
+    "height of the mass centre",
 )
-MOMENT_GOOD = Threshold("residual-moment-good", 50.0, "N m", "residual moment that is good")
-MOMENT_BAD = Threshold("residual-moment-bad", 75.0, "N m", "and from which on it is bad")
+MOMENT_GOOD = Threshold(
+    "residual-moment-good",
+    50.0,
+    "N m",
+    "a residual moment up to this is good",
+)
+MOMENT_BAD = Threshold(
+    "residual-moment-bad",
+    75.0,
+    "N m",
+    "a larger residual moment is bad",
+)
 MOMENT_RMS_GOOD = Threshold(
-    "residual-moment-rms-good", 30.0, "N m", "root mean square of one that is good"
+    "residual-moment-rms-good",
+    30.0,
+    "N m",
+    "a root mean square of a residual moment up to this is good",
 )
-MOMENT_RMS_BAD = Threshold("residual-moment-rms-bad", 50.0, "N m", "and from which on it is bad")
+MOMENT_RMS_BAD = Threshold(
+    "residual-moment-rms-bad",
+    50.0,
+    "N m",
+    "a larger root mean square of a residual moment is bad",
+)
 RESERVE_GOOD = Threshold(
-    "reserve-good", 5.0, "%", "of the moment at a joint that its reserve actuator may give"
+    "reserve-good",
+    5.0,
+    "%",
+    "a reserve actuator up to this share of the moment at its joint is good",
 )
-RESERVE_BAD = Threshold("reserve-bad", 10.0, "%", "and from which on that is bad")
+RESERVE_BAD = Threshold(
+    "reserve-bad",
+    10.0,
+    "%",
+    "a larger share of the moment at the joint is bad",
+)
 ERROR_GOOD = Threshold(
-    "tracking-error-good", 2.0, "deg", "by which (cm for translations) a tool may miss its motion"
+    "tracking-error-good",
+    2.0,
+    "deg",
+    "a tracking error up to this is good (cm for translations)",
 )
-ERROR_BAD = Threshold("tracking-error-bad", 5.0, "deg", "and from which on that is bad")
+ERROR_BAD = Threshold(
+    "tracking-error-bad",
+    5.0,
+    "deg",
+    "a larger tracking error is bad (cm for translations)",
+)
 ERROR_RMS_BAD = Threshold(
-    "tracking-error-rms-bad", 4.0, "cm", "root mean square of a translation's that is bad"
+    "tracking-error-rms-bad",
+    4.0,
+    "cm",
+    "a larger root mean square of the tracking error of a translation is bad",
 )
-FULL_GOOD = Threshold("full-activation", 5.0, "%", "of the time that a muscle may be fully active")
-FULL_BAD = Threshold("full-activation-bad", 25.0, "%", "and from which on that is bad")
+FULL_GOOD = Threshold(
+    "full-activation",
+    5.0,
+    "%",
+    "a muscle may be fully active for this share of the time",
+)
+FULL_BAD = Threshold(
+    "full-activation-bad",
+    25.0,
+    "%",
+    "a larger share of the time is bad",
+)
 PASSIVE_GOOD = Threshold(
-    "passive-force", 50.0, "%", "of the strength of a muscle that its passive fibers may pull with"
+    "passive-force",
+    50.0,
+    "%",
+    "largest accepted passive force, as a share of the strength of the muscle",
 )
 PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "and from which on that is bad")
 

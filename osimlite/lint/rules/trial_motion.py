@@ -6,37 +6,77 @@ from osimlite.lint.registry import WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OSIMLITE, TRIAL, Trial
 
 SCALE_RMS = Threshold(
-    "scale-marker-rms", 1.0, "cm", "root mean square of the marker errors of a scaled model"
+    "scale-marker-rms",
+    1.0,
+    "cm",
+    "largest accepted root mean square of the marker errors of a scaled model",
 )
-SCALE_PEAK = Threshold("scale-marker-peak", 2.0, "cm", "largest of them")
+SCALE_PEAK = Threshold(
+    "scale-marker-peak",
+    2.0,
+    "cm",
+    "largest accepted marker error of a scaled model",
+)
 RMS = Threshold(
-    "marker-rms", 2.0, "cm", "root mean square of the marker errors of inverse kinematics"
+    "marker-rms",
+    2.0,
+    "cm",
+    "largest accepted root mean square of the marker errors of inverse kinematics",
 )
-PEAK = Threshold("marker-peak", 4.0, "cm", "largest of them")
+PEAK = Threshold(
+    "marker-peak",
+    4.0,
+    "cm",
+    "largest accepted marker error of inverse kinematics",
+)
 SWAPPED = Threshold(
-    "swapped-frames", 2.0, "%", "frames in which two markers would fit better exchanged"
+    "swapped-frames",
+    2.0,
+    "%",
+    "share of the frames in which two markers would fit better exchanged",
 )
 BEYOND = Threshold(
     "beyond-range",
     2.0,
     "deg",
-    "so far (cm for translations) a motion may leave the range of a coordinate",
+    "a motion may leave the range of a coordinate by this (cm for translations)",
 )
-FAR_BEYOND = Threshold("far-beyond-range", 10.0, "deg", "from here on that is bad")
+FAR_BEYOND = Threshold(
+    "far-beyond-range",
+    10.0,
+    "deg",
+    "leaving the range by more than this is bad",
+)
 LOST = Threshold(
     "filtered-away",
     2.0,
     "deg",
-    "root mean square (cm for translations) of what a filter takes away",
+    "root mean square of the motion that a filter may remove (cm for translations)",
 )
-NOISE = Threshold("noise", 50.0, "%", "of the power of an acceleration that may lie above 15 Hz")
+NOISE = Threshold(
+    "noise",
+    50.0,
+    "%",
+    "largest accepted share of the power of an acceleration above 15 Hz",
+)
 SWAPPED_FEET = Threshold(
-    "swapped-feet", 25.0, "%", "of the time that a load may act nearer to another foot"
+    "swapped-feet",
+    25.0,
+    "%",
+    "largest accepted share of the time in which a load acts nearer to another foot",
 )
 WEIGHT = Threshold(
-    "measured-weight", 2.0, "%", "by which the mass of a model may differ from what plates carry"
+    "measured-weight",
+    2.0,
+    "%",
+    "the mass of the model may differ by this from the weight on the force plates",
 )
-WRONG_WEIGHT = Threshold("wrong-weight", 5.0, "%", "from here on that is bad")
+WRONG_WEIGHT = Threshold(
+    "wrong-weight",
+    5.0,
+    "%",
+    "a larger difference of the mass is bad",
+)
 
 
 @rule(

@@ -70,7 +70,11 @@ class Compiler(NamedTuple):
     @property
     def name(self) -> str:
         """Program and version, for messages."""
-        return f"{Path(self.command[0]).stem}: {self.version}"
+        program = Path(self.command[0]).stem
+        # GNU compilers begin the message with their name.
+        return (
+            self.version if self.version.startswith(f"{program} ") else f"{program}: {self.version}"
+        )
 
     @property
     def targets(self) -> tuple[str, ...]:

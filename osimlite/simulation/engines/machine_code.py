@@ -179,7 +179,7 @@ def explain_source() -> list[str]:
     if library is not None:
         sentences.append(
             f"kernels run from the compiled library {library.path} (target {library.table['target']}, "
-            f"made by {library.table['compiler']})"
+            f"compiled by {library.table['compiler']})"
         )
         if library.changed_files:
             count = len(library.changed_files)
@@ -189,12 +189,12 @@ def explain_source() -> list[str]:
             )
     elif is_allowed(LIBRARY):
         sentences.append(kernel_library.explain_absence())
-    alone = "kernels that it lacks are" if library is not None else "each kernel is"
+    alone = "a kernel that is not in it is" if library is not None else "each kernel is"
     if compiler is not None:
-        sentences.append(f"{alone} compiled at first use by {compiler.name}")
+        sentences.append(f"{alone} compiled at its first use by {compiler.name}")
     elif is_allowed(NUMBA) and _has_numba():
         sentences.append(
-            f"no C++ compiler was found: {alone} compiled at first use by numba, without derivatives"
+            f"no C++ compiler was found: {alone} compiled at its first use by numba, without derivatives"
         )
     elif library is None:
         sentences.append(f"no C++ compiler was found, numba is not installed: {PYTHON_COST}")

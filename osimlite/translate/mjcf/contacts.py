@@ -66,7 +66,7 @@ def add_contacts(draft: MjcfDraft) -> None:
         except ModelError as error:
             draft.fidelity.add("contact", path, description, f"{LEFT_OUT}: {error}")
             continue
-        replacement = "contact by MuJoCo's law: bodies are supported, but forces and motions differ"
+        replacement = "MuJoCo's contact law: it carries the bodies, but forces and motions differ"
         draft.fidelity.add("contact", path, description, replacement, f"pairs {pair_names}")
 
 

@@ -28,10 +28,10 @@ def test_a_table_lists_its_first_columns():
         "c5         5        6",
         "c6         6        7",
         "c7         7        8",
-        "... and 4 columns more",
+        "... and 4 more columns",
     ]
     html = make_table(40)._repr_html_()
-    assert html.count("<tr>") == 31 and "and 10 columns more" in html
+    assert html.count("<tr>") == 31 and "and 10 more columns" in html
 
 
 def test_tables_without_rows_or_numbers_have_a_text():

@@ -135,7 +135,10 @@ def test_an_unknown_source_is_refused(sources):
             ["compiled library", "target baseline", "clang version 14", "g++ 12"],
         ),
         ((add_library,), ["compiled library", "with an edited kernel", "thousand times slower"]),
-        ((add_compiler,), ["without a library", "each kernel is compiled at first use by g++ 12"]),
+        (
+            (add_compiler,),
+            ["without a library", "each kernel is compiled at its first use by g++ 12"],
+        ),
         ((add_numba,), ["without a library", "no C++ compiler", "by numba, without derivatives"]),
         ((), ["without a library", "numba is not installed", "thousand times slower"]),
     ],
