@@ -242,6 +242,7 @@ def test_contact_on_one_body_is_reported():
     [
         ("10 90", True, "0.174533 1.5708"),
         ("-120 -60", True, "-2.0944 -1.0472"),
+        ("-90 2.2", True, "-1.5708 2.2"),
         ("2.5 3", True, None),
         ("-1 1", False, None),
         ("1.9 3", False, None),

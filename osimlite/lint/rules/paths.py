@@ -183,13 +183,17 @@ def _report_unreachable(
     is_angle = motion != "translational"
     # Two per cent of the range allow for rounded numbers of degrees.
     slack = 0.02 * (high - low) + 1e-5
-    converted = (radians(range_start), radians(range_end))
+    # An end that is the coordinate's own, in radians, is not converted with the other.
+    start, end = (
+        value if abs(value - bound) < 1e-4 else radians(value)
+        for value, bound in ((range_start, low), (range_end, high))
+    )
     fits = (
         is_angle
         # An angle beyond half a turn is unusual in radians.
         and max(abs(range_start), abs(range_end)) > pi
-        and low - slack <= converted[0]
-        and converted[1] <= high + slack
+        and low - slack <= start
+        and end <= high + slack
     )
     is_never_active = range_end < low - 1e-5 or range_start > high + 1e-5
     # A range in degrees may begin at 0 or end there, which is in the range in radians too.
@@ -205,7 +209,7 @@ def _report_unreachable(
             + ("; is it in degrees?" if fits else ""),
             point,
             tag="range",
-            suggestion=f"{converted[0]:.6g} {converted[1]:.6g}" if fits else None,
+            suggestion=f"{start:.6g} {end:.6g}" if fits else None,
         )
 
 
