@@ -211,7 +211,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
     with tour.step("Plot the jump: coordinates, activations, forces, energy") as report_result:
         plots = plot_simulation(result[-1], tour.folder / MOTIONS[-1].model)
         report_result(f"{len(plots)} pictures", plots[0].with_name("*.png"))
-    with tour.step("Write a page for the browser of each motion") as report_result:
+    with tour.step("Write a page of each motion for the browser") as report_result:
         pages = []
         titles = [
             *((motion.title, f"{motion.model}.html") for motion in MOTIONS),
@@ -233,7 +233,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
             )
         )
         size = sum(page.stat().st_size for page in pages) / 1e6
-        report_result(f"{size:.1f} MB; they need no network", *pages)
+        report_result(f"{size:.1f} MB; the pages need no network", *pages)
     return pages
 
 
@@ -246,7 +246,7 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
 
     motion = MOTIONS[0]
     with tour.step(
-        "Simulate the walker by PyBullet too: URDF, custom contact forces"
+        "Simulate the walker with PyBullet, too: URDF, custom contact forces"
     ) as report_result:
         if find_spec("pybullet") is None:
             report_result(

@@ -59,7 +59,7 @@ class ScaleFactorFinder:
             if scale.apply:
                 # A segment is a name in files, and may be an object in Python.
                 name = str(getattr(scale.segment, "name", scale.segment))
-                if self._is_known(name, "scale factors given by hand"):
+                if self._is_known(name, "the scale factors set by hand"):
                     self.found.factors[name] = [float(factor) for factor in scale.scales]
 
     def apply_measurements(
@@ -135,7 +135,7 @@ class ScaleFactorFinder:
         """Return whether the model has a frame of a name; add a note if not."""
         if name not in self.found.factors:
             self.found.notes.append(
-                f"{user_description}: the model has no body '{name}'{suggest_name(name, self.found.factors)}"
+                f"body '{name}' of {user_description}: the model has no such body{suggest_name(name, self.found.factors)}"
             )
         return name in self.found.factors
 

@@ -67,7 +67,10 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
     for scale in theirs.objects:
         # OpenSim prints six digits of these.
         assert result.measured.factors[scale.segment] == pytest.approx(scale.scales, rel=1e-5)
-    assert result.measured.notes[0] == "measurement 'thigh': the model has no body 'patella_r'"
+    assert (
+        result.measured.notes[0]
+        == "body 'patella_r' of measurement 'thigh': the model has no such body"
+    )
     placed = osimlite.read_text(result.texts[tool.marker_placer.output_model_file])
     assert_same(placed, osimlite.read(setup / "their_subject01_simbody.osim"), but="location")
     text = result.texts[tool.marker_placer.output_motion_file]

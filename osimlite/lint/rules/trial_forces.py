@@ -142,8 +142,8 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
     ```
     """
     advice = (
-        "look at mass and mass centres, the filter, and that loads and motion have the same times "
-        "and feet"
+        "check masses and mass centres, the filter, and that the loads agree with the motion in time "
+        "and act on the right foot"
     )
     trial.judge(report, [FORCE_GOOD, FORCE_SHARE, FORCE_BAD], _BOTH, advice, "peak")
     trial.judge(report, [FORCE_RMS_GOOD, FORCE_RMS_BAD], OPENSIM, advice, "rms")
@@ -172,7 +172,9 @@ def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
     + peak of MZ of RRA: 6 N m, with loads times height of 800 N m
     ```
     """
-    advice = "look at the mass centre of the trunk (RRA adjusts it), and at where the loads act"
+    advice = (
+        "check the mass centre of the trunk (RRA adjusts it), and the points at which the loads act"
+    )
     trial.judge(report, [MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD], _BOTH, advice, "peak")
     trial.judge(report, [MOMENT_RMS_GOOD, MOMENT_RMS_BAD], OPENSIM, advice, "rms")
 
@@ -203,8 +205,8 @@ def report_reserve_moment(trial: Trial, report: FindingCollector) -> None:
     ```
     """
     advice = (
-        "look at strength and paths of the muscles there, at passive forces of those against "
-        "them, and at the moment"
+        "check strengths and paths of the muscles at this joint, passive forces of their "
+        "antagonists, and the joint moment"
     )
     for kind in ("peak", "rms"):
         trial.judge(report, [RESERVE_GOOD, RESERVE_BAD], f"{HICKS}; {CHECKLIST}", advice, kind)
@@ -253,10 +255,7 @@ def report_full_activation(trial: Trial, report: FindingCollector) -> None:
     + share of the time that 'tib_ant_r' is fully active: 0 %
     ```
     """
-    advice = (
-        "look at its max_isometric_force, its fibers' length in this pose, and at muscles that "
-        "pull against it"
-    )
+    advice = "check its max_isometric_force, its fiber length in this pose, and its antagonists"
     trial.judge(report, [FULL_GOOD, FULL_BAD], OSIMLITE, advice, "share")
 
 
@@ -285,7 +284,7 @@ def report_passive_force(trial: Trial, report: FindingCollector) -> None:
     ```
     """
     advice = (
-        "its fibers are too long in this pose: look at tendon_slack_length, optimal_fiber_length "
+        "its fibers are too long in this pose: check tendon_slack_length, optimal_fiber_length "
         "and its path"
     )
     trial.judge(report, [PASSIVE_GOOD, PASSIVE_BAD], OSIMLITE, advice, "peak")

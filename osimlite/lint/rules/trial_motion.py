@@ -105,7 +105,7 @@ def report_scale_marker_error(trial: Trial, report: FindingCollector) -> None:
     """
     # The limits and their sources are OpenSim's own documents, so that users can look them up.
     advice = (
-        "look at the markers on bones, the pairs that measure their segment, and the pose of the "
+        "check the positions of markers on bones, the marker pairs that scale the segment, and the pose of the "
         "static trial"
     )
     trial.judge(report, [SCALE_RMS], CHECKLIST, advice, "rms")
@@ -130,8 +130,8 @@ def report_marker_error(trial: Trial, report: FindingCollector) -> None:
     ```
     """
     advice = (
-        "look where this marker is on the model, whether it was taken for another, and what it "
-        "weighs"
+        "check the positions of the markers on the model, their weights, and whether two of them are "
+        "swapped"
     )
     trial.judge(report, [RMS], OPENSIM, advice, "rms")
     trial.judge(report, [PEAK], OPENSIM, advice, "peak")
@@ -182,7 +182,7 @@ def report_beyond_range(trial: Trial, report: FindingCollector) -> None:
         report,
         [BEYOND, FAR_BEYOND],
         OSIMLITE,
-        "widen the range if the joint goes there, else look at the markers",
+        "widen the range if the joint really moves so far, otherwise check the markers",
         "peak",
     )
 
