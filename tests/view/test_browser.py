@@ -545,3 +545,16 @@ def test_nothing_of_the_model_is_below_the_player(open_page, tmp_path):
     lowest = page.run("Math.max(...[1, 2, 3, 4, 5].map((k) => v.stage.onPage(k, [0, 0, 0])[1]))")
     player = page.run("document.querySelector('#player').offsetTop")
     assert lowest < player
+
+
+def test_the_label_of_gravity_is_below_the_buttons_of_a_small_frame(open_page, tmp_path):
+    page = open_page(shown_walker().write_page(tmp_path / "page.html"))
+    # The size of the viewer in a narrow notebook.
+    page.page.set_viewport_size({"width": 400, "height": 460})
+    page.until("v.stage.canvas.clientHeight < 300")
+    page.run("v.stage.resize(), v.stage.look(v.data.directions.home)")
+    page.until("!v.stage.waiting")
+    label = page.page.locator("#overlay .gravity").bounding_box()
+    tools = page.page.locator("#tools").bounding_box()
+    assert label["y"] >= tools["y"] + tools["height"]
+    assert page.run("v.stage.onPage(1, [0, 0, 0])[1]") > tools["height"]

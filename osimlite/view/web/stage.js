@@ -353,7 +353,7 @@
       if (this.gravity) {
         const side = new T.Vector3().crossVectors(this.up, back);
         if (side.lengthSq() < 1e-9) side.set(1, 0, 0);
-        this.gravity.position.copy(middle).addScaledVector(side.normalize(), -0.45 * size).addScaledVector(this.up, (0.3 - 0.5 * (1 - (this.free ?? 1))) * size);
+        this.gravity.position.copy(middle).addScaledVector(side.normalize(), -0.45 * size).addScaledVector(this.up, (0.3 - 0.5 * (this.lowered || 0)) * size);
       }
       this.controls.update();
       this.wanted();
@@ -405,10 +405,12 @@
       const { clientWidth, clientHeight } = this.canvas.parentElement;
       this.renderer.setSize(clientWidth, clientHeight, false);
       this.camera.aspect = clientWidth / Math.max(clientHeight, 1);
-      // What stands at the lower edge covers nothing of the model, which moves up and away.
+      // What stands at the lower or the upper edge covers nothing of the model, which is shown between them.
       const covered = Math.min(this.covered || 0, 0.5 * clientHeight);
-      this.camera.setViewOffset(clientWidth, clientHeight, 0, 0.5 * covered, clientWidth, clientHeight);
-      this.free = 1 - covered / Math.max(clientHeight, 1);
+      const above = Math.min(this.coveredAbove || 0, 0.25 * clientHeight);
+      this.camera.setViewOffset(clientWidth, clientHeight, 0, 0.5 * (covered - above), clientWidth, clientHeight);
+      this.free = 1 - (covered + above) / Math.max(clientHeight, 1);
+      this.lowered = covered / Math.max(clientHeight, 1);
       this.camera.updateProjectionMatrix();
       this.wanted();
     }

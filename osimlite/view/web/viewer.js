@@ -52,6 +52,7 @@
     resize() {
       const player = $("#player");
       this.stage.covered = player.hidden ? 0 : player.offsetHeight + 12;
+      this.stage.coveredAbove = $("#tools").offsetTop + $("#tools").offsetHeight;
       this.stage.resize();
     }
 
