@@ -63,7 +63,7 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
         say(f"ignored columns, which are not coordinates: {join_words(recorded.ignored)}")
     times = recorded.times
     paths = join_words([str(file) for file in files])
-    say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
+    say(f"{len(times)} rows from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
 
 
 def require_plots(*, plot: bool, band: Path | None = None) -> None:

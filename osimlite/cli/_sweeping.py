@@ -17,11 +17,11 @@ Vary = Annotated[
     Option(
         "--vary",
         metavar="NAME=RANGE",
-        help="Range LOW:HIGH (in a sweep also LOW:HIGH:COUNT; :log at the end for a logarithmic scale) of a "
-        "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a parameter of "
-        "the model function or of the controller (default: all of its). MUSCLE/control@0:0.5:6 are six nodes over "
-        "time, @switch1 is a time at which it switches. Names may have * and ? or commas and get the same value; "
-        "{*} makes one variable for each match.",
+        help="Range LOW:HIGH (:log at the end: logarithmic scale; in a sweep also LOW:HIGH:COUNT) of a coordinate, "
+        "COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a parameter of the model "
+        "function or the controller (default: all its parameters). MUSCLE/control@0:0.5:6 varies six nodes from 0 "
+        "to 0.5 s, @switch1 the time of a switch. Names with * and ? or commas share one value; {*} makes one "
+        "variable for each match.",
         show_default=False,
     ),
 ]

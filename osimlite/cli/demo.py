@@ -67,7 +67,7 @@ def demo(
 
     The first model is that of the OpenSim exercise "Building a Dynamic Walker". The four motions
     play in the browser, with ground reaction forces and with muscles coloured by activation. The
-    demo takes about five seconds and needs no display.
+    demo takes about ten seconds and needs no display.
 
     Example: osimlite demo -o tour --no-browser
     """

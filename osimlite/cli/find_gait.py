@@ -31,7 +31,9 @@ def find_gait(
     ] = 300,
     stable: Annotated[
         float,
-        Option(help="Largest multiplier that is small enough; then the basin is optimized."),
+        Option(
+            help="Optimize the stability until the largest multiplier is below this, then the basin."
+        ),
     ] = 0.6,
     perturb: Annotated[
         float,

@@ -43,7 +43,7 @@ def gait(
         list[float] | None,
         Option(
             metavar="PART",
-            help="Change the initial state at random by at most this part: 0.05 is 5 %.",
+            help="Change the initial state at random by at most this share: 0.05 is 5 %.",
             show_default=False,
         ),
     ] = None,
@@ -57,7 +57,8 @@ def gait(
     basin: Annotated[
         bool,
         Option(
-            "--basin", help="Test from which initial states on a grid around the cycle it walks."
+            "--basin",
+            help="Test from which initial states, on a grid around the cycle, the model walks.",
         ),
     ] = False,
     basin_x: Annotated[
@@ -87,7 +88,7 @@ def gait(
 
     The walk begins at the model's default values and speeds. A step is a touch-down of the other
     foot, at least 5 cm ahead along the slope and after at least 0.05 s in the air. Any other
-    touch-down is a scuff. The walk ends when another part than a foot touches the ground.
+    touch-down is a scuff. The walk ends when any part other than a foot touches the ground.
 
     Exits with 1 if there is no cycle.
 

@@ -51,7 +51,7 @@ def modify(
     the largest error is reported. For a MocoStudy, MocoTrack or MocoInverse, the model is the result
     of its ModelProcessor.
 
-    With --from nimble, joints that nimblephysics computes otherwise than OpenSim are rewritten, so
+    With --from nimble, joints that nimblephysics and OpenSim compute differently are rewritten, so
     that the same coordinates give the same poses. It is applied before all replacements.
 
     Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace

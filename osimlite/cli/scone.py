@@ -77,7 +77,7 @@ def scone(
     """Run a SCONE scenario: simulate its human model walking by reflexes, or optimize the parameters.
 
     docs/reflexes.md lists the supported parts of SCONE, and how to write a controller. Other parts
-    are an error that names them, with the line.
+    are reported as errors, with their line.
 
     To look at the result: osimlite view walk/human.osim walk/states.sto
 

@@ -212,7 +212,7 @@ def test_loads_without_a_document(fixtures: Path, tmp_path: Path) -> None:
         "out",
         folder=tmp_path,
     )
-    assert done.code == 0 and "6 times from 0.05 s to 0.1 s" in done.out
+    assert done.code == 0 and "6 rows from 0.05 s to 0.1 s" in done.out
 
 
 def test_forces_are_shared(fixtures: Path, tmp_path: Path) -> None:

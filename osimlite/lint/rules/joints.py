@@ -308,7 +308,7 @@ def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
 
 @rule("OSIM417", "nimble-ellipsoid", severity=WARNING)
 def report_nimble_ellipsoid(subject: Subject, report: FindingCollector) -> None:
-    """An ellipsoid joint was made for nimblephysics, which moves it otherwise than OpenSim.
+    """An ellipsoid joint was made for nimblephysics, which moves it differently from OpenSim.
 
     Reports ellipsoid joints whose coordinates are abduction, elevation and upward rotation, in this
     order, and those of models that AddBiomechanics wrote.
