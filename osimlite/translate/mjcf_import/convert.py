@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.robot.names import legal
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
+from osimlite.translate.mjcf.warnings import collect_warnings
 from osimlite.translate.mjcf_import.actuators import add_actuators
 from osimlite.translate.mjcf_import.bodies import add_bodies, add_markers
 from osimlite.translate.mjcf_import.contacts import add_contacts
@@ -185,8 +186,12 @@ def from_mjcf(
         tendon_paths=tendon_paths,
     )
     draft = start_draft(Path(path), options)
-    for run_pass in PASSES:
-        run_pass(draft)
+    # MuJoCo also warns when it poses a model, for example of bodies that cannot start asleep.
+    with collect_warnings(draft.source.mujoco) as warnings:
+        for run_pass in PASSES:
+            run_pass(draft)
+    new_warnings = set(warnings) - set(draft.source.warnings)
+    _record_warnings(draft.fidelity, sorted(new_warnings))
     return Osim(
         draft.source.path.stem if name is None else name,
         draft.model,
@@ -220,6 +225,11 @@ def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
         )
         model.add(world)
     fidelity = Fidelity(source.name, "osim")
-    for text in source.warnings:
-        fidelity.add("warning", "/model", "a model that MuJoCo warns of", "used as it is", text)
+    _record_warnings(fidelity, source.warnings)
     return ConversionDraft(source, options, model, fidelity, world)
+
+
+def _record_warnings(fidelity: Fidelity, texts: Iterable[str]) -> None:
+    """Record what MuJoCo warns of."""
+    for text in texts:
+        fidelity.add("warning", "/model", "a model that MuJoCo warns of", "used as it is", text)

@@ -146,3 +146,27 @@ def test_bodies_move_the_same_in_opensim(mechanism, tmp_path):
             position, rotation = live.body(name)
             assert np.abs(position - data.xpos[body]).max() < 1e-9
             assert np.abs(rotation - data.xmat[body].reshape(3, 3)).max() < 1e-9
+
+
+AWAKE = """<mujoco>
+  <option><flag sleep="enable"/></option>
+  <worldbody>
+    <body name="lower" sleep="init"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+    <body name="upper" pos="0 0 0.15"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+  </worldbody>
+</mujoco>
+"""
+"""A body that is to start asleep beside one that is awake: MuJoCo warns when it poses the model."""
+
+
+@pytest.mark.skipif(
+    int(mujoco.__version__.split(".")[0]) < 4, reason="needs a MuJoCo whose bodies can sleep"
+)
+def test_warnings_after_compilation_are_recorded_and_write_no_file(tmp_path, monkeypatch):
+    path = models.write_mjcf(tmp_path, AWAKE)
+    (tmp_path / "current").mkdir()
+    monkeypatch.chdir(tmp_path / "current")
+    made = osimlite.from_mjcf(path)
+    assert not list((tmp_path / "current").iterdir())
+    records = [record for record in made.fidelity if record.kind == "warning"]
+    assert len(records) == 1 and "could not be slept" in records[0].detail
