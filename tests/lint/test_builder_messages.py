@@ -96,6 +96,15 @@ MODELS = {
         "<radius>0.12</radius></ContactSphere>",
         _obstacle_of("x") + _obstacle_of("y", "<contact_hint>0 0.1 0</contact_hint>"),
     ),
+    "an obstacle of negative radius": _lay_cable(
+        '<ContactSphere name="x"><socket_frame>/bodyset/a</socket_frame><radius>-0.1</radius></ContactSphere>',
+        _obstacle_of("x"),
+    ),
+    "a ring of negative radius as an obstacle": _lay_cable(
+        '<ContactTorus name="x"><socket_frame>/bodyset/a</socket_frame>'
+        "<torus_radius>-0.1</torus_radius><tube_radius>0.02</tube_radius></ContactTorus>",
+        _obstacle_of("x"),
+    ),
     "a mesh as an obstacle": _lay_cable(
         '<ContactMesh name="x"><socket_frame>/ground</socket_frame><location>9 0 0</location></ContactMesh>',
         _obstacle_of("x"),

@@ -9,6 +9,7 @@ import pytest
 
 import osimlite
 from osimlite import Body, ContactSphere, Coordinate, Model
+from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
 from osimlite.schema.frames import PhysicalOffsetFrame
@@ -149,3 +150,54 @@ def test_cable(elements, tmp_path):
         assert [result.get(info.path, 0.0) for info in mechanism.coordinates] == pytest.approx(
             arms, rel=0, abs=1e-9
         )
+
+
+SIZES = {
+    "ring of radius 0": ContactTorus(torus_radius=0.0, tube_radius=0.05),
+    "ring of negative radius": ContactTorus(torus_radius=-0.08, tube_radius=0.03),
+    "tube of radius 0": ContactTorus(torus_radius=0.08, tube_radius=0.0),
+    "tube of negative radius": ContactTorus(torus_radius=0.08, tube_radius=-0.03),
+    "sphere of radius 0": ContactSphere(radius=0.0),
+    "sphere of negative radius": ContactSphere(radius=-0.05),
+    "cylinder of radius 0": ContactCylinder(radius=0.0),
+    "cylinder of negative radius": ContactCylinder(radius=-0.05),
+    "half axis of 0": ContactEllipsoid(radii=(0.04, 0.0, 0.05)),
+    "negative half axis": ContactEllipsoid(radii=(0.04, -0.06, 0.05)),
+}
+"""Obstacles whose sizes are not positive."""
+
+
+@pytest.mark.parametrize("geometry", SIZES.values(), ids=SIZES)
+def test_sizes_that_are_not_positive(geometry, tmp_path, monkeypatch):
+    opensim.Logger.setLevelString("off")
+    monkeypatch.setitem(SURFACES, "sized", geometry)
+    hint = (0.08, 0, 0.03) if isinstance(geometry, ContactTorus) else (0.01, 0.08, 0.01)
+    height = -0.08 if isinstance(geometry, ContactTorus) else 0
+    model = carrier((HIGH, over("sized", B0, 0.1, height, 0, hint=hint), END))
+    file = tmp_path / "model.osim"
+    osimlite.write(model, file)
+    findings = osimlite.validate(file)
+    codes = {finding.code for finding in findings.errors}
+    refusals = [finding for finding in findings.errors if finding.consequence == "refuses"]
+    theirs = opensim.Model(str(file))
+    try:
+        state = theirs.initSystem()
+    except RuntimeError:
+        assert codes == {"OSIM206", "OSIM534"}
+        assert len(refusals) == 2
+        with pytest.raises(ModelError, match="size that is not positive"):
+            osimlite.paths(model)
+        return
+    assert not refusals
+    if isinstance(geometry, ContactSphere | ContactCylinder):
+        # OpenSim rejects some models with a radius of 0.
+        assert codes == ({"OSIM206"} if geometry.radius == 0.0 else set())
+        with pytest.raises(UnsupportedError, match="radius that is not positive"):
+            osimlite.paths(model)
+        return
+    assert codes == set()
+    assert "OSIM207" in {finding.code for finding in findings.warnings}
+    length = opensim.PathSpring.safeDownCast(theirs.getForceSet().get(0)).getPath().getLength(state)
+    paths = osimlite.paths(model)
+    q = paths.mechanism.assemble({})
+    assert paths.lengths(q)["/forceset/spring"] == pytest.approx(length, rel=0, abs=1e-9)

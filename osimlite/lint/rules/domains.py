@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -404,9 +404,8 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
                     and outside_numbers == list(_to_numbers(spec.default))
                 ):
                     continue
-                # A torus radius of 0 makes a sphere, which is a surface.
-                if id(item) in obstacles and (spec.name, outside_numbers[0]) != ("torus_radius", 0):
-                    consequence, fails = REFUSED, True
+                if id(item) in obstacles:
+                    consequence, fails = _describe_obstacle_size(spec.name, outside_numbers)
                 else:
                     rigid = bool(getattr(item, "ignore_tendon_compliance", False))
                     consequence, fails = describe_consequence(
@@ -419,6 +418,27 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
                     value,
                     DomainVerdict(outside_numbers[0], domain, consequence, fails),
                 )
+
+
+def _describe_obstacle_size(name: str, numbers: Sequence[float]) -> tuple[str, bool]:
+    """Return what OpenSim 4.6 does with sizes of an obstacle of a path that are not positive (measured).
+
+    Returns:
+        The consequence, and whether it is a failure.
+    """
+    if name == "torus_radius":
+        return (REFUSED, True) if min(numbers) < 0.0 else ("it is a sphere", False)
+    if name == "radius":
+        # Whether OpenSim starts with a radius of 0 depends on the rest of the model.
+        meaning = "the path around it has no meaning"
+        return (
+            (f"{meaning}, or OpenSim rejects the model", True)
+            if 0.0 in numbers
+            else (meaning, False)
+        )
+    if 0.0 in numbers:
+        return REFUSED, True
+    return "OpenSim takes the absolute value", False
 
 
 def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:

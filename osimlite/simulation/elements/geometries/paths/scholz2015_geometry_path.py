@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from osimlite.base.records import dataclass, replace
-from osimlite.errors import ModelError, OsimliteError
+from osimlite.errors import ModelError, OsimliteError, UnsupportedError
 from osimlite.mechanics.kernels.cable_correction import solver_size
 from osimlite.mechanics.kernels.cable_records import (
     CABLE,
@@ -227,6 +227,7 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
     Raises:
         ModelError: the path does not begin and end with a point, a cable cannot run over an obstacle
             of this class, a parameter has no meaning, or no path over the obstacles is found.
+        UnsupportedError: the radius of an obstacle is not positive.
     """
     elements = tuple(
         _read_point(builder, item)
@@ -334,10 +335,7 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
             "ellipsoid, torus or half-space"
         )
     builder.check_finite(geometry, (*surface, *geometry.location, *geometry.orientation))
-    if min(surface[1:3]) <= 0.0 or min(surface) < 0.0:
-        raise ModelError(
-            f"'{builder.path(geometry)}' has a size that is not positive; give it a positive one"
-        )
+    _check_size(builder, geometry, surface)
     hint = np.array(item.contact_hint)
     has_hint = not np.isnan(hint).all()
     if has_hint:
@@ -367,6 +365,33 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
     return CableObstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
 
 
+def _check_size(
+    builder: ElementBuilder, geometry: ContactGeometry, surface: tuple[float, ...]
+) -> None:
+    """Check whether the sizes of an obstacle make a surface, as OpenSim 4.6 decides it (measured).
+
+    It takes the absolute value of half axes and of the radius of a tube; a ring of radius 0 is a
+    sphere.
+
+    Raises:
+        ModelError: OpenSim finds no path over such a surface.
+        UnsupportedError: the radius is not positive: OpenSim may find a path, which has no meaning.
+    """
+    if isinstance(geometry, ContactSphere | ContactCylinder) and geometry.radius <= 0.0:
+        raise UnsupportedError(
+            f"'{builder.path(geometry)}' has a radius that is not positive, around which a path "
+            "has no meaning; give it a positive one"
+        )
+    if isinstance(geometry, ContactTorus):
+        is_surface = geometry.torus_radius >= 0.0 and geometry.tube_radius != 0.0
+    else:
+        is_surface = min(surface[1:3]) > 0.0 and min(surface) >= 0.0
+    if not is_surface:
+        raise ModelError(
+            f"'{builder.path(geometry)}' has a size that is not positive; give it a positive one"
+        )
+
+
 def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None:
     """Return the numbers of a surface for the kernels of cables.
 
@@ -386,7 +411,7 @@ def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None
             SURFACE_TYPE.ELLIPSOID,
             1.0,
             1.0,
-            *(radius**-2 if radius > 0.0 else -1.0 for radius in geometry.radii),
+            *(radius**-2 if radius != 0.0 else -1.0 for radius in geometry.radii),
         )
     if isinstance(geometry, ContactTorus):
         return SURFACE_TYPE.TORUS, geometry.torus_radius, geometry.tube_radius, 0.0, 0.0, 0.0
