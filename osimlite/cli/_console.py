@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 from osimlite.base.text import escape_control_sequences, escape_unprintable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
     from rich.table import Table
 
@@ -265,6 +267,9 @@ def add_row(table: Table, *cells: str) -> None:
     table.add_row(*map(escape_unprintable, cells))
 
 
+MAX_PATH_LINES = 3
+"""Number of lines up to which the files of a command are listed with their folder each."""
+
 TEXT_COLUMN_GAP = 2
 """Blanks between the columns of a table."""
 CELL_COLOURS = {"good": "\033[32m", "okay": "\033[33m", "bad": "\033[31m"}
@@ -381,12 +386,70 @@ def _wrap_words(text: str, width: int) -> list[str]:
     return wrap(text, width, break_on_hyphens=False, break_long_words=False)
 
 
+def _join_content(content: str | list[str]) -> str:
+    """Return a text, or the paths of files as one text."""
+    return content if isinstance(content, str) else ", ".join(content) or "none"
+
+
+def _has_single_columns(name: str, content: str | list[str]) -> bool:
+    """Return whether each character of a row is one column wide."""
+    text = name + _join_content(content)
+    if text.isascii():
+        return True
+    from unicodedata import combining, east_asian_width
+
+    return not any(east_asian_width(letter) in "WF" or combining(letter) for letter in text)
+
+
+def _list_content_lines(content: str | list[str], width: int) -> list[str]:
+    """Return the lines of a text or of paths of files; single words and paths can be longer than `width`."""
+    if isinstance(content, str) or not content:
+        return _wrap_words(_join_content(content), width)
+    lines = _wrap_items(content, width)
+    if len(lines) <= MAX_PATH_LINES and max(map(len, lines)) <= width:
+        return lines
+    folders: dict[str, list[str]] = {}
+    for path in content:
+        folder, name = os.path.split(_shorten_path(path))
+        folders.setdefault(os.path.join(folder, "") if folder else "", []).append(name)
+    lines = []
+    for folder, names in folders.items():
+        if not folder:
+            lines += _wrap_items(names, width)
+        elif len(names) == 1:
+            lines.append(folder + names[0])
+        else:
+            lines += [folder, *(f"  {line}" for line in _wrap_items(names, width - 2))]
+    return lines
+
+
+def _shorten_path(path: str) -> str:
+    """Return a path relative to the current folder if the file is below it."""
+    from pathlib import Path
+
+    with suppress(OSError, ValueError):
+        return str(Path(path).relative_to(Path.cwd()))
+    return path
+
+
+def _wrap_items(items: Sequence[str], width: int) -> list[str]:
+    """Return the lines of a list with commas, broken between items only: file names can have spaces."""
+    lines: list[str] = []
+    for index, item in enumerate(items):
+        text = item + "," * (index < len(items) - 1)
+        if lines and len(lines[-1]) + 1 + len(text) <= width:
+            lines[-1] += f" {text}"
+        else:
+            lines.append(text)
+    return lines
+
+
 class FactTable:
     """Table of two columns: names, and what is stated about each."""
 
     def __init__(self, title: str = "", rows: Iterable[tuple[str, str]] = ()) -> None:
         self.title = title
-        self.rows = [*rows]
+        self.rows: list[tuple[str, str | list[str]]] = [*rows]
 
     def add(self, name: str, text: str) -> None:
         """Add a row.
@@ -397,27 +460,43 @@ class FactTable:
         """
         self.rows.append((name, text))
 
+    def add_files(self, paths: Iterable[str | Path]) -> None:
+        """Add the row of the files that were written; many files of one folder are listed below its name."""
+        self.rows.append(("files", [str(path) for path in paths]))
+
     def show(self) -> None:
         """Print the table; text that is too long for its column is wrapped between words.
 
-        Words are never broken, so that a file path can be copied and searched for.
+        Words are never broken, so that a file path can be copied and searched for. A text with a
+        word that is wider than the second column starts below its name.
         """
-        rows = [(escape_unprintable(name), escape_unprintable(text)) for name, text in self.rows]
+        rows: list[tuple[str, str | list[str]]] = [
+            (
+                escape_unprintable(name),
+                escape_unprintable(content)
+                if isinstance(content, str)
+                else [escape_unprintable(path) for path in content],
+            )
+            for name, content in self.rows
+        ]
         width = max((len(name) for name, _ in rows), default=0)
         width_left = count_columns() - width - 2
         # Narrow columns need broken words, and characters of other scripts can be two columns wide.
-        if width_left < 30 or not all(name.isascii() and text.isascii() for name, text in rows):
-            self._show_any(rows)
+        if width_left < 30 or not all(_has_single_columns(name, text) for name, text in rows):
+            self._show_any([(name, _join_content(content)) for name, content in rows])
             return
-        from textwrap import wrap
 
         italic, bold, end = ("\033[3m", "\033[1m", "\033[0m") if wants_colour() else ("", "", "")
         if self.title:
             show(f"{italic}{escape_unprintable(self.title)}{end}\n")
-        for name, text in rows:
-            for line in wrap(text, width_left, break_on_hyphens=False, break_long_words=False) or [
-                ""
-            ]:
+        for name, content in rows:
+            lines = _list_content_lines(content, width_left) or [""]
+            if max(map(len, lines)) > width_left:
+                show(f"{bold}{name}{end}\n")
+                for line in _list_content_lines(content, count_columns() - 2):
+                    show(f"  {line}\n")
+                continue
+            for line in lines:
                 show(f"{bold}{name:{width}}{end}  {line}".rstrip() + "\n")
                 name = ""
 

@@ -116,7 +116,7 @@ def find_gait(
 
 
 def _describe_result(gait: Gait) -> FactTable:
-    from osimlite.base.text import format_count, join_words
+    from osimlite.base.text import format_count
     from osimlite.studies.gait.cycle_search import BASIN_STARTS, BASIN_STEPS
 
     cycle, walk = gait.found.cycle, gait.walk
@@ -137,5 +137,5 @@ def _describe_result(gait: Gait) -> FactTable:
         "search",
         f"{gait.candidates} random walkers made two steps; {format_count(gait.cycles, 'cycle')} found",
     )
-    facts.add("files", join_words([str(path) for path in gait.files]))
+    facts.add_files(gait.files)
     return facts

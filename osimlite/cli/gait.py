@@ -317,7 +317,7 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
     for skipped in summarize_skipped(result.skipped):
         facts.add("left out", skipped)
     if files:
-        facts.add("files", ", ".join(str(path) for path in files))
+        facts.add_files(files)
     return facts
 
 

@@ -170,5 +170,5 @@ def _describe_optimum(objective: str, optimum: Optimum) -> FactTable:
         # Only searches for parameters of a controller write this file.
         *([PAR_FILE] if optimum.model.with_name(PAR_FILE).exists() else []),
     )
-    facts.add("files", ", ".join(str(optimum.model.with_name(name)) for name in names))
+    facts.add_files(optimum.model.with_name(name) for name in names)
     return facts

@@ -307,7 +307,7 @@ def _print_outcome(setup: Path, outcome: Outcome) -> None:
             "check",
             f"{format_count(hidden_count, 'more warning')}; see them with: osimlite validate {files}",
         )
-    facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
+    facts.add_files(outcome.files)
     facts.show()
 
 

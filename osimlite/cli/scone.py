@@ -139,5 +139,5 @@ def scone(
     gait = measure_gait(loaded, walk)
     for name, gait_text in () if gait is None else gait.describe().items():
         facts.add(name, gait_text)
-    facts.add("files", ", ".join(map(str, files)))
+    facts.add_files(files)
     facts.show()

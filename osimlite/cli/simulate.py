@@ -284,5 +284,5 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
         )
     for skipped in summarize_skipped(summary["skipped_forces"]):
         facts.add("left out", skipped)
-    facts.add("files", ", ".join(str(path) for path in files))
+    facts.add_files(files)
     return facts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import sys
 from pathlib import Path
@@ -142,6 +143,45 @@ def test_no_path_of_a_file_is_broken_into_lines(
     path = "/tmp/" + "pytest-of-somebody/" * 4 + "best.par"
     FactTable("search", [("runs", "40"), ("files", f"results/best.osim, {path}")]).show()
     assert path in capsys.readouterr().out.splitlines()[-1]
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_many_files_of_one_folder_are_listed_below_it(
+    columns: int, capsys: pytest.CaptureFixture[str], monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.chdir(tmp_path)
+    names = [f"so_MuscleAnalysis_Moment Arm_{index}_{'angle' * 4}.sto" for index in range(12)]
+    folder = tmp_path / "a_rather_long_folder_name_for_results" / "so"
+    facts = FactTable("so.xml", [("rows", "31")])
+    facts.add_files(folder / name for name in names)
+    facts.show()
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2] == "files  " + os.path.join("a_rather_long_folder_name_for_results", "so", "")
+    assert all(len(line) <= columns for line in lines)
+    assert all(any(name in line for line in lines) for name in names)
+    # Few files keep their paths, which can be copied.
+    facts = FactTable()
+    facts.add_files(["results/states.sto", "results/forces.sto"])
+    facts.show()
+    assert capsys.readouterr().out == "files  results/states.sto, results/forces.sto\n"
+
+
+def test_a_path_that_does_not_fit_beside_its_label_is_below_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    path = "/tmp/müller/" + "0123456789" * 6 + ".sto"
+    facts = FactTable("", [("a rather long label", path), ("rows", "31")])
+    facts.add_files([path * 2])
+    facts.show()
+    assert capsys.readouterr().out.splitlines() == [
+        "a rather long label",
+        f"  {path}",
+        "rows                 31",
+        "files",
+        f"  {path * 2}",
+    ]
 
 
 def test_what_others_print_is_guarded_too(capsys: pytest.CaptureFixture[str]) -> None:
