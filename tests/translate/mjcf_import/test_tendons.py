@@ -73,6 +73,38 @@ def test_paths_are_as_long_as_tendons(arm, made, records):
     assert records["/actuator/mixed"].how == "dropped"
 
 
+def test_moment_arms_are_rates_of_tendons(arm, made, records):
+    source = load_mjcf(arm)
+    model, data, paths = source.model, mujoco.MjData(source.model), osimlite.paths(made.model)
+    owners = {"straight": "m_straight", "over": "m_over", "round": "m_round", "both": "linear"}
+    owners |= {"through": "m_through", "pulley": "m_pulley", "elastic": "elastic_spring"}
+    # MuJoCo's lengths are differentiated, because the layout of its Jacobian differs by version.
+    step = 1e-5
+    errors = {name: [] for name in owners}
+    for pose in sample_qpos(source, 30, 6):
+        arms = paths.moment_arms(made.coordinates.values(pose))
+        for joint in range(model.njnt):
+            lengths = []
+            for change in (-step, step):
+                data.qpos[:] = pose
+                data.qpos[model.jnt_qposadr[joint]] += change
+                mujoco.mj_fwdPosition(model, data)
+                lengths.append(data.ten_length.copy())
+            rates = (lengths[1] - lengths[0]) / (2.0 * step)
+            for name, owner in owners.items():
+                by_coordinate = {
+                    coordinate.rpartition("/")[2]: value
+                    for coordinate, value in arms[f"/forceset/{owner}"].items()
+                }
+                # OpenSim's moment arm is the negative rate of the length.
+                value = -by_coordinate.get(model.joint(joint).name, 0.0)
+                errors[name].append(value - rates[model.tendon(name).id])
+    for name in ("through", "pulley"):
+        recorded = records[f"/tendon/{name}"].errors["moment arm"].rms
+        assert np.sqrt(np.mean(np.square(errors.pop(name)))) < 2.0 * recorded
+    assert np.abs(list(errors.values())).max() < 1e-8
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize("muscle_class", ["exact", "millard"])
 def test_forces_are_mujocos_in_opensim(arm, tmp_path, muscle_class):
