@@ -40,6 +40,12 @@ AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 ERROR_POSES = 100
 """Random poses in which the errors of paths are measured."""
 
+ACTIVATION_CONSTANTS = {"activation_time_constant": 0.01, "deactivation_time_constant": 0.04}
+"""Time constants (s) of all muscles in biorbd, which no attribute changes.
+
+Its equation of first order is that of OpenSim if the muscle has no `statetype`.
+"""
+
 MUSCLE_TYPE = "hillthelen"
 """Class of biorbd's muscles that is nearest to those of OpenSim."""
 
@@ -329,6 +335,20 @@ def _format_muscles(
             "the force curves of OpenSim's muscles",
             f"biorbd's '{MUSCLE_TYPE}'",
         )
+        constants = {
+            attribute: value
+            for attribute, default in ACTIVATION_CONSTANTS.items()
+            # Classes without activation dynamics have no such property.
+            if (value := getattr(muscle, attribute, default)) != default
+        }
+        if constants:
+            fidelity.add(
+                "activation",
+                muscle.path,
+                "time constants of the activation",
+                "those of all muscles in biorbd: 0.01 s up, 0.04 s down",
+                ", ".join(f"{attribute} {value:g} s" for attribute, value in constants.items()),
+            )
         name = names(muscle.name)
         # The first and the last point are attributes of the group, the others are via points.
         positions = [_place(point, robot, placements) for point in points]

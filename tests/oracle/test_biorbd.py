@@ -33,6 +33,11 @@ import biorbd
 path, states = json.load(sys.stdin)
 model = biorbd.Model(path)
 names = [model.segment(index).name().to_string() for index in range(model.nbSegment())]
+states_of_muscles = model.stateSet() if model.nbMuscles() else []
+for each in states_of_muscles:
+    each.setExcitation(0.8)
+    each.setActivation(0.3)
+rising = model.activationDot(states_of_muscles).to_array().tolist() if states_of_muscles else []
 characteristics = [model.muscle(k).characteristics() for k in range(model.nbMuscles())]
 numbers = [
     [each.forceIsoMax(), each.optimalLength(), each.tendonSlackLength(), each.pennationAngle(),
@@ -51,6 +56,7 @@ for state in states:
         "lengths": [model.muscle(k).musculoTendonLength(model, q, False) for k in range(model.nbMuscles())],
         "arms": model.musclesLengthJacobian(q).to_array().tolist() if model.nbMuscles() else [],
         "muscles": numbers,
+        "rising": rising,
     })
 os.write(1, b"\\nANSWER" + json.dumps(result).encode() + b"\\n")
 """
@@ -115,6 +121,8 @@ def test_biorbd_computes_the_same(tmp_path: Path, make: Callable[[], osimlite.Mo
                 muscle.pennation_angle_at_optimal,
                 muscle.max_contraction_velocity,
             ]
+            # OpenSim's activation dynamics of first order, with the time constants of biorbd.
+            assert result["rising"][k] == pytest.approx((0.8 - 0.3) / (0.01 * (0.5 + 1.5 * 0.3)))
             assert result["muscles"][k] == pytest.approx(characteristics, abs=1e-12)
             if muscle.path in wrapped:
                 continue

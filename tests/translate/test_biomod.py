@@ -117,6 +117,16 @@ def test_paths_that_biorbd_cannot_follow_have_measured_errors() -> None:
     assert "moment arm about swing" in record.errors
 
 
+def test_other_time_constants_are_recorded() -> None:
+    model = make_tilted()
+    (muscle,) = model.components(osimlite.Muscle)
+    muscle.activation_time_constant, muscle.deactivation_time_constant = 0.01, 0.05
+    (record,) = [record for record in to_biomod(model).fidelity if record.kind == "activation"]
+    assert record.detail == "deactivation_time_constant 0.05 s"
+    muscle.deactivation_time_constant = 0.04
+    assert "activation" not in {record.kind for record in to_biomod(model).fidelity}
+
+
 READ_ATTRIBUTES = {
     "segment": {"parent", "rtinmatrix", "rt", "translations", "rotations", "rangesq", "mass",
                 "inertia", "com"},
