@@ -41,12 +41,18 @@ def add_actuators(draft: ConversionDraft) -> None:
     model, mujoco = draft.mj, draft.source.mujoco
     lengths = _sample_lengths(draft)
     transmissions = mujoco.mjtTrn
-    for actuator in range(model.nu):
-        report_progress("converting actuators", actuator, model.nu)
+    count = len(model.actuator_trntype)
+    for actuator in range(count):
+        report_progress("converting actuators", actuator, count)
         transmission = int(model.actuator_trntype[actuator])
         target = int(model.actuator_trnid[actuator, 0])
         is_muscle = int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_MUSCLE)
-        if transmission in (int(transmissions.mjTRN_JOINT), int(transmissions.mjTRN_JOINTINPARENT)):
+        if not draft.has_one_control(actuator):
+            draft.drop("actuator", actuator, "an actuator with several controls or outputs")
+        elif transmission in (
+            int(transmissions.mjTRN_JOINT),
+            int(transmissions.mjTRN_JOINTINPARENT),
+        ):
             if int(model.jnt_type[target]) in (FREE, BALL):
                 draft.drop("actuator", actuator, "an actuator of a ball or free joint")
             elif is_muscle:
@@ -56,7 +62,7 @@ def add_actuators(draft: ConversionDraft) -> None:
         elif transmission == int(transmissions.mjTRN_TENDON):
             path = draft.paths[target]
             # The gear of a tendon has one number that counts.
-            gear = float(model.actuator_gear[actuator, 0])
+            gear = float(model.actuator_gear[draft.output_of(actuator), 0])
             if is_muscle:
                 muscle = make_muscle(
                     draft, actuator, _copy(path), gear, lengths[target] + path.shift
@@ -149,9 +155,9 @@ def _set_limits(
     """Set the range of the control, and record what a limit of the force becomes."""
     model = draft.mj
     lower, upper = -np.inf, np.inf
-    if model.actuator_ctrllimited[actuator]:
+    if model.actuator_ctrllimited[draft.control_of(actuator)]:
         # No limit is infinite in OpenSim.
-        lower, upper = map(float, model.actuator_ctrlrange[actuator])
+        lower, upper = map(float, model.actuator_ctrlrange[draft.control_of(actuator)])
     if model.actuator_forcelimited[actuator]:
         limits = [float(value) for value in model.actuator_forcerange[actuator]]
         text = f"{limits[0]:g} to {limits[1]:g}"
@@ -170,7 +176,7 @@ def _set_limits(
 
 
 def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> None:
-    gear = float(draft.mj.actuator_gear[actuator, 0])
+    gear = float(draft.mj.actuator_gear[draft.output_of(actuator), 0])
     law = _read_linear_law(draft, actuator, gear)
     if law is None:
         return
@@ -222,7 +228,7 @@ def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> No
 def _add_joint_muscle(draft: ConversionDraft, actuator: int, joint: int) -> None:
     """Add a muscle whose length is a multiple of a joint position."""
     model = draft.mj
-    gear = float(model.actuator_gear[actuator, 0])
+    gear = float(model.actuator_gear[draft.output_of(actuator), 0])
     lower, upper = draft.made[draft.coordinates[joint][0]].range
     shortest = min(gear * lower, gear * upper)
     # OpenSim's paths have positive lengths: 1 cm at least.
@@ -285,7 +291,7 @@ def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None
     """Add a force or a torque at a site."""
     model = draft.mj
     gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
-    gear = np.array(model.actuator_gear[actuator])
+    gear = np.array(model.actuator_gear[draft.output_of(actuator)])
     force, torque = gear[:3], gear[3:]
     body = int(model.site_bodyid[site])
     if (
@@ -336,7 +342,7 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
     model = draft.mj
     driven_tendons = {
         int(model.actuator_trnid[actuator, 0])
-        for actuator in range(model.nu)
+        for actuator in range(len(model.actuator_trntype))
         if int(model.actuator_trntype[actuator]) == int(draft.source.mujoco.mjtTrn.mjTRN_TENDON)
     }
     for tendon in range(model.ntendon):

@@ -95,6 +95,21 @@ class ConversionDraft:
         """MuJoCo's compiled model."""
         return self.source.model
 
+    def has_one_control(self, actuator: int) -> bool:
+        """Return whether an actuator has one control and one output; those of MuJoCo 4 may have several."""
+        counts = (getattr(self.mj, f"actuator_{part}num", None) for part in ("ctrl", "out"))
+        return all(numbers is None or int(numbers[actuator]) == 1 for numbers in counts)
+
+    def control_of(self, actuator: int) -> int:
+        """Return the index of the first control of an actuator, to which limits of controls belong."""
+        addresses = getattr(self.mj, "actuator_ctrladr", None)
+        return actuator if addresses is None else int(addresses[actuator])
+
+    def output_of(self, actuator: int) -> int:
+        """Return the index of the first output of an actuator, to which gears and lengths belong."""
+        addresses = getattr(self.mj, "actuator_outadr", None)
+        return actuator if addresses is None else int(addresses[actuator])
+
     def coordinate_path(self, joint: int) -> str:
         """Return the path of the coordinate of a hinge or slide."""
         return self.model.tree().path_of(self.made[self.coordinates[joint][0]]) or ""

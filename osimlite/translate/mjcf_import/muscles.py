@@ -76,7 +76,7 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     """
     model = draft.mj
     gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
-    shortest, longest = map(float, model.actuator_lengthrange[actuator])
+    shortest, longest = map(float, model.actuator_lengthrange[draft.output_of(actuator)])
 
     def lengths(numbers: Array) -> tuple[float, float]:
         # Two lengths of the path, at both ends of the normalized range, give fiber and tendon.
@@ -86,7 +86,11 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     def strength(numbers: Array) -> float:
         force = float(numbers[2])
         # A negative force means that MuJoCo scales by the acceleration at unit force.
-        return force if force >= 0.0 else float(numbers[3] / model.actuator_acc0[actuator])
+        return (
+            force
+            if force >= 0.0
+            else float(numbers[3] / model.actuator_acc0[draft.output_of(actuator)])
+        )
 
     fiber, slack = lengths(gain)
     # Active and passive curves may be scaled differently.
@@ -154,8 +158,8 @@ def make_muscle(
         draft.source.mujoco.mjtDyn.mjDYN_MUSCLE
     )
     limits = (0.0, 1.0)
-    if model.actuator_ctrllimited[actuator]:
-        lower, upper = map(float, model.actuator_ctrlrange[actuator])
+    if model.actuator_ctrllimited[draft.control_of(actuator)]:
+        lower, upper = map(float, model.actuator_ctrlrange[draft.control_of(actuator)])
         # OpenSim's muscles have controls from 0 to 1.
         limits = max(lower, 0.0), min(upper, 1.0)
     if draft.options.muscle == "exact":

@@ -244,3 +244,34 @@ def test_tendons_of_free_bodies_have_paths_without_polynomials(tmp_path):
     assert 0.0 < records["/tendon/within"].errors["length"].max < 0.2
     assert records["/tendon/branched"].errors["length"].max > 0.2
     assert osimlite.read_text(made.text).name == made.model.name
+
+
+SEVERAL = """<mujoco>
+  <worldbody>
+    <body>
+      <joint name="ball" type="ball"/>
+      <geom size="0.1"/>
+      <body pos="0 0 0.3">
+        <joint name="hinge" axis="0 1 0"/>
+        <geom size="0.1"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <orientation name="turn" joint="ball" kp="1"/>
+    <motor name="pull" joint="hinge" gear="7" ctrlrange="-2 3"/>
+  </actuator>
+</mujoco>
+"""
+"""An actuator with three controls and outputs before one that has one of each."""
+
+
+@pytest.mark.skipif(VERSION < 4, reason="needs a MuJoCo whose actuators have several controls")
+def test_actuators_after_those_with_several_controls_keep_their_numbers(tmp_path):
+    made = osimlite.from_mjcf(models.write_mjcf(tmp_path, SEVERAL))
+    motor = made.model["/forceset/pull"]
+    assert motor.optimal_force == 7.0
+    assert (motor.min_control, motor.max_control) == (-2.0, 3.0)
+    records = {record.component: record for record in made.fidelity}
+    assert records["/actuator/turn"].cannot_say == "an actuator with several controls or outputs"
+    assert records["/actuator/turn"].how == "dropped"
