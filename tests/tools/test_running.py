@@ -76,7 +76,7 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
         "contains walk.mot, which the folder of the setup lacks",
     ) in osimlite.run("trial/setup.xml").told
     done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
-    assert done.out.count("current folder contains walk.mot,") == 1
+    assert done.out.count("current folder: contains walk.mot,") == 1
 
 
 def test_the_setup_that_makes_what_is_missing_is_told(setup: Path) -> None:
