@@ -51,7 +51,7 @@ class RunRecord:
 
     setup: str  # file of the setup
     status: str  # one of `STATUSES`
-    told: list[tuple[str, str]] = field(default_factory=list)  # names and messages
+    notices: list[tuple[str, str]] = field(default_factory=list)  # subjects, and what was noticed
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the result
     files: list[str] = field(default_factory=list)  # written files
     message: str = ""  # reason of the failure
@@ -264,7 +264,7 @@ def _run_one(
     return RunRecord(
         str(setup),
         DONE if outcome.done else NO,
-        outcome.told,
+        outcome.notices,
         _to_json_values(outcome.summary),
         files=[str(file) for file in outcome.files],
         warnings=[str(finding) for finding in outcome.warnings],
@@ -354,7 +354,7 @@ def read_record(line: bytes) -> RunRecord | None:
             case {
                 "setup": str(),
                 "status": str(status),
-                "told": [*told],
+                "notices": [*notices],
                 "summary": {**_summary},
                 "files": [*files],
                 "message": str(),
@@ -363,12 +363,12 @@ def read_record(line: bytes) -> RunRecord | None:
                 "digest": str(),
                 "was_done": bool(),
             } as values if status in STATUSES:
-                messages = [(name, message) for name, message in told]
-                texts = (*files, *warnings, *(text for pair in messages for text in pair))
+                pairs = [(subject, notice) for subject, notice in notices]
+                texts = (*files, *warnings, *(text for pair in pairs for text in pair))
                 # The table of all runs is sorted by this number, so it must be one.
                 error = values["summary"].get("rms_marker_error", 0.0)
                 if isinstance(error, int | float) and all(isinstance(text, str) for text in texts):
-                    return RunRecord(**{**values, "told": messages})
+                    return RunRecord(**{**values, "notices": pairs})
     # A damaged line only means that its setup runs again.
     except (ValueError, TypeError, RecursionError):
         pass

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from html import escape
 from pathlib import Path
 from typing import Any
+from warnings import warn
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import format_count, join_words
-from osimlite.errors import DocumentError, SettingError, SimulationError
+from osimlite.errors import DeprecatedWarning, DocumentError, SettingError, SimulationError
 from osimlite.io.tables.old_storage import PRECISION, format_old_table
 from osimlite.io.tables.storage import StoTable, format_adapter_table
 from osimlite.lint.diagnostic import Finding
@@ -43,8 +44,8 @@ class Outcome:
 
     tables: dict[str, StoTable] = field(default_factory=dict)  # tables by the names of their files
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the results
-    # Messages about the results: names and words.
-    told: list[tuple[str, str]] = field(default_factory=list)
+    # Notices about the results: the subject, and what was noticed about it.
+    notices: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)  # written files
     # Findings about the setup, and files that it names, that are not errors; those with a
     # suggestion first.
@@ -57,13 +58,19 @@ class Outcome:
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
+    @property
+    def told(self) -> list[tuple[str, str]]:
+        """Former name of `notices`."""
+        warn("use notices", DeprecatedWarning, stacklevel=2)
+        return self.notices
+
     def __repr__(self) -> str:
         status = "done" if self.done else "not done"
         counts = (
             f"{format_count(len(self.tables), 'table')}, {format_count(len(self.files), 'file')}"
         )
         lines = [f"Outcome: {status}, {counts}"]
-        lines += [f"{name}: {message}" for name, message in self.told[:MAX_LISTED]]
+        lines += [f"{name}: {message}" for name, message in self.notices[:MAX_LISTED]]
         lines += [str(path) for path in self.files[:MAX_LISTED]]
         if (omitted_count := len(self.files) - MAX_LISTED) > 0:
             lines.append(f"... and {format_count(omitted_count, 'more file')}")
@@ -72,7 +79,7 @@ class Outcome:
     def _repr_html_(self) -> str:
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(message)}</td></tr>"
-            for name, message in [*self.told, *(("file", str(path)) for path in self.files)]
+            for name, message in [*self.notices, *(("file", str(path)) for path in self.files)]
         )
         status = "done" if self.done else "not done"
         return f"<div>Outcome: {status}</div><table>{rows}</table>"
@@ -127,7 +134,7 @@ class Outcome:
             name: what the message is about, one to three words.
             message: the message.
         """
-        self.told.append((name, message))
+        self.notices.append((name, message))
 
     def add_warning(self, name: str, message: str) -> None:
         """Add a message that makes the results doubtful, and print it on standard error.
@@ -150,7 +157,7 @@ class Outcome:
             return ""
         names = join_words([f"'{table.columns[index]}'" for index in np.flatnonzero(missing)])
         # One message suffices: all tables of a motion lack numbers for the same reason.
-        if not any("NaN" in message for _, message in self.told):
+        if not any("NaN" in message for _, message in self.notices):
             self.add_message(
                 "not a number", f"{path.name} has NaN where there is no value: {names}"
             )

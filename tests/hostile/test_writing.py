@@ -179,9 +179,9 @@ def test_a_pipe_in_the_place_of_the_journal(study: Path, words: tuple[str, ...])
 @pytest.mark.parametrize(
     "damage",
     [
-        {"told": 5},
-        {"told": [["a"]]},
-        {"told": [["a", 1]]},
+        {"notices": 5},
+        {"notices": [["a"]]},
+        {"notices": [["a", 1]]},
         {"files": 5},
         {"files": [5]},
         {"message": [5]},

@@ -11,9 +11,10 @@ pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
 import numpy as np
 
 import osimlite
-from osimlite.errors import OsimliteError
+from osimlite.errors import DeprecatedWarning, OsimliteError
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.tools.job import NotRunnable
+from osimlite.tools.outcome import Outcome
 from osimlite.tools.running import FaultySetup
 from tests.cli.command import run
 
@@ -74,7 +75,7 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
     assert (
         "current folder",
         "contains walk.mot, which the folder of the setup lacks",
-    ) in osimlite.run("trial/setup.xml").told
+    ) in osimlite.run("trial/setup.xml").notices
     done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
     assert done.out.count("current folder: contains walk.mot,") == 1
 
@@ -185,3 +186,9 @@ def test_a_study_with_a_property_that_nothing_knows_is_not_searched_for(repo, tm
     (tmp_path / "slide.omoco").write_text(text)
     with pytest.raises(FaultySetup, match=r"slide\.omoco:13:.*has no property <bound>"):
         osimlite.run(tmp_path / "slide.omoco")
+
+
+def test_the_former_name_of_notices_warns() -> None:
+    outcome = Outcome(notices=[("thigh", "was scaled")])
+    with pytest.warns(DeprecatedWarning, match="use notices"):
+        assert outcome.told == [("thigh", "was scaled")]
