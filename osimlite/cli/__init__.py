@@ -229,6 +229,19 @@ def _was_interrupted(error: BaseException | None) -> bool:
 
 SYNONYMS = {"--to": "--until", "--until": "--to"}
 """Options of other commands with the same meaning: the last time of a simulation, or of recorded data."""
+COMMAND_SYNONYMS = {
+    "check": "validate",
+    "explain": "rule",
+    "export": "translate",
+    "id": "inverse-dynamics",
+    "import": "convert",
+    "inspect": "info",
+    "lint": "validate",
+    "plot": "run --plot",
+    "show": "view",
+    "so": "static-optimization",
+}
+"""Words that users of other programs try, and the command that does it here."""
 
 
 def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
@@ -266,5 +279,8 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
         options = {word for parameter in context.command.params for word in parameter.opts}
         if synonym in options:
             error.possibilities = [synonym]  # type: ignore[attr-defined]
-    complain(f"{error.format_message().rstrip('.')}; '{path} --help' shows the usage")
+    message = error.format_message().rstrip(".")
+    if words[0] not in COMMANDS and words[0] in COMMAND_SYNONYMS:
+        message += f", use '{COMMAND_SYNONYMS[words[0]]}'"
+    complain(f"{message}; '{path} --help' shows the usage")
     raise SystemExit(2) from None

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from osimlite.base.options import list_options
-from osimlite.cli import COMMANDS, create_app
+from osimlite.cli import COMMAND_SYNONYMS, COMMANDS, create_app
 from osimlite.cli._command import Command
 from osimlite.simulation.options import Options
 from tests.cli.support import loaded
@@ -129,3 +129,8 @@ def test_python_does_not_look_through_all_objects_at_the_end() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
     )
     assert done.stdout.split()[-1] == "True"
+
+
+def test_synonyms_name_commands_that_exist():
+    assert not {*COMMAND_SYNONYMS} & {*COMMANDS}
+    assert {words.split()[0] for words in COMMAND_SYNONYMS.values()} <= {*COMMANDS}

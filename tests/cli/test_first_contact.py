@@ -48,6 +48,7 @@ def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
         (("translate", "box.osim", "-o"), "'osimlite translate --help' shows the usage"),
         (("run-tool", "setup.xml", "--workers"), "'osimlite run --help' shows the usage"),
         (("--nothing",), "'osimlite --help' shows the usage"),
+        (("explain", "OSIM301"), "No such command 'explain', use 'rule'"),
     ],
 )
 def test_errors_lead_on(box: Path, words: tuple[str, ...], said: str) -> None:
