@@ -48,6 +48,8 @@ EXPONENTS = (-4, 6)
 """Powers of ten of ordinates beyond which a common power is written above the axis."""
 DPI = 110
 """Resolution of the pages, dots per inch: a page of twelve panels has 1,210 by 1,050 pixels."""
+FRACTION, MULTIPLE = "0–1", "× optimal force"
+"""Units of activations of muscles, and of controls of other actuators."""
 FORCE_UNITS = frozenset({"N", "N·m", "W"})
 """Units in which one table has sums of large terms, whose rounding errors are no curves."""
 NOISE = 1e-9
@@ -101,6 +103,7 @@ class Column(NamedTuple):
     group: str = ""  # body region, joint or coordinate to which it belongs
     section: str = ""  # title of the pages on which it is drawn, "" for none
     limits: tuple[float, ...] = ()  # bounds of the values in their unit, drawn as lines
+    range: tuple[float, float] | None = None  # ends of the ordinate; None to fit the values
 
 
 class PanelCurve(NamedTuple):
@@ -124,6 +127,7 @@ class Panel(NamedTuple):
     section: str = ""
     limits: tuple[float, ...] = ()
     band: Band | None = None  # reference, drawn where the abscissa is the gait cycle
+    range: tuple[float, float] | None = None  # ends of the ordinate; None to fit the values
 
 
 class Page(NamedTuple):
@@ -249,6 +253,7 @@ def group_columns(
                 column.group,
                 column.section,
                 column.limits,
+                range=column.range,
             ),
         )
         panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
@@ -279,7 +284,7 @@ def _describe_constant(column: Column, values: Array) -> str:
     finite_values = values[np.isfinite(values)]
     if not finite_values.size:
         return f"{column.name} (no values)"
-    unit = f" {column.unit}" if column.unit else ""
+    unit = f" {column.unit}" if column.unit not in ("", FRACTION, MULTIPLE) else ""
     # Rounding to 9 places turns rounding errors, such as 1e-17, into 0; adding 0.0 turns -0.0 into
     # 0.0.
     return f"{column.name} {0.0 + round(float(finite_values[0]), 9):.4g}{unit}"
@@ -461,6 +466,12 @@ def draw_panel(panel_axes: Any, panel: Panel, abscissa: str, *, cyclic: bool = F
         panel_axes.fill_between(percent, mean - deviation, mean + deviation, color="0.85", lw=0.0)
         panel_axes.plot(percent, mean, color="0.6", lw=1.0, zorder=1.0)
     style_axes(panel_axes, abscissa)
+    if panel.range is not None:
+        first, last = panel.range
+        margin = 0.05 * (last - first)
+        lowest, highest = panel_axes.get_ylim()
+        # Values outside of the range, such as those of a wrong table, are not cut off.
+        panel_axes.set_ylim(min(first - margin, lowest), max(last + margin, highest))
     title = panel.title.replace("_", " ")
     unit = f" ({panel.unit})" if panel.unit else ""
     height = find_title_height(panel_axes)

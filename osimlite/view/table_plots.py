@@ -26,6 +26,8 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath
 from osimlite.view.bands import Band, check_bands
 from osimlite.view.panels import (
+    FRACTION,
+    MULTIPLE,
     Column,
     StepTimes,
     draw_pages,
@@ -42,21 +44,24 @@ FORCE_OR_MOMENT = "N or N·m"
 SPEED = "m/s or rad/s"
 """Unit of the speed of an actuator about which nothing is known."""
 
+ACTIVATIONS = "Static Optimization"
+"""First line of tables of activations, which have the controls of other actuators too."""
+
 ACTUATOR_TABLES = (
     "ActuatorForces",
     "ActuatorSpeeds",
     "ActuatorPowers",
     "ModelForces",
     "controls",
-    "Static Optimization",
+    ACTIVATIONS,
 )
 """First lines of tables whose columns have the names of actuators and other forces."""
 
 TABLE_UNITS = {
     "ActuatorPowers": POWER,
     "ActuatorSpeeds": SPEED,
-    "controls": "",
-    "Static Optimization": "",
+    "controls": MULTIPLE,
+    ACTIVATIONS: MULTIPLE,
     "ActuatorForces": FORCE_OR_MOMENT,
     "ModelForces": FORCE_OR_MOMENT,
     "Length": "m",
@@ -73,8 +78,14 @@ TABLE_UNITS = {
     "FiberPassivePower": POWER,
     "TendonPower": POWER,
     "MusclePower": POWER,
+    "MuscleActuatorPower": POWER,
     "PennationAngle": "rad",
     "PennationAngularVelocity": "rad/s",
+    "NormalizedFiberLength": "× optimal length",
+    "NormFiberVelocity": "× maximal speed",
+    "PointPosition": "m",
+    "PointVelocity": "m/s",
+    "PointAcceleration": "m/s²",
     "marker errors": "m",
     "orientation errors": "rad",
 }
@@ -85,6 +96,29 @@ LABEL_UNITS = {"total_squared_error": "m²", "marker_error_RMS": "m", "marker_er
 
 ACRONYMS = {"cmc", "grf", "id", "ik", "rra", "so"}
 """Words in names of files that are written in capitals in titles."""
+
+TITLES = (
+    (r"StaticOptimization_activation", "Activations"),
+    (r"StaticOptimization_force", "Forces"),
+    (r"Actuation_force", "Forces of actuators"),
+    (r"Actuation_speed", "Speeds of actuators"),
+    (r"Actuation_power", "Powers of actuators"),
+    (r"BodyKinematics_pos_(?:global|bodyLocal)", "Positions of bodies"),
+    (r"BodyKinematics_vel_(?:global|bodyLocal)", "Velocities of bodies"),
+    (r"BodyKinematics_acc_(?:global|bodyLocal)", "Accelerations of bodies"),
+    (r"PointKinematics_(?P<name>.+)_pos", r"Position of \g<name>"),
+    (r"PointKinematics_(?P<name>.+)_vel", r"Velocity of \g<name>"),
+    (r"PointKinematics_(?P<name>.+)_acc", r"Acceleration of \g<name>"),
+    (r"Kinematics_q", "Coordinates"),
+    (r"Kinematics_u", "Speeds of coordinates"),
+    (r"Kinematics_dudt", "Accelerations of coordinates"),
+    (r"JointReaction_ReactionLoads", "Loads at joints"),
+    (r"MuscleAnalysis_MomentArm_(?P<name>.+)", r"Moment arms about \g<name>"),
+    (r"MuscleAnalysis_Moment_(?P<name>.+)", r"Moments of muscles about \g<name>"),
+    (r"MuscleAnalysis_Length", "Lengths of muscles and tendons"),
+    (r"MuscleAnalysis_(?P<name>.+)", r"\g<name>"),
+)
+"""Ends of the names of files that analyses of OpenSim write, and titles of their pages."""
 
 STATE_UNITS = {
     "fiber_length": "m",
@@ -190,7 +224,10 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
         # Values, speeds, activations and so on of a table of states come one after the other.
         quantity = _find_kind(label)
         section = SECTIONS.get(quantity, quantity.replace("_", " "))
-        columns.setdefault(quantity, []).append(column._replace(section=section))
+        column = column._replace(section=section)
+        if section == SECTIONS["activation"]:
+            column = column._replace(unit=FRACTION, range=(0.0, 1.0))
+        columns.setdefault(quantity, []).append(column)
     all_columns = [column for group in columns.values() for column in group]
     groups = split_sides(column.group for column in all_columns)
     return [column._replace(group=groups[column.group][0]) for column in all_columns]
@@ -250,7 +287,10 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
         unit = "m"
     elif table.name.startswith("Moment_"):
         unit = MOMENT
-    return Column(label, unit, values, names.regions.get(label, ""))
+    factor = 1.0
+    if unit.startswith("rad"):
+        factor, unit = np.degrees(1.0), unit.replace("rad", "deg", 1)
+    return Column(label, unit, factor * values, names.regions.get(label, ""))
 
 
 def _describe_actuator(label: str, values: Array, table: StoTable, names: ColumnNames) -> Column:
@@ -266,6 +306,11 @@ def _describe_actuator(label: str, values: Array, table: StoTable, names: Column
         unit = force or unit
     elif unit == SPEED:
         unit = {FORCE: "m/s", MOMENT: "rad/s"}.get(force, unit)
+    elif unit == MULTIPLE:
+        if label in names.regions:
+            return Column(label, FRACTION, values, group, range=(0.0, 1.0))
+        # Without a model, a muscle cannot be distinguished from another actuator.
+        unit = MULTIPLE if label in names.units else ""
     return Column(label, unit, values, group)
 
 
@@ -372,7 +417,22 @@ def plot_tables(
 
 
 def make_title(file_stem: str) -> str:
-    """Return the title of a picture from the name of its file."""
+    """Return the title of a picture from the name of its file: the name of the tool, and the quantity."""
+    for pattern, template in TITLES:
+        if match := re.fullmatch(rf"(?:(?P<tool>.*)_)?{pattern}", file_stem):
+            title = match.expand(template).replace("_", " ")
+            # Quantities of muscles have names such as "NormFiberVelocity".
+            if title in file_stem:
+                title = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title)
+                title = title.lower().replace("norm ", "normalized ")
+            if tool := match["tool"]:
+                return f"{_capitalize_words(tool)}, {title[:1].lower()}{title[1:]}"
+            return title[:1].upper() + title[1:]
+    return _capitalize_words(file_stem)
+
+
+def _capitalize_words(file_stem: str) -> str:
+    """Return the words of the name of a file, with acronyms and the first letter in capitals."""
     title = file_stem.strip("_").replace("_", " ")
     words = [word.upper() if word in ACRONYMS else word for word in title.split(" ")]
     text = " ".join(words)

@@ -20,7 +20,7 @@ from osimlite.view.panels import (
     split_sides,
     write_pages,
 )
-from osimlite.view.table_plots import ColumnNames, describe_columns, plot_tables
+from osimlite.view.table_plots import ColumnNames, describe_columns, make_title, plot_tables
 
 pytest.importorskip("matplotlib")
 
@@ -188,7 +188,7 @@ def table(name, columns, **options):
         ("Speeds", "RHip_rz", "deg/s", "RHip_rz"),
         ("walk", "/jointset/RHip/RHip_rz/value", "deg", "RHip_rz"),
         ("walk", "/jointset/RHip/RHip_rz/speed", "deg/s", "RHip_rz"),
-        ("walk", "/forceset/soleus_r/activation", "", "soleus_r"),
+        ("walk", "/forceset/soleus_r/activation", "0–1", "soleus_r"),
         ("walk", "/forceset/soleus_r/fiber_length", "m", "soleus_r"),
         ("walk", "soleus_r.fiber_length", "m", "soleus_r"),
         ("Inverse Dynamics Generalized Forces", "RHip_rz_moment", "N·m", "RHip_rz"),
@@ -204,6 +204,11 @@ def table(name, columns, **options):
         ("ActuatorPowers", "soleus_r", "W", "soleus_r"),
         ("MomentArm_knee_angle_r", "soleus_r", "m", "soleus_r"),
         ("FiberForce", "soleus_r", "N", "soleus_r"),
+        ("MuscleActuatorPower", "soleus_r", "W", "soleus_r"),
+        ("PennationAngle", "soleus_r", "deg", "soleus_r"),
+        ("NormalizedFiberLength", "soleus_r", "× optimal length", "soleus_r"),
+        ("NormFiberVelocity", "soleus_r", "× maximal speed", "soleus_r"),
+        ("PointVelocity", "state_0", "m/s", "state_0"),
         ("something else", "a", "", "a"),
     ],
 )
@@ -211,6 +216,42 @@ def test_columns_have_the_units_of_their_tables(name, label, unit, words):
     names = ColumnNames.from_model(None, build_mechanism(dynamic_walker()))
     (column,) = describe_columns(table(name, {label: wave()}), names)
     assert (column.unit, column.name) == (unit, words)
+
+
+def test_activations_and_controls_have_units() -> None:
+    names = ColumnNames({}, {"soleus_r": "N", "lumbar": "N·m"}, {"soleus_r": "tibia – calcn"})
+    values = {"soleus_r": 0.2 + 0.1 * wave(), "lumbar": wave(), "unknown": wave()}
+    columns = describe_columns(table("Static Optimization", values), names)
+    assert [column.unit for column in columns] == ["0–1", "× optimal force", ""]
+    (figure,) = drawn(panels_of(columns)[0])
+    # Small activations look small.
+    lowest, highest = figure.axes[0].get_ylim()
+    assert lowest <= 0.0 and 1.0 <= highest < 1.1
+    constant = describe_columns(table("Static Optimization", {"soleus_r": 0.5 + 0 * TIMES}), names)
+    assert panels_of(constant)[1] == "Constant: soleus_r 0.5"
+
+
+@pytest.mark.parametrize(
+    ("file_stem", "title"),
+    [
+        ("so_StaticOptimization_activation", "SO, activations"),
+        ("StaticOptimization_activation", "Activations"),
+        ("walk_1_BodyKinematics_pos_global", "Walk 1, positions of bodies"),
+        ("so_Kinematics_q", "SO, coordinates"),
+        ("so_PointKinematics_knee_pos", "SO, position of knee"),
+        (
+            "so_MuscleAnalysis_MomentArm_knee_angle_r",
+            "SO, moment arms about knee angle r",
+        ),
+        ("so_MuscleAnalysis_NormFiberVelocity", "SO, normalized fiber velocity"),
+        ("MuscleAnalysis_PennationAngle", "Pennation angle"),
+        ("so_JointReaction_ReactionLoads", "SO, loads at joints"),
+        ("ik", "IK"),
+        ("walk_states", "Walk states"),
+    ],
+)
+def test_titles_name_the_quantity_of_a_table(file_stem: str, title: str) -> None:
+    assert make_title(file_stem) == title
 
 
 def test_angles_are_in_degrees_whatever_the_table_has():

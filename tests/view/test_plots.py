@@ -169,7 +169,7 @@ def test_states_of_a_kind_share_pages_and_probes_have_theirs():
     assert panel.get_lines()[0].get_ydata().tolist() == list(range(12))
     figure = laid_out(figures["states.png"])
     assert figure.get_suptitle() == "States: activations"
-    assert titles(figure) == [f"m{index}" for index in range(9)]
+    assert titles(figure) == [f"m{index} (0–1)" for index in range(9)]
     figure = laid_out(figures["states-2.png"])
     assert titles(figure)[8] == "m8 (m)"
     assert figure.axes[8].get_lines()[0].get_ydata() == pytest.approx(8.0 + waves)
