@@ -17,11 +17,11 @@ Vary = Annotated[
     Option(
         "--vary",
         metavar="NAME=RANGE",
-        help="Range LOW:HIGH (:log at the end: logarithmic scale; in a sweep also LOW:HIGH:COUNT) of a coordinate, "
-        "COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a parameter of the model "
-        "function or the controller (default: all its parameters). MUSCLE/control@0:0.5:6 varies six nodes from 0 "
-        "to 0.5 s, @switch1 the time of a switch. Names with * and ? or commas share one value; {*} makes one "
-        "variable for each match.",
+        help="NAME: a coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a "
+        "parameter of the model function or controller (default: all of these parameters). RANGE: LOW:HIGH "
+        "(LOW:HIGH:log for a logarithmic scale, LOW:HIGH:COUNT in a sweep). MUSCLE/control@0:0.5:6 varies six nodes "
+        "from 0 to 0.5 s, @switch1 the time of a switch. Names with * and ? or commas share one value; {*} makes "
+        "one variable for each match.",
         show_default=False,
     ),
 ]

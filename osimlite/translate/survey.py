@@ -21,7 +21,7 @@ from osimlite.simulation.robot.couplings import Mimic, find_mimics, list_coupler
 from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
-COMPUTE_ADVICE = "compute its value as .coordinates.json says"
+COMPUTE_ADVICE = "your program computes its value by the function in .coordinates.json"
 """Advice for a joint that the robot file leaves free."""
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
@@ -311,7 +311,7 @@ class _Survey:
                 "coordinate-function",
                 path,
                 "a joint that follows a function of a coordinate",
-                f"a joint of its own: {COMPUTE_ADVICE}"
+                f"a separate joint: {COMPUTE_ADVICE}"
                 if mimic is None
                 else "a joint that mimics another",
                 f"joint {robot_joint.name}" + ("" if mimic is None else f" follows {mimic.leader}"),
@@ -336,7 +336,7 @@ class _Survey:
                 "coupler",
                 coupler.name,
                 "a coordinate that is a function of others",
-                f"a joint of its own: {COMPUTE_ADVICE}"
+                f"a separate joint: {COMPUTE_ADVICE}"
                 if leader is None
                 else "a joint that mimics another",
                 f"coordinate {name}" + ("" if leader is None else f" follows joint {leader}"),

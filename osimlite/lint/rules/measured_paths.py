@@ -175,7 +175,7 @@ RATE = Threshold(
     "resting-point",
     0.005,
     "m per rad or m",
-    "largest accepted computed speed of a point that stays in place outside the range",
+    "largest accepted rate at which OpenSim lets a point move beyond the range of its coordinate",
 )
 
 
@@ -235,9 +235,10 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
             )
         else:
             report(
-                f"nothing keeps '{end.coordinate}' in its range: outside it, {names} stays in place, "
-                "but OpenSim computes path speeds and moment arms as if it still moved, by "
-                f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}",
+                f"{names} stays in place outside the range of '{end.coordinate}', but OpenSim "
+                "computes path speeds and moment arms as if it still moved, by "
+                f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}; add a "
+                "CoordinateLimitForce",
                 owner,
                 severity=INFO,
             )

@@ -164,7 +164,7 @@ def _add_argument_joint(draft: MjcfDraft, coordinate_index: int) -> Lead:
         "argument",
         coordinate.path,
         "a coordinate that no axis moves by, but only functions of it",
-        "a joint of its own, which turns a small body",
+        "a separate joint, which turns a small body",
         f"joint {name}, {inertia:.3g} kg m^2",
     )
     draft.leads[coordinate_index] = Lead(name, StraightLine(1.0, 0.0))
