@@ -25,7 +25,7 @@ def faulty(tmp_path):
 def test_a_sound_model_is_exit_0():
     done = run("validate", WALKER, "--format", "concise")
     assert done.code == 0 and done.err == ""
-    assert done.out.endswith(" info in 1 file.\n")
+    assert done.out.endswith(" infos in 1 file.\n")
 
 
 def test_an_error_is_exit_1(faulty):

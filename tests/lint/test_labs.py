@@ -104,7 +104,7 @@ def test_units_of_markers_beside_the_model(tmp_path: Path, factor: float, said: 
     found = codes(folder / "ik.xml")
     assert ("OSIM857" in found) == bool(said)
     if said:
-        assert found["OSIM857"].endswith(f"are they in {said}?")
+        assert found["OSIM857"].endswith(f"are the numbers in {said}?")
 
 
 def test_sides_that_are_not_swapped(tmp_path: Path) -> None:

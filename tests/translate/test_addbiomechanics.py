@@ -22,7 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     files.write_subject(place / "it.b3d", (40, 30))
     code, out, error = run("convert", "it.b3d", "-o", "subject", folder=place)
     assert code == 0, error
-    assert "parts:" in out and "wrote subject/models/kinematics.osim" in out
+    assert "components: " in out and "wrote subject/models/kinematics.osim" in out
     return place / "subject"
 
 

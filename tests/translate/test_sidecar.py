@@ -306,7 +306,7 @@ def test_curved_couplers_circles_and_locks_are_left_to_the_file():
     urdf = to_urdf(chain((1, 0, curve), (3, 1, LinearFunction(coefficients=(3.0, 0.0)))))
     assert mimic_lines(urdf.text) == ['<mimic joint="b" multiplier="3"/>']
     done = [r.done for r in urdf.fidelity if r.kind == "coupler"]
-    assert "file of coordinates" in done[0] and "mimics" in done[1]
+    assert ".coordinates.json" in done[0] and "mimics" in done[1]
     line = LinearFunction(coefficients=(1.0, 0.0))
     circle = to_urdf(chain((0, 1, line), (1, 0, line), count=2))
     assert len(mimic_lines(circle.text)) == 1

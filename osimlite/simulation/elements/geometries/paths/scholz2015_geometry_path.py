@@ -29,7 +29,6 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     surface_value,
 )
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.kernels.wrap_curves import MOST
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
@@ -203,7 +202,8 @@ class Cable:
             # As Python, kernels raise where machine code gets NaN: a path that is normal to a plane
             # at its hint has no direction on it.
             return None
-        if np.isnan(work[PATH_WORK.LENGTH]):
+        # A search that lifted off keeps what was not a number in the obstacle's record.
+        if np.isnan(work).any():
             return None
         kept = ints[CABLE.ELEMENTS + ELEMENT.KEPT :: ELEMENT.SIZE].tolist()
         return Cable(
