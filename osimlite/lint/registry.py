@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from osimlite.schema.base import Object
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
-REFUSES, FAILS, NAN, RUNS = Consequence
+REFUSES, FAILS = Consequence.REFUSES, Consequence.FAILS
+NAN, RUNS = Consequence.NAN, Consequence.RUNS
 
 FAMILIES = {
     "0": "text",

@@ -937,6 +937,8 @@ def old_names() -> list[Case]:
         old("used by a set of controls", RUNS, FORCES=drive("a t"), CONTROLLERS=control_of_set),
         old("used as OpenSim writes it", RUNS, COORDINATE="a q", FORCES=drive("t", "aq")),
         old("used by nobody", RUNS, COORDINATE="a q"),
+        old("at the beginning", RUNS, COORDINATE=" aq", FORCES=drive("t", "aq")),
+        old("at the ends of name and reference", RUNS, COORDINATE="aq ", FORCES=drive("t", " aq")),
     ]
 
 

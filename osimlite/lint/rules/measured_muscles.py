@@ -24,8 +24,8 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
     Reports muscles with an elastic tendon whose fibers, in the default pose and at their default
     activation, start more than 0.1 optimal fiber lengths from their equilibrium length, or whose
     tension is off by more than 0.1 `max_isometric_force`. A muscle that has no equilibrium in the
-    default pose is reported as a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle are
-    checked.
+    default pose is reported as a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and
+    DeGrooteFregly2016Muscle are checked.
 
     OpenSim equilibrates muscles only on request (`solve_for_equilibrium_for_auxiliary_states` of
     ForwardTool, Model::equilibrateMuscles); otherwise fibers start with `default_fiber_length`, 0.1

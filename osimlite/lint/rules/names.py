@@ -76,8 +76,8 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     Reports white space, `/`, `\`, `*` and `+` in the names of components.
 
     Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
-    removes white space from the names, but not from references to them: it refuses the file unless
-    only groups and controllers use the name.
+    removes white space from the names, but from references to them only at their ends: it refuses
+    the file unless only groups and controllers use a name with white space inside.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -121,8 +121,12 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
             name = subject.source.text[start : start + position.length]
             if any(character.isspace() for character in name) and not name.startswith("<"):
                 better = "".join(name.split())
-                users = list_old_references(subject, subject.source, name)
-                is_used = subject.source.text.count(name) > 1
+                # OpenSim removes white space at the ends of references, too.
+                has_inner_space = len(name.split()) > 1
+                users = (
+                    list_old_references(subject, subject.source, name) if has_inner_space else []
+                )
+                is_used = has_inner_space and subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
                 consequence = f"OpenSim makes it '{better}'" + (
                     ", but not where others use it" if is_used else ""

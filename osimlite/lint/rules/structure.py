@@ -37,8 +37,8 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
     a model has no forces. In setups, properties of older versions are a warning, or an info if the
     element is empty or disables something that is disabled anyway. A misspelt element with the
     default value is a warning too, as is one that no version reads, such as the `<location>` of a
-    MovingPathPoint. A `<Comment>` is an info. Of several elements with
-    the same tag only the first is reported, with the number of the others.
+    MovingPathPoint. A `<Comment>` is an info. Of several elements with the same tag only the first
+    is reported, with the number of the others.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
