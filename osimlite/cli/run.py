@@ -296,7 +296,7 @@ def _print_outcome(setup: Path, outcome: Outcome) -> None:
     from osimlite.base.text import format_count
     from osimlite.cli._console import FactTable
 
-    facts = FactTable(str(setup), outcome.notices)
+    facts = FactTable(str(setup), outcome.messages)
     # Findings with a suggestion were shown before the run.
     unreported = [finding for finding in outcome.warnings if finding.suggestion is None]
     for finding in unreported[:MOST_WARNINGS]:
@@ -331,8 +331,8 @@ def _show_trials(trials: list[RunRecord]) -> None:
         visible_trials = worst[-MOST_ROWS:][::-1]
     rows = []
     for trial in visible_trials:
-        result_text = trial.message or "; ".join(
-            f"{name}: {fact}" for name, fact in trial.notices[:2]
+        result_text = trial.failure or "; ".join(
+            f"{name}: {fact}" for name, fact in trial.messages[:2]
         )
         if trial.warnings:
             remark = (

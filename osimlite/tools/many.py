@@ -51,10 +51,12 @@ class RunRecord:
 
     setup: str  # file of the setup
     status: str  # one of `STATUSES`
-    notices: list[tuple[str, str]] = field(default_factory=list)  # subjects, and what was noticed
+    messages: list[tuple[str, str]] = field(
+        default_factory=list
+    )  # subjects, and what is said of them
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the result
     files: list[str] = field(default_factory=list)  # written files
-    message: str = ""  # reason of the failure
+    failure: str = ""  # reason of the failure
     # Findings of the check that are not errors; those with a suggestion first.
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0  # duration
@@ -176,7 +178,7 @@ def _report_clashes(trials: Sequence[RunRecord]) -> None:
             if writer is not trial:
                 for failed, another in ((trial, writer), (writer, trial)):
                     failed.status = FAILED
-                    failed.message = (
+                    failed.failure = (
                         f"'{another.setup}' writes '{file}' as well; "
                         "give each setup a results folder of its own, or use -o FOLDER"
                     )
@@ -257,14 +259,14 @@ def _run_one(
         )
     except OsimliteError as error:
         return RunRecord(
-            str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started
+            str(setup), FAILED, failure=str(error), seconds=time.perf_counter() - started
         )
     if outcomes is not None:
         outcomes[setup] = outcome
     return RunRecord(
         str(setup),
         DONE if outcome.done else NO,
-        outcome.notices,
+        outcome.messages,
         _to_json_values(outcome.summary),
         files=[str(file) for file in outcome.files],
         warnings=[str(finding) for finding in outcome.warnings],
@@ -354,21 +356,21 @@ def read_record(line: bytes) -> RunRecord | None:
             case {
                 "setup": str(),
                 "status": str(status),
-                "notices": [*notices],
+                "messages": [*messages],
                 "summary": {**_summary},
                 "files": [*files],
-                "message": str(),
+                "failure": str(),
                 "warnings": [*warnings],
                 "seconds": int() | float(),
                 "digest": str(),
                 "was_done": bool(),
             } as values if status in STATUSES:
-                pairs = [(subject, notice) for subject, notice in notices]
+                pairs = [(subject, text) for subject, text in messages]
                 texts = (*files, *warnings, *(text for pair in pairs for text in pair))
                 # The table of all runs is sorted by this number, so it must be one.
                 error = values["summary"].get("rms_marker_error", 0.0)
                 if isinstance(error, int | float) and all(isinstance(text, str) for text in texts):
-                    return RunRecord(**{**values, "notices": pairs})
+                    return RunRecord(**{**values, "messages": pairs})
     # A damaged line only means that its setup runs again.
     except (ValueError, TypeError, RecursionError):
         pass
@@ -411,7 +413,7 @@ class _Schedule:
                 ]
                 if failed_needs:
                     message = f"it needs results of {join_words(failed_needs)}, which failed"
-                    self.record_run(RunRecord(str(setup), WAITED, message=message))
+                    self.record_run(RunRecord(str(setup), WAITED, failure=message))
                 elif (trial := self.journal.find_finished(setup)) is not None:
                     self.record_run(trial)
                 else:
@@ -467,7 +469,7 @@ class _Schedule:
                         self.record_run(pool.result()[1])
                 except WorkerLostError:
                     self.record_run(
-                        RunRecord(str(setup), FAILED, message="the process that ran it died twice")
+                        RunRecord(str(setup), FAILED, failure="the process that ran it died twice")
                     )
 
 

@@ -44,8 +44,8 @@ class Outcome:
 
     tables: dict[str, StoTable] = field(default_factory=dict)  # tables by the names of their files
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the results
-    # Notices about the results: the subject, and what was noticed about it.
-    notices: list[tuple[str, str]] = field(default_factory=list)
+    # Messages about the results: the subject, and what is said of it.
+    messages: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)  # written files
     # Findings about the setup, and files that it names, that are not errors; those with a
     # suggestion first.
@@ -60,9 +60,9 @@ class Outcome:
 
     @property
     def told(self) -> list[tuple[str, str]]:
-        """Former name of `notices`."""
-        warn("use notices", DeprecatedWarning, stacklevel=2)
-        return self.notices
+        """Former name of `messages`."""
+        warn("use messages", DeprecatedWarning, stacklevel=2)
+        return self.messages
 
     def __repr__(self) -> str:
         status = "done" if self.done else "not done"
@@ -70,7 +70,7 @@ class Outcome:
             f"{format_count(len(self.tables), 'table')}, {format_count(len(self.files), 'file')}"
         )
         lines = [f"Outcome: {status}, {counts}"]
-        lines += [f"{name}: {message}" for name, message in self.notices[:MAX_LISTED]]
+        lines += [f"{name}: {message}" for name, message in self.messages[:MAX_LISTED]]
         lines += [str(path) for path in self.files[:MAX_LISTED]]
         if (omitted_count := len(self.files) - MAX_LISTED) > 0:
             lines.append(f"... and {format_count(omitted_count, 'more file')}")
@@ -79,7 +79,7 @@ class Outcome:
     def _repr_html_(self) -> str:
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(message)}</td></tr>"
-            for name, message in [*self.notices, *(("file", str(path)) for path in self.files)]
+            for name, message in [*self.messages, *(("file", str(path)) for path in self.files)]
         )
         status = "done" if self.done else "not done"
         return f"<div>Outcome: {status}</div><table>{rows}</table>"
@@ -134,7 +134,7 @@ class Outcome:
             name: what the message is about, one to three words.
             message: the message.
         """
-        self.notices.append((name, message))
+        self.messages.append((name, message))
 
     def add_warning(self, name: str, message: str) -> None:
         """Add a message that makes the results doubtful, and print it on standard error.
@@ -157,7 +157,7 @@ class Outcome:
             return ""
         names = join_words([f"'{table.columns[index]}'" for index in np.flatnonzero(missing)])
         # One message suffices: all tables of a motion lack numbers for the same reason.
-        if not any("NaN" in message for _, message in self.notices):
+        if not any("NaN" in message for _, message in self.messages):
             self.add_message(
                 "not a number", f"{path.name} has NaN where there is no value: {names}"
             )

@@ -134,7 +134,7 @@ def _render_messages(trial: TrialOutcomes) -> Iterator[str]:
             setup = trial.setups[index]
             tool = f"{type(get_object(str(setup))).__name__}, {setup.name}"
         source = html.escape(tool)
-        for name, message in outcome.notices:
+        for name, message in outcome.messages:
             yield (
                 f'<tr><td class="source">{source}</td><th>{html.escape(name)}</th>'
                 f"<td>{html.escape(message)}</td></tr>"

@@ -390,7 +390,7 @@ def test_tables_of_tools_say_where_they_have_nan(tmp_path: Path) -> None:
         '<OpenSimDocument Version="40600"><InverseDynamicsTool name="a"/></OpenSimDocument>'
     )
     outcome.write(setup, ResultWriter.for_document(setup))
-    assert outcome.notices == [("not a number", "old.sto has NaN where there is no value: 'a'")]
+    assert outcome.messages == [("not a number", "old.sto has NaN where there is no value: 'a'")]
     for name in ("old.sto", "new.sto"):
         head, _, _ = (tmp_path / name).read_text().partition("endheader")
         assert "NaN stands where there is no value: 'a'" in head

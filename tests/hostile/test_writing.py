@@ -179,12 +179,12 @@ def test_a_pipe_in_the_place_of_the_journal(study: Path, words: tuple[str, ...])
 @pytest.mark.parametrize(
     "damage",
     [
-        {"notices": 5},
-        {"notices": [["a"]]},
-        {"notices": [["a", 1]]},
+        {"messages": 5},
+        {"messages": [["a"]]},
+        {"messages": [["a", 1]]},
         {"files": 5},
         {"files": [5]},
-        {"message": [5]},
+        {"failure": [5]},
         {"warnings": {"a": 1}},
         {"warnings": [1]},
         {"summary": []},

@@ -97,7 +97,7 @@ def test_setups_are_run_and_tell_the_motion_too(tmp_path):
     osimlite.write(squat(tmp_path, mesh_interval=0.2), tmp_path / "setup.xml")
     outcome = osimlite.run(tmp_path / "setup.xml", simulates=True)
     assert outcome.done
-    assert ("not simulated", "the motion is prescribed") in outcome.notices
+    assert ("not simulated", "the motion is prescribed") in outcome.messages
     page = osimlite.report({tmp_path / "setup.xml": outcome}, tmp_path / "page.html").read_text(
         encoding="utf-8"
     )

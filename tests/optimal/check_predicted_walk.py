@@ -112,7 +112,7 @@ def test_a_report_shows_what_was_found(walk):
     file = folder / "human-walks.omoco"
     outcome, problem = Outcome(), osimlite.moco.build_problem(file)
     report_solution(Job(problem.study, file, simulates=True), problem, found, outcome)
-    told = dict(outcome.notices)
+    told = dict(outcome.messages)
     assert {"effort", "roughness", "objective"} <= {*told}
     near = re.fullmatch(
         r"within 0\.01 rad or m of it up to (\S+) s of (\S+) s, (\S+) off at the end \(\w+\)",

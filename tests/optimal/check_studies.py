@@ -181,12 +181,14 @@ def test_a_failure_names_more_violations_than_a_solution(success, name, count, t
     report_solution(Job(problem.study, tmp_path / "study.omoco"), problem, solution, outcome)
     assert outcome.done is success
     told = [
-        words for title, words in outcome.notices if title in ("largest violation", "not fulfilled")
+        words
+        for title, words in outcome.messages
+        if title in ("largest violation", "not fulfilled")
     ]
     assert told == [str(violation) for violation in violations[:count]]
-    assert (name, told[0]) in outcome.notices
+    assert (name, told[0]) in outcome.messages
     # Nobody has asked for a simulation of the solution.
-    assert not {"simulated", "not simulated"} & {title for title, _ in outcome.notices}
+    assert not {"simulated", "not simulated"} & {title for title, _ in outcome.messages}
 
 
 def test_an_interrupt_keeps_the_best_so_far(tmp_path):

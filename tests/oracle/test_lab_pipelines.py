@@ -72,7 +72,7 @@ def test_a_muscle_without_equilibrium(tmp_path: Path, which: str) -> None:
         ("hip_flexion_reserve", np.zeros_like(calf)),
     ):
         assert (np.isnan(forces[column]) == rows).all(), column
-    words = [said for name, said in result.notices if name == "no equilibrium"]
+    words = [said for name, said in result.messages if name == "no equilibrium"]
     for name, rows in (("calf", calf), ("quad", quad)):
         assert any(
             f"/forceset/{name}'" in said and f"at {rows.sum()} of 51 moments" in said
@@ -85,7 +85,7 @@ def compare_runs(folder: Path, setup: str, tolerance: float = 2e-6) -> None:
     ran, log = run_opensim(folder / setup, folder / "theirs")
     assert ran, log
     result = osimlite.run(folder / setup, folder / "ours")
-    assert result.done, result.notices
+    assert result.done, result.messages
     assert result.tables
     for name, table in result.tables.items():
         if name.endswith("_states.sto"):

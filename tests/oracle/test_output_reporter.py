@@ -116,7 +116,7 @@ def test_what_is_no_number_is_left_out_and_told(
     )
     labels = read_sto(theirs / "it_OutputsVec3.sto").columns
     assert read_sto(ours / "it_OutputsVec3.sto").columns == labels and "here_x" in labels
-    told = dict(osimlite.run(tmp_path / "ours.xml").notices)["O"]
+    told = dict(osimlite.run(tmp_path / "ours.xml").messages)["O"]
     assert "rotation" in told and "left out" in told
 
 

@@ -76,7 +76,7 @@ def tracked(
         [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
     )
     outcome = osimlite.run(folder / "ours.xml")
-    assert outcome.done, outcome.notices
+    assert outcome.done, outcome.messages
     # OpenSim's table of states has two headers.
     names = [
         path.name

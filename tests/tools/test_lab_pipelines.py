@@ -88,7 +88,7 @@ def test_given_forces_are_not_doubted(tmp_path: Path, probe: str, start: str) ->
         warnings.simplefilter("error", DoubtfulWarning)
         first = osimlite.run(folder / "so.xml")
         result = osimlite.run(folder / "jr.xml")
-    assert "probe" not in str(result.notices).lower() + str(first.notices).lower()
+    assert "probe" not in str(result.messages).lower() + str(first.messages).lower()
 
 
 def test_given_forces_that_end_early_are_told(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_lock_is_named(tmp_path: Path, setup: str) -> None:
     folder = copy_lab("locked", tmp_path)
     result = osimlite.run(folder / setup, folder / "out")
     assert result.done
-    said = dict(result.notices)["pelvis_tx"]
+    said = dict(result.messages)["pelvis_tx"]
     assert "locked at 0 m" in said
     (errors,) = (table for name, table in result.tables.items() if name.endswith("_pErr.sto"))
     assert (errors["pelvis_tx"] == 0.0).all()
@@ -276,7 +276,7 @@ def test_inverse_dynamics_of_columns_by_paths(tmp_path: Path) -> None:
     (folder / "walk.mot").write_text(text)
     result = osimlite.run(folder / "id.xml", folder / "two")
     assert (next(iter(result.tables.values())).rows == by_path.rows).all()
-    assert "columns" not in dict(result.notices)
+    assert "columns" not in dict(result.messages)
 
 
 CHAINED = """<OpenSimDocument Version="40600"><InverseDynamicsTool name="id"><results_directory>.</results_directory>

@@ -142,8 +142,8 @@ def test_two_that_write_one_file_are_told(trials: Path, monkeypatch: pytest.Monk
     for trial, other in ((one, two), (two, one)):
         assert (
             trial.status == "failed"
-            and f"'{other.setup}' writes" in trial.message
-            and "-o FOLDER" in trial.message
+            and f"'{other.setup}' writes" in trial.failure
+            and "-o FOLDER" in trial.failure
         )
 
 

@@ -75,7 +75,7 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
     assert (
         "current folder",
         "contains walk.mot, which the folder of the setup lacks",
-    ) in osimlite.run("trial/setup.xml").notices
+    ) in osimlite.run("trial/setup.xml").messages
     done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
     assert done.out.count("current folder: contains walk.mot,") == 1
 
@@ -188,7 +188,7 @@ def test_a_study_with_a_property_that_nothing_knows_is_not_searched_for(repo, tm
         osimlite.run(tmp_path / "slide.omoco")
 
 
-def test_the_former_name_of_notices_warns() -> None:
-    outcome = Outcome(notices=[("thigh", "was scaled")])
-    with pytest.warns(DeprecatedWarning, match="use notices"):
+def test_the_former_name_of_messages_warns() -> None:
+    outcome = Outcome(messages=[("thigh", "was scaled")])
+    with pytest.warns(DeprecatedWarning, match="use messages"):
         assert outcome.told == [("thigh", "was scaled")]

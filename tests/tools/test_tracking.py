@@ -115,7 +115,7 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
     )
     written(folder, pendulum(1.0, **bounds), "CMCTool")
     outcome = osimlite.run(folder / "setup.xml")
-    told = dict(outcome.notices)
+    told = dict(outcome.messages)
     assert (
         not outcome.done
         and "missing: " in told["ended early"]
@@ -194,7 +194,7 @@ def test_a_coordinate_may_have_no_actuator(tmp_path: Path, tool: str) -> None:
     model.add(pin)
     written(tmp_path, model, tool)
     outcome = osimlite.run(tmp_path / "setup.xml")
-    assert outcome.done, outcome.notices
+    assert outcome.done, outcome.messages
     states = outcome.tables["it_states.sto"]
     wanted = 0.2 * np.sin(4.0 * states.times)
     assert states["/jointset/pin/angle/value"] == pytest.approx(wanted, abs=1e-3)

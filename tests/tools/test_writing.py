@@ -160,7 +160,7 @@ def test_more_digits_than_there_are(trial: Path) -> None:
 
 def test_markers_without_weights_are_not_told_to_be_unseen(trial: Path) -> None:
     """The weight of a task of OpenSim's is 0 unless it is given."""
-    told = osimlite.run(trial / "scale.xml").notices
+    told = osimlite.run(trial / "scale.xml").messages
     words = (
         "1 frame without any measurement that has a weight: the pose of the frame before is kept"
     )
