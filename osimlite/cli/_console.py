@@ -268,7 +268,7 @@ def add_row(table: Table, *cells: str) -> None:
 
 
 MAX_PATH_LINES = 3
-"""Number of lines up to which the files of a command are listed with their folder each."""
+"""Largest number of lines of a list of files in which each file is written with its folder."""
 
 TEXT_COLUMN_GAP = 2
 """Blanks between the columns of a table."""

@@ -24,7 +24,8 @@ def fit(
         Option(
             "--hold",
             metavar="NAME",
-            help="Keep this marker's position in the model, as by default of markers that are fixed in it; may be repeated.",
+            help="Keep this marker's position in the model, and fit those of all others; may be repeated. "
+            "By default the markers with <fixed> true keep theirs.",
         ),
     ] = None,
     weight: options.Weights = None,

@@ -68,8 +68,8 @@ def muscles(
 ) -> None:
     """Compute lengths, moment arms, fiber lengths and forces of muscles over a coordinate, like OpenSim's plotter.
 
-    Fibers are in equilibrium with their tendons at the activation of --activation, and the model is at rest. Prints
-    the minimum and maximum for each muscle; -o writes every number.
+    Fibers are in equilibrium with their tendons at the activation that --activation gives, and the
+    model is at rest. Prints the minimum and maximum for each muscle; -o writes every number.
 
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
     """

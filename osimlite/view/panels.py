@@ -48,26 +48,31 @@ EXPONENTS = (-4, 6)
 """Powers of ten of ordinates beyond which a common power is written above the axis."""
 DPI = 110
 """Resolution of the pages, dots per inch: a page of twelve panels has 1,210 by 1,050 pixels."""
-FRACTION, MULTIPLE = "0–1", "× optimal force"
-"""Units of activations of muscles, and of controls of other actuators."""
+FRACTION = "0–1"
+"""Unit of activations of muscles."""
+MULTIPLE = "× optimal force"
+"""Unit of controls of actuators that are no muscles."""
 FORCE_UNITS = frozenset({"N", "N·m", "W"})
-"""Units in which one table has sums of large terms, whose rounding errors are no curves."""
+"""Units of sums of large terms. A sum that should be zero has a rounding error instead."""
 NOISE = 1e-9
 """Force, moment or power that counts as zero, relative to the largest one of a table."""
 
-# Places on a page, inches. Matplotlib could find them by measuring all its labels, which takes
-# longer than drawing them; the labels of all pages have the same sizes, so that nothing is gained.
+# The panels have fixed places. Matplotlib's constrained layout measures all labels to find places,
+# which takes longer than drawing the page, and the labels have the same sizes on all pages.
 TITLE_HEIGHT_IN = 0.5
+"""Height of the title of a page, inches."""
 PANEL_HEIGHT_IN = 2.15
+"""Height of a panel with its margins, inches."""
 PANEL_WIDTH_IN = 3.6
+"""Width of a panel with its margins, inches."""
 PANEL_MARGINS_IN = {"left": 0.62, "right": 0.1, "bottom": 0.26, "top": 0.34}
-"""Room around the axes of a panel for ticks, label and title."""
+"""Margins around the axes of a panel for ticks, label and title, inches."""
 LABEL_HEIGHT_IN = 0.16
-"""Room for the label of the abscissa, which only the lowest panel of a column has."""
+"""Height of the label of the abscissa, which only the lowest panel of a column has, inches."""
 NOTE_LINE_IN = 0.15
-"""Height of a line of the note."""
+"""Height of a line of the note, inches."""
 LETTERS_PER_INCH = 12.0
-"""Letters of a title of 10 points in an inch."""
+"""Number of letters of a title of 10 points in an inch."""
 
 _SIDE_TOKENS = (
     (re.compile(r"(?:^|(?<=[._/ ]))[rl](?=[._/ ]|$)"), {"r": "l", "l": "r"}),
@@ -103,7 +108,7 @@ class Column(NamedTuple):
     group: str = ""  # body region, joint or coordinate to which it belongs
     section: str = ""  # title of the pages on which it is drawn, "" for none
     limits: tuple[float, ...] = ()  # bounds of the values in their unit, drawn as lines
-    range: tuple[float, float] | None = None  # ends of the ordinate; None to fit the values
+    y_range: tuple[float, float] | None = None  # ends of the ordinate; None to fit the values
 
 
 class PanelCurve(NamedTuple):
@@ -127,7 +132,7 @@ class Panel(NamedTuple):
     section: str = ""
     limits: tuple[float, ...] = ()
     band: Band | None = None  # reference, drawn where the abscissa is the gait cycle
-    range: tuple[float, float] | None = None  # ends of the ordinate; None to fit the values
+    y_range: tuple[float, float] | None = None  # ends of the ordinate; None to fit the values
 
 
 class Page(NamedTuple):
@@ -137,12 +142,7 @@ class Page(NamedTuple):
     rows: list[list[Panel]]
     abscissa: str  # label of the abscissa
     note: str = ""  # sentences below the panels
-    section: str = ""  # section of the panels
     cyclic: bool = False  # whether curves are drawn over the gait cycle
-
-    def draw(self) -> Any:
-        """Return the figure of the page."""
-        return _draw_page(self)
 
 
 def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -253,7 +253,7 @@ def group_columns(
                 column.group,
                 column.section,
                 column.limits,
-                range=column.range,
+                y_range=column.y_range,
             ),
         )
         panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
@@ -313,27 +313,19 @@ def merge_panels(panels: Iterable[Panel]) -> list[Panel]:
 def draw_pages(
     title: str, panels: Sequence[Panel], *, abscissa: str = "time (s)", note: str = ""
 ) -> Iterator[Any]:
-    """Yield the figures of the pages that `plan_pages` returns for the same arguments."""
-    for page in plan_pages(title, panels, abscissa=abscissa, note=note):
-        yield page.draw()
-
-
-def plan_pages(
-    title: str, panels: Sequence[Panel], *, abscissa: str = "time (s)", note: str = ""
-) -> list[Page]:
-    """Divide panels into pages, with at most `MAX_PANELS` on each.
+    """Yield the figures of panels, at most `MAX_PANELS` on each.
 
     Curves are drawn over the gait cycle if there is a complete cycle for each of them, otherwise
     over time, with lines at foot strikes and toe-offs, which the note of each page explains.
 
     Args:
-        title: title of the pages; "" for none.
-        panels: what to draw; without any panel there is no page.
+        title: title of the figures; "" for none.
+        panels: what to draw; without any panel there is no figure.
         abscissa: label of the abscissa, where it is not the gait cycle.
         note: sentence below the panels of the last page.
 
-    Returns:
-        The pages of each section, one after the other.
+    Yields:
+        The figures of each section, one section after the other.
     """
     cyclic = has_cycles(panels)
     sections: dict[str, list[Panel]] = {}
@@ -349,13 +341,11 @@ def plan_pages(
             if page_title and len(section_pages) > 1:
                 page_title += f" ({number} of {len(section_pages)})"
             label = "gait cycle (%)" if cyclic else abscissa
-            pages.append(
-                Page(page_title, rows, label, section=section, cyclic=cyclic, note=step_note)
-            )
+            pages.append(Page(page_title, rows, label, step_note, cyclic))
     if pages:
         last_note = ". ".join(filter(None, (note, step_note)))
         pages[-1] = pages[-1]._replace(note=last_note)
-    return pages
+    yield from map(_draw_page, pages)
 
 
 def has_cycles(panels: Iterable[Panel]) -> bool:
@@ -466,8 +456,8 @@ def draw_panel(panel_axes: Any, panel: Panel, abscissa: str, *, cyclic: bool = F
         panel_axes.fill_between(percent, mean - deviation, mean + deviation, color="0.85", lw=0.0)
         panel_axes.plot(percent, mean, color="0.6", lw=1.0, zorder=1.0)
     style_axes(panel_axes, abscissa)
-    if panel.range is not None:
-        first, last = panel.range
+    if panel.y_range is not None:
+        first, last = panel.y_range
         margin = 0.05 * (last - first)
         lowest, highest = panel_axes.get_ylim()
         # Values outside of the range, such as those of a wrong table, are not cut off.

@@ -226,7 +226,7 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
         section = SECTIONS.get(quantity, quantity.replace("_", " "))
         column = column._replace(section=section)
         if section == SECTIONS["activation"]:
-            column = column._replace(unit=FRACTION, range=(0.0, 1.0))
+            column = column._replace(unit=FRACTION, y_range=(0.0, 1.0))
         columns.setdefault(quantity, []).append(column)
     all_columns = [column for group in columns.values() for column in group]
     groups = split_sides(column.group for column in all_columns)
@@ -308,7 +308,7 @@ def _describe_actuator(label: str, values: Array, table: StoTable, names: Column
         unit = {FORCE: "m/s", MOMENT: "rad/s"}.get(force, unit)
     elif unit == MULTIPLE:
         if label in names.regions:
-            return Column(label, FRACTION, values, group, range=(0.0, 1.0))
+            return Column(label, FRACTION, values, group, y_range=(0.0, 1.0))
         # Without a model, a muscle cannot be distinguished from another actuator.
         unit = MULTIPLE if label in names.units else ""
     return Column(label, unit, values, group)

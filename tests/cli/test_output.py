@@ -171,7 +171,7 @@ def test_a_path_that_does_not_fit_beside_its_label_is_below_it(
     capsys: pytest.CaptureFixture[str], monkeypatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    path = "/tmp/müller/" + "0123456789" * 6 + ".sto"
+    path = "/home/müller/" + "0123456789" * 6 + ".sto"
     facts = FactTable("", [("a rather long label", path), ("rows", "31")])
     facts.add_files([path * 2])
     facts.show()
