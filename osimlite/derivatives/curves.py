@@ -128,7 +128,7 @@ def evaluate_curve(curve: Any, x: Any) -> tuple[Any, Any]:
 def solve_damped_velocity(
     m: Any, active: Any, by_length: Any, elastic: Any, tendon: Any, cos: Any, curves: Any
 ) -> tuple[bool, Any, Any]:
-    """Solve for the fiber velocity, as :func:`osimlite.mechanics.laws.millard2012_equilibrium.damped_velocity`.
+    """Solve for the fiber velocity, as :func:`osimlite.mechanics.laws.millard2012_equilibrium.find_damped_velocity`.
 
     There is no tolerance: the fiber force ``active_factor * factor + damping * velocity`` is a polynomial
     on each section of the curve, whose root is found to rounding.

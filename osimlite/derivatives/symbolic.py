@@ -31,7 +31,7 @@ from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.functions import evaluate_piecewise
 from osimlite.mechanics.laws.bezier import curve_value
 from osimlite.mechanics.laws.dual_numbers import is_exact_zero
-from osimlite.mechanics.laws.millard2012_equilibrium import damped_velocity
+from osimlite.mechanics.laws.millard2012_equilibrium import find_damped_velocity
 from osimlite.mechanics.laws.rotations import sine_cosine
 
 HELPERS = {
@@ -99,7 +99,7 @@ _counterparts: dict[Any, Any] = {
     sine_cosine: symbols.sine_cosine,
     is_exact_zero: symbols.is_zero,
     curve_value: evaluate_curve,
-    damped_velocity: solve_damped_velocity,
+    find_damped_velocity: solve_damped_velocity,
     evaluate_piecewise: evaluate_pieces,
 }
 """Symbolic counterparts of the functions that were used so far."""

@@ -158,7 +158,7 @@ class FitLayout:
                 *arguments,
             ]
             # Arguments that are locked have no degree of freedom, but a value.
-            numbers += [placements.locked_value(index) for index in coupler.independent]
+            numbers += [placements.get_locked_value(index) for index in coupler.independent]
             numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
         self._append_list(ints, FIT.COUPLERS, FIT.COUPLER_AT, records)
         self._append_axes(ints, structure, system.numbers, links)

@@ -353,7 +353,7 @@ class Setup(Subject):
     def find_writer(self, path: str) -> str | None:
         """Return another setup of the project that writes a file; None without one."""
         target = os.path.realpath(path)
-        around = self._read_tools([*Path(target).parents][:3])
+        around = self._read_tools(list(Path(target).parents)[:3])
         files_by_name_length: dict[int, str] = {}
         for file, top in dict([*self.iterate_neighbours(), *around]).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):

@@ -37,7 +37,7 @@ class Hessian:
         pattern = program._end_hessian_pattern
         # The product of two integrals depends on each pair of points: a dense Hessian.
         if pattern[direct:, direct:].any():
-            raise program.problem.unsupported_error(
+            raise program.problem.make_unsupported_error(
                 program.problem.solver,
                 "a goal is not linear in its integral; set optim_hessian_approximation to limited-memory",
             )

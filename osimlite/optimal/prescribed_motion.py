@@ -262,7 +262,7 @@ class PrescribedDynamics(Dynamics):
         self.is_implicit, self._first_rate = False, 0
         # The numbers of the motion are tabulated once, at the times of the grid.
         if any(lower != upper for lower, upper in problem.times):
-            raise problem.unsupported_error(
+            raise problem.make_unsupported_error(
                 problem.phase, "initial and final time must be fixed with a prescribed motion"
             )
         prescribed_motion: PrescribedMotion = self.functions

@@ -123,7 +123,7 @@ class Problem(StudyContext):
         # and whether for points with projected states.
         self.formulas: dict[tuple[bool, bool], Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
-            raise self.unsupported_error(study.solver, "only MocoCasADiSolver is supported")
+            raise self.make_unsupported_error(study.solver, "only MocoCasADiSolver is supported")
         self.solver: MocoCasADiSolver = study.solver
         self.model = self._process_model()
         # A PositionMotion makes the coordinates functions of time, so that only actuators vary.
@@ -323,7 +323,7 @@ class Problem(StudyContext):
             ]
             return functions
         if parameters:
-            raise self.unsupported_error(
+            raise self.make_unsupported_error(
                 self.phase,
                 f"parameters ({parameters[0]}) are not supported with a prescribed motion",
             )
@@ -339,7 +339,7 @@ class Problem(StudyContext):
                 )
             if isinstance(component, Controller) and component.enabled:
                 message = f"the model's {type(component).tag} '{component.path}' sets controls, which is not supported; remove it"
-                raise self.unsupported_error(self.phase, message)
+                raise self.make_unsupported_error(self.phase, message)
             if type(component).tag in JOINTS_WITHOUT_RATES:
                 message = (
                     f"{type(component).tag} '{component.path}' has speeds other than the rates of its "
@@ -350,7 +350,7 @@ class Problem(StudyContext):
     def _check_settings(self) -> None:
         """Check that the study asks for a solver that is supported here."""
         if self.solver.optim_solver != "ipopt":
-            raise self.unsupported_error(
+            raise self.make_unsupported_error(
                 self.solver,
                 f"optim_solver '{self.solver.optim_solver}' is not supported; use ipopt",
             )
@@ -432,7 +432,7 @@ class Problem(StudyContext):
             for info in infos:
                 self.check_name(info, info.name, known_names, variable_type)
         for info in (*self.phase.input_control_infos, *self.phase.input_control_infos_pattern):
-            raise self.unsupported_error(info, "input controls are not supported")
+            raise self.make_unsupported_error(info, "input controls are not supported")
 
     def _name_constraints(self) -> list[str]:
         """Name the equations of the model's constraints as OpenSim numbers them: constraint, then row.
@@ -479,7 +479,7 @@ class Problem(StudyContext):
             message = "enforce_constraint_derivatives with Posa2016 requires transcription_scheme hermite-simpson, as in Moco"
             raise self.invalid_error(solver, message)
         if self.functions.constraints.size1_out(0) != count:
-            raise self.unsupported_error(
+            raise self.make_unsupported_error(
                 self.phase,
                 "constraints on speeds alone are not supported",
             )
@@ -508,7 +508,7 @@ class Problem(StudyContext):
         """
         build = GOAL_BUILDERS.get(type(goal))
         if build is None:
-            raise self.unsupported_error(goal, "this class of goals is not supported yet")
+            raise self.make_unsupported_error(goal, "this class of goals is not supported yet")
         self._factors = {self._scaled[factor.name]: factor.name for factor in goal.scale_factors}
         first_function = len(self.time_functions)
         terms = build(goal, self)
@@ -531,7 +531,7 @@ class Problem(StudyContext):
         """Return the rows of a path constraint."""
         build = PATH_CONSTRAINT_BUILDERS.get(type(constraint))
         if build is None:
-            raise self.unsupported_error(
+            raise self.make_unsupported_error(
                 constraint, "this class of path constraints is not supported yet"
             )
         return build(constraint, self)
@@ -542,7 +542,7 @@ class Problem(StudyContext):
             if factor.name not in self._scaled:
                 # OpenSim's method addScaleFactor() receives the column, and its files do not store it.
                 message = "a file cannot say which column it scales, and OpenSim ignores scale factors in files"
-                raise self.unsupported_error(
+                raise self.make_unsupported_error(
                     factor, f"{message}; in Python, pass `scaled` to osimlite.moco.solve"
                 )
             if factor.name in self.parameters:

@@ -156,15 +156,15 @@ def check_refinable(problem: Problem) -> None:
         UnsupportedError: tendons or dynamics are implicit, or states are projected.
     """
     if problem.dynamics.tendons.names:
-        raise problem.unsupported_error(
+        raise problem.make_unsupported_error(
             problem.solver,
             "mesh refinement does not support implicit tendons; set tendon_compliance_dynamics_mode to explicit",
         )
     if problem.uses_projection:
         message = "mesh refinement requires kinematic_constraint_method Posa2016, as projections make states jump"
-        raise problem.unsupported_error(problem.solver, message)
+        raise problem.make_unsupported_error(problem.solver, message)
     if problem.dynamics.is_implicit:
-        raise problem.unsupported_error(
+        raise problem.make_unsupported_error(
             problem.solver, "mesh refinement requires multibody_dynamics_mode explicit"
         )
 

@@ -100,7 +100,7 @@ class StudyContext:
         ] or matches
         return {"file": str(self.file), "line": matches[0][0] if matches else 1}
 
-    def unsupported_error(self, study_object: Object, reason: str) -> UnsupportedError:
+    def make_unsupported_error(self, study_object: Object, reason: str) -> UnsupportedError:
         """Return the error for a part that OpenSim accepts and osimlite does not support.
 
         Args:
@@ -208,7 +208,7 @@ class StudyContext:
         try:
             return Pattern(text).fullmatch
         except UnsupportedPatternError as error:
-            raise self.unsupported_error(
+            raise self.make_unsupported_error(
                 study_object, f"the pattern '{text}' is not supported: {error}"
             ) from None
         except PatternError as error:

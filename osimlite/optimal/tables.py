@@ -101,10 +101,10 @@ def process_table(
         elif isinstance(operator, TabOpAppendCoupledCoordinateValues):
             if table.in_degrees:
                 message = "the table is in degrees, which OpenSim's functions of couplers take for radians; convert it to radians"
-                raise problem.unsupported_error(operator, message)
+                raise problem.make_unsupported_error(operator, message)
             table = _append_coupled_values(problem, operator, table, mechanism)
         else:
-            raise problem.unsupported_error(operator, "this table operator is not supported")
+            raise problem.make_unsupported_error(operator, "this table operator is not supported")
     return replace(_convert_to_radians(table, mechanism), header={"inDegrees": "no"})
 
 

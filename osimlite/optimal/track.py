@@ -118,7 +118,7 @@ def build_track_problem(
         times = np.linspace(start, end, len(table.times))
         states = {name: table[name] for name in table.columns if name in problem.states}
         if guess is not None:
-            raise problem_without_goals.unsupported_error(
+            raise problem_without_goals.make_unsupported_error(
                 tool, "guess_file and apply_tracked_states_to_guess cannot be combined"
             )
         guess = MocoTrajectory(times, states, {"states": tuple(states)})

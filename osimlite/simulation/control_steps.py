@@ -64,7 +64,7 @@ class Controller(Protocol):
     def gains(self, model: Model, engine: Any) -> list[Gain]:
         """Return the gains that can be varied, for a model and its engine."""
 
-    def with_values(self, values: Mapping[str, float]) -> Self:
+    def replace_values(self, values: Mapping[str, float]) -> Self:
         """Return the controller with other values of some gains.
 
         Args:

@@ -63,8 +63,8 @@ def read_messages() -> list[Message]:
                 and node.args
             ):
                 name = node.func.id if isinstance(node.func, ast.Name) else node.func.attr
-                text = _template(node.args[-1 if name == "unsupported_error" else 0])
-                known = name in ERRORS or (name == "unsupported_error" and len(node.args) > 1)
+                text = _template(node.args[-1 if name == "make_unsupported_error" else 0])
+                known = name in ERRORS or (name == "make_unsupported_error" and len(node.args) > 1)
                 if known and text is not None and len(text.replace("{}", "").strip()) > 3:
                     result[Message(str(file.relative_to(PACKAGE)), text)] = None
     return [*result]

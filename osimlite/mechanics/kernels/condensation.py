@@ -343,11 +343,9 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
             )
             # Each pair of an operation and a rotation on its path to ground is visited once, so both
             # entries of the symmetric matrix are changed.
-            load_change, inner_operation, inner_link = (
-                plus(load_change, rotate(at(load, 3), turn)),
-                operation,
-                link,
-            )
+            load_change = plus(load_change, rotate(at(load, 3), turn))
+            inner_operation = operation
+            inner_link = link
             while inner_link >= 0:
                 inner_ints = operation_ints(model, inner_operation)
                 if inner_ints[OPERATION.DOF] >= 0 and inner_ints[OPERATION.MOTION] == MOTION.TURN:

@@ -141,7 +141,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
         criterion = at(i, 1 + CRITERION.SIZE * number)
         noted, centre = at(work, criterion[CRITERION.WORKSPACE]), senses[SENSES.CENTRE]
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
-            noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = walked_distance(senses, row)
+            noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = compute_walked_distance(senses, row)
             noted[GAIT_WORK.HEIGHT] = row[centre + 1]
             noted[GAIT_WORK.FALLEN] = noted[GAIT_WORK.COUNT] = 0.0
             # Unknown contact, so that a foot that stands from the start does not count as one that
@@ -185,10 +185,8 @@ def update_criteria(
     has_fallen = False
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        numbers, noted = (
-            at(p, criterion[CRITERION.NUMBERS]),
-            at(work, criterion[CRITERION.WORKSPACE]),
-        )
+        numbers = at(p, criterion[CRITERION.NUMBERS])
+        noted = at(work, criterion[CRITERION.WORKSPACE])
         # SCONE's measures see only what happens within their times.
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
@@ -235,7 +233,7 @@ def add_sample(noted: Floats, t: float, value: float) -> None:
     noted[SAMPLE_WORK.BEGUN], noted[SAMPLE_WORK.TIME], noted[SAMPLE_WORK.VALUE] = 1.0, t, value
 
 
-def walked_distance(senses: Ints, row: Floats) -> float:
+def compute_walked_distance(senses: Ints, row: Floats) -> float:
     """Return the distance of a walker along x (m).
 
     It is the mean of the two smallest positions of both feet and the mass centre.
@@ -268,7 +266,7 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         row: sensor row.
         noted: workspace of the criterion, see `GAIT_WORK`.
     """
-    noted[GAIT_WORK.HERE] = walked_distance(senses, row)
+    noted[GAIT_WORK.HERE] = compute_walked_distance(senses, row)
     if row[senses[SENSES.CENTRE] + 1] < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_WORK.HEIGHT]:
         noted[GAIT_WORK.FALLEN] = 1.0
     has_touched = False

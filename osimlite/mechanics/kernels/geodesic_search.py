@@ -149,7 +149,10 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
         step = 1.0
         for k in range(count):
             step = min(
-                step, accepted_part(at(chain, SLOT.SIZE * (k + 1)), at(corrections, UNKNOWNS * k))
+                step,
+                compute_accepted_part(
+                    at(chain, SLOT.SIZE * (k + 1)), at(corrections, UNKNOWNS * k)
+                ),
             )
         # A negative or undefined part cannot be taken; 0 reports a geodesic that vanishes.
         if not step > 0.0:
@@ -168,7 +171,7 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
     return False
 
 
-def accepted_part(slot: Floats, corrections: Floats) -> float:
+def compute_accepted_part(slot: Floats, corrections: Floats) -> float:
     """Return the part of its corrections that a geodesic may take.
 
     It is 0 if the geodesic would become shorter than zero, and its length is then set to zero.

@@ -172,7 +172,7 @@ def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> No
                 controls[k] += width * draw_normal(int(p[LIMITS.SEED]), NOISE.CONTROLS, step, k)
 
 
-def delayed_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
+def interpolate_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
     """Return a delayed sensor by linear interpolation; before the start it has its first value.
 
     Args:
@@ -210,8 +210,8 @@ def update_leg_states(
     """
     # Loads are the first two sensors, and are delayed like all others.
     first_load, second_load = (
-        delayed_sensor(i, frames, history, 0, p[0]),
-        delayed_sensor(i, frames, history, 1, p[0]),
+        interpolate_sensor(i, frames, history, 0, p[0]),
+        interpolate_sensor(i, frames, history, 1, p[0]),
     )
     first_lead, second_lead = foot_lead(senses, row, 0), foot_lead(senses, row, 1)
     first_limits, second_limits, is_direct = (
@@ -322,7 +322,7 @@ def add_reflexes(
             ):
                 continue
             value = (
-                delayed_sensor(i, frames, history, term[TERM.SENSOR], term_numbers[0])
+                interpolate_sensor(i, frames, history, term[TERM.SENSOR], term_numbers[0])
                 - term_numbers[2]
             )
             if term[TERM.KIND] == TERM_TYPE.OF_SENSOR:
@@ -352,8 +352,8 @@ def is_suppressed(i: Ints, gate: Ints, gate_numbers: Floats, frames: int, histor
         frames: number of sensor rows.
         history: ring buffer of sensors.
     """
-    value = delayed_sensor(i, frames, history, gate[0], gate_numbers[0])
-    speed = delayed_sensor(i, frames, history, gate[1], gate_numbers[0])
+    value = interpolate_sensor(i, frames, history, gate[0], gate_numbers[0])
+    speed = interpolate_sensor(i, frames, history, gate[1], gate_numbers[0])
     return (value < gate_numbers[1] and speed < 0.0) or (value > gate_numbers[2] and speed >= 0.0)
 
 

@@ -298,7 +298,7 @@ def tangent_point(
         for _ in range(TRIALS):
             if not error >= previous_error:
                 break
-            step, d_step = damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
+            step, d_step = solve_damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
             step, d_step = times(size, step), size * d_step
             r, d = plus(r, step), d + d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
@@ -340,7 +340,7 @@ def tangent_residuals(
     return dot(normal, r) - offset, square - 1.0, 2.0 * square + d, dot(by_end, r) + d
 
 
-def damped_step(
+def solve_damped_step(
     normal: Vector, n: Vector, by_end: Vector, downhill: Vector, d_downhill: float, damping: float
 ) -> tuple[Vector, float]:
     """Solve (J' J + damping D) step = downhill, where D is the diagonal of J' J.

@@ -219,7 +219,7 @@ def minimize_residual(
         # lmdif scales the unknown by the largest slope so far.
         scale = max(scale, abs(slope))
         while True:
-            step, damping = damped_step(slope, value, scale, radius, damping)
+            step, damping = solve_damped_step(slope, value, scale, radius, damping)
             size = scale * abs(step)
             # The first trust region is not longer than the first step.
             if not has_moved:
@@ -253,7 +253,7 @@ def minimize_residual(
                 break
 
 
-def damped_step(
+def solve_damped_step(
     slope: float, value: float, scale: float, radius: float, damping: float
 ) -> tuple[float, float]:
     """Return a step that is hardly longer than the trust region, as MINPACK's lmpar does.

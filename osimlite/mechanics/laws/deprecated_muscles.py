@@ -65,7 +65,7 @@ def cos_pennation_of_fibers(length: float, height: float) -> float:
     return sqrt((length - height) * (length + height)) / length if height < length else UPRIGHT
 
 
-def scaled_activation_rate(
+def compute_schutte_activation_rate(
     excitation: float, activation: float, rate_difference: float, smallest_rate: float, time: float
 ) -> float:
     """Return the rate of activation of Schutte's muscle (1/s).

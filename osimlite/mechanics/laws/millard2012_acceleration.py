@@ -148,12 +148,12 @@ def evaluate_dynamics(
     # Short fibers push, stretched ones pull; the damping in parallel is linear in the velocity.
     passive = stretch * stretched - short * shortened + m.fiber_damping * velocity / m.optimal
     fiber_force = active * by_length * by_velocity + passive
-    borne_slope = (
+    fiber_force_slope = (
         active * active_slope * by_velocity + stretch_slope * stretched - short_slope * shortened
     )
     net = tension - m.strength * (fiber_force * cos - steep * steepened)
     stiffness = m.strength * (
-        borne_slope / m.optimal * cos - fiber_force * sin * turn - steep_slope
+        fiber_force_slope / m.optimal * cos - fiber_force * sin * turn - steep_slope
     )
     # The second term is the centripetal acceleration of fibers that rotate by pennation.
     acceleration = net * cos / m.mass + fiber * turning * turning

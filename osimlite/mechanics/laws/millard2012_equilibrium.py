@@ -11,9 +11,9 @@ With an elastic tendon, the fiber velocity v follows from the equilibrium
 (a fl(l) fv(v) + fp(l) + beta v) cos(phi) = ft
 
 where a is the activation, fl, fv, fp, ft are the curves, beta is the damping, and phi the pennation
-angle. The computation is divided into `fibers_at`, `combine_length_curves` and `combine_velocity_curve`, between
-which curves are evaluated, so that machine code can evaluate the curves of several muscles
-together.
+angle. The computation is divided into `fibers_at`, `combine_length_curves` and
+`combine_velocity_curve`, between which curves are evaluated, so that machine code can evaluate the
+curves of several muscles together.
 """
 
 from __future__ import annotations
@@ -119,16 +119,14 @@ def millard2012_equilibrium(
         rate of activation (1/s), fiber velocity (m/s), elastic part of the passive force (N).
     """
     fibers = evaluate_length_curves(inputs, m, curves)
-    is_found, velocity, by_velocity = (
-        fibers.velocity_source != NONE,
-        fibers.velocity,
-        fibers.by_velocity,
-    )
+    is_found = fibers.velocity_source != NONE
+    velocity = fibers.velocity
+    by_velocity = fibers.by_velocity
     # Only the branch that applies evaluates a curve over velocity.
     if fibers.velocity_source == RIGID:
         by_velocity, _ = curve_value(curves.velocity, velocity)
     elif fibers.velocity_source == DAMPED:
-        is_found, velocity, by_velocity = damped_velocity(
+        is_found, velocity, by_velocity = find_damped_velocity(
             m, fibers.active, fibers.by_length, fibers.elastic, fibers.tendon, fibers.cos, curves
         )
     elif fibers.velocity_source == INVERSE:
@@ -199,24 +197,17 @@ def evaluate_length_curves(
     velocity, by_velocity, by_length, elastic, tendon = combine_length_curves(
         fibers, m, by_length, elastic, tendon
     )
-    velocity_source, active, length, cos, change = (
+    return MillardFibers(
         fibers.velocity_source,
+        velocity,
+        by_velocity,
         fibers.active,
         fibers.length,
         fibers.cos,
-        fibers.change,
-    )
-    return MillardFibers(
-        velocity_source,
-        velocity,
-        by_velocity,
-        active,
-        length,
-        cos,
         by_length,
         elastic,
         tendon,
-        change,
+        fibers.change,
     )
 
 
@@ -449,7 +440,7 @@ def millard2012_rigid(
     return m.strength * by_length * by_velocity * normalized_cos
 
 
-def damped_velocity(
+def find_damped_velocity(
     m: Millard2012Equilibrium,
     active: float,
     by_length: float,

@@ -375,7 +375,7 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
         m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos)
     )
     stiffness, _ = force_stiffnesses(m, fibers, active, 0.0)
-    by_velocity = shared_velocity_factor(m, fibers, active, inputs.rate, stiffness)
+    by_velocity = find_velocity_factor(m, fibers, active, inputs.rate, stiffness)
     fiber_force, error = fiber_balance(m, fibers, active * by_velocity)
     stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, fiber_force)
     for _ in range(ROUNDS):
@@ -396,7 +396,7 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
         stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, fiber_force)
         # Outside of the line search, as in OpenSim: the factor by velocity stays constant along a
         # step.
-        by_velocity = shared_velocity_factor(m, fibers, active, inputs.rate, stiffness)
+        by_velocity = find_velocity_factor(m, fibers, active, inputs.rate, stiffness)
     if isnan(by_velocity):
         return False, fibers.length
     # At the smallest length any residual is accepted, because the fibers cannot shorten further.
@@ -444,7 +444,7 @@ def force_stiffnesses(
     return stiffness * fibers.cos + fiber_force * sin * sin / (length * cos), of_tendon
 
 
-def shared_velocity_factor(
+def find_velocity_factor(
     m: Thelen2003, fibers: ThelenFibers, activation: float, rate: float, stiffness: float
 ) -> float:
     """Return the factor of the active force by velocity, if the stiffer part moves less.

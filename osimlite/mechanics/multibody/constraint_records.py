@@ -170,7 +170,7 @@ def _encode_coupler(constraint: Coupler, places: Places, balls: Balls) -> Constr
     ints = [*dependent, 0, len(independent), *map(places.freedom, independent)]
     for index in independent:
         ints += _encode_coordinate(index, places, balls)
-    numbers = [places.locked_value(index) for index in (constraint.dependent, *independent)]
+    numbers = [places.get_locked_value(index) for index in (constraint.dependent, *independent)]
     return ConstraintRecord(
         "couple",
         ints,

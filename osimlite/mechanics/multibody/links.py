@@ -76,7 +76,7 @@ class Places:
         """Return the degree of freedom of a coordinate, -1 if it is locked."""
         return self.freedoms.get(coordinate, -1)
 
-    def locked_value(self, coordinate: int) -> float:
+    def get_locked_value(self, coordinate: int) -> float:
         """Return the value that a coordinate has if it is locked (rad or m)."""
         return float(self.mechanism.coordinates[coordinate].default_value)
 

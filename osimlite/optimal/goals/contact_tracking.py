@@ -143,7 +143,7 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
                 goal, f"the loads have no force '{group.external_force_name}'{suggestion}"
             )
         if force.force_expressed_in_body not in ("ground", "/ground"):
-            raise problem.unsupported_error(
+            raise problem.make_unsupported_error(
                 goal,
                 f"the force '{force.name}' is expressed in {force.force_expressed_in_body}; only ground is supported",
             )
@@ -215,7 +215,7 @@ def _find_contact_path(
     # OpenSim negates the force for the body of the half space; here only the sphere's side is done.
     if not any(target.rpartition("/")[2] in frames for target in targets):
         message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' acts on {force.applied_to_body}"
-        raise problem.unsupported_error(
+        raise problem.make_unsupported_error(
             goal, f"{message}; forces on the body of the half space are not supported"
         )
     return path

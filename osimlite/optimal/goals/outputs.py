@@ -226,7 +226,9 @@ def _find_output(
     )
     index = law.record_names.get(name) if law is not None else None
     if law is None or index is None:
-        raise problem.unsupported_error(owner, f"the output '{name}' of {path} is not supported")
+        raise problem.make_unsupported_error(
+            owner, f"the output '{name}' of {path} is not supported"
+        )
     # The record of the force may have another label for the output.
     label = f"{path}|{next(label for label, record_index in law.record_offsets.items() if record_index == index)}"
     return 1, (lambda point, path: point.output("forces")[label], path)

@@ -146,7 +146,7 @@ class ElementBuilder:
         component: type = type(force)
         force_type = FORCE_TYPES.find(component)
         if force_type is None:
-            raise self.unsupported_error(force)
+            raise self.make_unsupported_error(force)
         element: ForceElement = force_type.make(self, force)
         return element
 
@@ -209,7 +209,7 @@ class ElementBuilder:
         try:
             return convert_function(function, 1, f"'{what}' of '{self.path(force)}'")
         except UnsupportedError:
-            raise self.unsupported_error(
+            raise self.make_unsupported_error(
                 force, f" with the {get_class_name(function)} '{what}'"
             ) from None
 
@@ -229,7 +229,7 @@ class ElementBuilder:
                 f"'{self.path(component)}' has a parameter that is not a finite number; give it a finite value"
             )
 
-    def unsupported_error(self, force: Any, why: str = "") -> UnsupportedError:
+    def make_unsupported_error(self, force: Any, why: str = "") -> UnsupportedError:
         """Return the error that names a force that cannot be computed.
 
         Args:

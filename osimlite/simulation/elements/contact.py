@@ -343,7 +343,9 @@ class HuntCrossley(PairContact):
                 raise ModelError(f"the force '{builder.path(force)}': {error}") from None
         early_return = builder.early_return and len(pairs) > 1
         if early_return and any(surface.radii for surface in surfaces):
-            raise builder.unsupported_error(force, " with an ellipsoid, and Simbody's early return")
+            raise builder.make_unsupported_error(
+                force, " with an ellipsoid, and Simbody's early return"
+            )
         path, vt = builder.path(force), force.transition_velocity
         return cls(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
 
@@ -429,7 +431,7 @@ def read_surface(
         UnsupportedError: it is not a half space, sphere or ellipsoid, or is not fixed to a body.
     """
     if not isinstance(geometry, ContactHalfSpace | ContactSphere | ContactEllipsoid):
-        raise builder.unsupported_error(
+        raise builder.make_unsupported_error(
             force, f" on the {get_class_name(geometry)} '{builder.path(geometry)}'"
         )
     frame, body, placed = find_frame(builder, geometry)

@@ -117,4 +117,4 @@ def refuse_proportional_control(
     """Yield the error that osimlite does not compute this controller."""
     actuator = builder.resolve_target(controller, "socket_actuator", controller.socket_actuator)
     why = f" driven by the ToyPropMyoController '{builder.path(controller)}', which follows an activation"
-    yield Drive(actuator, builder.unsupported_error(actuator, why))
+    yield Drive(actuator, builder.make_unsupported_error(actuator, why))

@@ -140,7 +140,7 @@ class ModelControls:
             if number is None and actuator.control_count > 1:
                 # OpenSim 4.6 reads the other controls from the memory behind the first.
                 why = f" driven by '{builder.path(controller)}', which has one control for its {actuator.control_count}"
-                signal = builder.unsupported_error(actuator, why)
+                signal = builder.make_unsupported_error(actuator, why)
             if isinstance(signal, UnsupportedError):
                 # The error is raised only if the actuator is computed: one that is off needs no
                 # control.
@@ -209,7 +209,7 @@ def _iterate_drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive
         if is_a(controller, "TrackingController"):
             why += ", whose desired motion is known to its tool only"
         for actuator in find_actuators(builder, controller):
-            yield controller, Drive(actuator, builder.unsupported_error(actuator, why))
+            yield controller, Drive(actuator, builder.make_unsupported_error(actuator, why))
 
 
 def find_actuators(builder: ElementBuilder, controller: Controller) -> list[Any]:

@@ -150,7 +150,7 @@ def read_load_of_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     """
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
-        raise builder.unsupported_error(
+        raise builder.make_unsupported_error(
             force, " outside of ExternalLoads, so that it has no data file"
         )
     columns = _Columns(read_loads_table(loads, builder.folder, builder.path(loads)), [force])

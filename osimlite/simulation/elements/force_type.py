@@ -108,7 +108,7 @@ class ForceType:
             normal and across it.
         batched: the law in stages, for several forces together.
         describe_failure: returns words about a force whose law or equilibrium has no solution, from
-            its `named_values`.
+            its `list_named_values`.
         labels: labels of the report with their outputs, where {name} is the name of the force; the
             labels of the geometry if None.
         compute_energy: returns the energy (J) of a force from its record, if it is not an output of
@@ -209,7 +209,7 @@ class ForceType:
         element_class = DeclaredForce if force.appliesForce else ForceOff
         if builder.rigid_tendons and is_a(force, "Muscle"):
             if self.rigid_law is None:
-                raise builder.unsupported_error(force, " with a rigid tendon")
+                raise builder.make_unsupported_error(force, " with a rigid tendon")
             element_class = RigidTendon
         return element_class(
             self.component, path, force.name, self.geometry.read(builder, force), values, states
@@ -389,7 +389,7 @@ class DeclaredForce:
             return None
         return [force_type.record_offsets[output] for output in force_type.labels.values()]
 
-    def named_values(self, record: Sequence[float]) -> dict[str, float]:
+    def list_named_values(self, record: Sequence[float]) -> dict[str, float]:
         """Return its scalar parameters and the values of its record, by name.
 
         Args:
@@ -417,7 +417,7 @@ class DeclaredForce:
             The path of the force, and what its type adds.
         """
         return f"'{self.path}'" + (
-            self.force_type.describe_failure(self.named_values(record))
+            self.force_type.describe_failure(self.list_named_values(record))
             if self.force_type.describe_failure
             else ""
         )

@@ -149,7 +149,7 @@ def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Rea
     if any(driven) and not all(
         isinstance(item, Lock | PrescribedCoordinate) for item in mechanism.constraints
     ):
-        raise builder.unsupported_error(
+        raise builder.make_unsupported_error(
             probe, " of prescribed coordinates beside other constraints"
         )
     reading = define_reading(

@@ -58,7 +58,7 @@ def read_metabolic_probe(
     for item in parameters:
         muscle = known.get(item.name)
         if muscle is None:
-            raise builder.unsupported_error(
+            raise builder.make_unsupported_error(
                 probe, f" of the muscle '{item.name}', which the model does not have"
             )
         subjects.append(
@@ -107,11 +107,11 @@ def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any
     for name in names:
         if not (getattr(item, name) or 0.0) > 0.0:
             # The reader stores None for a missing property.
-            raise builder.unsupported_error(
+            raise builder.make_unsupported_error(
                 probe, f" of the muscle '{item.name}', whose {name} is not positive"
             )
     if not 0.0 <= item.ratio_slow_twitch_fibers <= 1.0:
-        raise builder.unsupported_error(
+        raise builder.make_unsupported_error(
             probe, f" of the muscle '{item.name}', whose ratio_slow_twitch_fibers is not 0 to 1"
         )
     if item.use_provided_muscle_mass:

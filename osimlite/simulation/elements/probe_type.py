@@ -246,7 +246,7 @@ def _make_probe(
     operation = getattr(probe, "probe_operation", "value")
     gain = float(getattr(probe, "gain", 1.0))
     if operation == INTEGRATE and probe_type.law is None:
-        raise builder.unsupported_error(probe, ", whose integral osimlite does not compute")
+        raise builder.make_unsupported_error(probe, ", whose integral osimlite does not compute")
     initial: tuple[float, ...] = tuple(getattr(probe, "initial_conditions_for_integration", ()))
     if len(initial) != len(reading.labels):
         # As in OpenSim, which reports an error and continues.
@@ -302,13 +302,13 @@ def _locate_inputs(
         # A force that is off is 0.
         return (control,) * len(probe_type.reads), tuple(map(float, numbers._replace(factor=0.0)))
     if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
-        raise builder.unsupported_error(probe, f" of '{path}', whose force is not computed")
+        raise builder.make_unsupported_error(probe, f" of '{path}', whose force is not computed")
     known = element.force_type.record_names
     places = []
     for name in probe_type.reads:
         place = known.get(name)
         if place is None and name != "control":
-            raise builder.unsupported_error(
+            raise builder.make_unsupported_error(
                 probe, f" of '{path}', whose {name.replace('_', ' ')} is unknown"
             )
         places.append(control if place is None else (path, place))

@@ -84,7 +84,7 @@ def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -
         function = read_signal(builder, controller, word)
         for (actuator, number), weight in zip(targets, vector.synergy_weights, strict=True):
             if function is None:
-                refused: UnsupportedError = builder.unsupported_error(
+                refused: UnsupportedError = builder.make_unsupported_error(
                     actuator,
                     f" driven by '{path}', whose input '{word}' is not a known function of time",
                 )

@@ -126,7 +126,7 @@ class Feedback:
             for parameter in requested
         ]
 
-    def with_values(self, values: Mapping[str, float]) -> Self:
+    def replace_values(self, values: Mapping[str, float]) -> Self:
         """Return a copy in which some parameters have other values."""
         result = copy(self)
         result._values = {**self._values, **values}

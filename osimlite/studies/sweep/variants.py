@@ -280,7 +280,7 @@ class Variants:
             for k in self._gains
             for name in getattr(variables[k].target, "parts", ())
         )
-        return self._plan.controller.with_values(
+        return self._plan.controller.replace_values(
             {name: float(value) for name, value in named_values}
         )
 

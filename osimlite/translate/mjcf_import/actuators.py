@@ -62,7 +62,7 @@ def add_actuators(draft: ConversionDraft) -> None:
         elif transmission == int(transmissions.mjTRN_TENDON):
             path = draft.paths[target]
             # The gear of a tendon has one number that counts.
-            gear = float(model.actuator_gear[draft.output_of(actuator), 0])
+            gear = float(model.actuator_gear[draft.get_output_index(actuator), 0])
             if is_muscle:
                 muscle = make_muscle(
                     draft, actuator, _copy(path), gear, lengths[target] + path.shift
@@ -155,9 +155,9 @@ def _set_limits(
     """Set the range of the control, and record what a limit of the force becomes."""
     model = draft.mj
     lower, upper = -np.inf, np.inf
-    if model.actuator_ctrllimited[draft.control_of(actuator)]:
+    if model.actuator_ctrllimited[draft.get_control_index(actuator)]:
         # No limit is infinite in OpenSim.
-        lower, upper = map(float, model.actuator_ctrlrange[draft.control_of(actuator)])
+        lower, upper = map(float, model.actuator_ctrlrange[draft.get_control_index(actuator)])
     if model.actuator_forcelimited[actuator]:
         limits = [float(value) for value in model.actuator_forcerange[actuator]]
         text = f"{limits[0]:g} to {limits[1]:g}"
@@ -176,7 +176,7 @@ def _set_limits(
 
 
 def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> None:
-    gear = float(draft.mj.actuator_gear[draft.output_of(actuator), 0])
+    gear = float(draft.mj.actuator_gear[draft.get_output_index(actuator), 0])
     law = _read_linear_law(draft, actuator, gear)
     if law is None:
         return
@@ -222,13 +222,13 @@ def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> No
                 )
             )
         result += f" and {spring}: a servo as an actuator and a passive spring"
-    draft.translated("actuator", actuator, result)
+    draft.note_result("actuator", actuator, result)
 
 
 def _add_joint_muscle(draft: ConversionDraft, actuator: int, joint: int) -> None:
     """Add a muscle whose length is a multiple of a joint position."""
     model = draft.mj
-    gear = float(model.actuator_gear[draft.output_of(actuator), 0])
+    gear = float(model.actuator_gear[draft.get_output_index(actuator), 0])
     lower, upper = draft.made[draft.coordinates[joint][0]].range
     shortest = min(gear * lower, gear * upper)
     # OpenSim's paths have positive lengths: 1 cm at least.
@@ -284,14 +284,14 @@ def _add_path_actuator(
         draft.record(
             "actuator", actuator, "a delay of the control of a tendon", LEFT_OUT, f"{delay:g} s"
         )
-    draft.translated("actuator", actuator, result)
+    draft.note_result("actuator", actuator, result)
 
 
 def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None:
     """Add a force or a torque at a site."""
     model = draft.mj
     gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
-    gear = np.array(model.actuator_gear[draft.output_of(actuator)])
+    gear = np.array(model.actuator_gear[draft.get_output_index(actuator)])
     force, torque = gear[:3], gear[3:]
     body = int(model.site_bodyid[site])
     if (
@@ -334,7 +334,7 @@ def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None
         )
     _set_limits(draft, actuator, actuator_force, gain_and_bias[0], biased=False)
     draft.model.add(actuator_force)
-    draft.translated("actuator", actuator, f"{type(actuator_force).__name__} {name}")
+    draft.note_result("actuator", actuator, f"{type(actuator_force).__name__} {name}")
 
 
 def _add_tendon_springs(draft: ConversionDraft) -> None:

@@ -24,7 +24,7 @@ def add_bodies(draft: ConversionDraft) -> None:
         parent = draft.frames[int(model.body_parentid[body])]
         draft.frames.append(frame)
         draft.model.add(frame)
-        draft.translated("body", body, f"body {frame.name}")
+        draft.note_result("body", body, f"body {frame.name}")
         draft.fidelity.note_name(
             draft.source.path_of("body", body),
             "body",
@@ -83,4 +83,4 @@ def add_markers(draft: ConversionDraft) -> None:
                 fixed=True,
             )
         )
-        draft.translated("site", site, f"marker {name}")
+        draft.note_result("site", site, f"marker {name}")

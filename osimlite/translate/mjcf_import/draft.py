@@ -100,12 +100,12 @@ class ConversionDraft:
         counts = (getattr(self.mj, f"actuator_{part}num", None) for part in ("ctrl", "out"))
         return all(numbers is None or int(numbers[actuator]) == 1 for numbers in counts)
 
-    def control_of(self, actuator: int) -> int:
+    def get_control_index(self, actuator: int) -> int:
         """Return the index of the first control of an actuator, to which limits of controls belong."""
         addresses = getattr(self.mj, "actuator_ctrladr", None)
         return actuator if addresses is None else int(addresses[actuator])
 
-    def output_of(self, actuator: int) -> int:
+    def get_output_index(self, actuator: int) -> int:
         """Return the index of the first output of an actuator, to which gears and lengths belong."""
         addresses = getattr(self.mj, "actuator_outadr", None)
         return actuator if addresses is None else int(addresses[actuator])
@@ -118,7 +118,7 @@ class ConversionDraft:
         """Return a legal name that no other component of this kind has."""
         return self.names.setdefault(kind, UniqueNames())(name)
 
-    def translated(self, kind: str, index: int, result: str) -> None:
+    def note_result(self, kind: str, index: int, result: str) -> None:
         """Note what an object of MuJoCo became."""
         self.fidelity.translated[self.source.path_of(kind, index)] = result
 

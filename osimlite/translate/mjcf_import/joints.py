@@ -206,7 +206,7 @@ def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordi
     )
     draft.coordinates[joint] = (name,)
     draft.made[name] = coordinate
-    draft.translated("joint", joint, f"coordinate {name}")
+    draft.note_result("joint", joint, f"coordinate {name}")
     return coordinate
 
 
@@ -239,7 +239,7 @@ def _make_special_joint(
             function=LinearFunction(name="function", coefficients=(1.0, 0.0)),
         )
     draft.coordinates[joint] = tuple(each_coordinate.name for each_coordinate in coordinates)
-    draft.translated("joint", joint, f"joint {name}")
+    draft.note_result("joint", joint, f"joint {name}")
     draft.record(
         "joint",
         joint,

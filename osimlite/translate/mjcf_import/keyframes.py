@@ -54,7 +54,7 @@ def add_keyframes(draft: ConversionDraft) -> None:
                 f"the pose alone, in row {key} of {file}",
             )
         else:
-            draft.translated("key", key, f"row {key} of {file}")
+            draft.note_result("key", key, f"row {key} of {file}")
     draft.files[file] = "\n".join(lines) + "\n"
     if requested is not None:
         set_default_pose(draft, rows[names.index(requested)])

@@ -36,7 +36,7 @@ class MuscleData(NamedTuple):
     vmax: float  # maximum contraction velocity, optimal fiber lengths per second
     shape: Shape
 
-    def with_slack(self, slack: float) -> MuscleData:
+    def replace_slack(self, slack: float) -> MuscleData:
         """Return the same muscle with another slack length.
 
         Parabolas of the fiber length stay parabolas if the length is measured from another origin,
@@ -76,7 +76,7 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     """
     model = draft.mj
     gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
-    shortest, longest = map(float, model.actuator_lengthrange[draft.output_of(actuator)])
+    shortest, longest = map(float, model.actuator_lengthrange[draft.get_output_index(actuator)])
 
     def lengths(numbers: Array) -> tuple[float, float]:
         # Two lengths of the path, at both ends of the normalized range, give fiber and tendon.
@@ -89,7 +89,7 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
         return (
             force
             if force >= 0.0
-            else float(numbers[3] / model.actuator_acc0[draft.output_of(actuator)])
+            else float(numbers[3] / model.actuator_acc0[draft.get_output_index(actuator)])
         )
 
     fiber, slack = lengths(gain)
@@ -152,14 +152,14 @@ def make_muscle(
     # The slack length moves into the fiber, which leaves the force as it is.
     if data.slack < LEAST_SLACK_M:
         detail = f"; its tendon slack length of {data.slack:.4g} m is now part of the fiber"
-        data = data.with_slack(LEAST_SLACK_M)
+        data = data.replace_slack(LEAST_SLACK_M)
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
     has_activation = int(model.actuator_dyntype[actuator]) == int(
         draft.source.mujoco.mjtDyn.mjDYN_MUSCLE
     )
     limits = (0.0, 1.0)
-    if model.actuator_ctrllimited[draft.control_of(actuator)]:
-        lower, upper = map(float, model.actuator_ctrlrange[draft.control_of(actuator)])
+    if model.actuator_ctrllimited[draft.get_control_index(actuator)]:
+        lower, upper = map(float, model.actuator_ctrlrange[draft.get_control_index(actuator)])
         # OpenSim's muscles have controls from 0 to 1.
         limits = max(lower, 0.0), min(upper, 1.0)
     if draft.options.muscle == "exact":
@@ -269,7 +269,7 @@ def _make_exact(
             f"time constants {activation_time:g} and {deactivation_time:g} s{detail}",
         )
     else:
-        draft.translated("actuator", actuator, f"muscle {name}")
+        draft.note_result("actuator", actuator, f"muscle {name}")
     if data.shape.fpmax > MOST_PASSIVE:
         draft.record(
             "actuator",

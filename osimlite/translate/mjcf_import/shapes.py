@@ -71,7 +71,7 @@ def add_shapes(draft: ConversionDraft) -> None:
                 rotation @ part.rotation,
             )
             _draw(draft, geom, frame, part.shape, name)
-        draft.translated("geom", geom, f"shape {name}")
+        draft.note_result("geom", geom, f"shape {name}")
 
 
 def _draw(
@@ -118,7 +118,7 @@ def _make_parts(draft: ConversionDraft, geom: int) -> list[_Part] | None:
         return [_Part(Mesh(mesh_file=file.rpartition("/")[2]), origin, identity)]
     if geom_type == PLANE:
         # A plane is endless; contact surfaces show it.
-        draft.translated("geom", geom, "not drawn: a plane")
+        draft.note_result("geom", geom, "not drawn: a plane")
         return None
     draft.drop("geom", geom, "a height field or another shape that OpenSim does not have")
     return None
@@ -145,7 +145,7 @@ def write_mesh(draft: ConversionDraft, mesh: int) -> str:
         lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in faces.tolist()]
         draft.files[file] = "\n".join(lines) + "\n"
-        draft.translated("mesh", mesh, f"file {file}")
+        draft.note_result("mesh", mesh, f"file {file}")
     return draft.meshes[mesh]
 
 

@@ -9,6 +9,8 @@ moves such a tendon, its path is straight.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from osimlite.base.progress import report_progress
@@ -97,9 +99,9 @@ def add_tendon_paths(draft: ConversionDraft) -> None:
             if segment.geom >= 0:
                 draft.wrapping_geoms.add(segment.geom)
     for site in draft.path_sites:
-        draft.translated("site", site, "point of a path, or side of a wrap surface")
+        draft.note_result("site", site, "point of a path, or side of a wrap surface")
     for geom in draft.wrapping_geoms:
-        draft.translated("geom", geom, "wrap surface of paths")
+        draft.note_result("geom", geom, "wrap surface of paths")
     spatial = [tendon for tendon in tendons if not tendon.is_fixed]
     for tendon in tendons:
         if tendon.is_fixed:
@@ -418,7 +420,7 @@ class _Selection:
                     errors,
                 )
             else:
-                draft.translated("tendon", tendon.number, "path")
+                draft.note_result("tendon", tendon.number, "path")
             if row not in polynomials:
                 self._record_coincident_sites(tendon, default_pose)
 
@@ -448,17 +450,10 @@ def _key(segment: TendonSegment) -> TendonSegment:
 
 def _find_first_branch(tendon: Tendon) -> tuple[TendonSegment, ...]:
     """Return the segments of a tendon up to its first pulley."""
-    last = next(
-        (
-            index
-            for index, (segment, following) in enumerate(
-                zip(tendon.segments, tendon.segments[1:], strict=False), 1
-            )
-            if segment.second != following.first or segment.divisor != following.divisor
-        ),
-        len(tendon.segments),
-    )
-    return tendon.segments[:last]
+    for count, (segment, following) in enumerate(pairwise(tendon.segments), 1):
+        if segment.second != following.first or segment.divisor != following.divisor:
+            return tendon.segments[:count]
+    return tendon.segments
 
 
 def _make_straight_path(
@@ -519,7 +514,7 @@ def _make_linear_path(draft: ConversionDraft, tendon: Tendon) -> TendonPath:
             f"constant {shift:g}",
         )
     else:
-        draft.translated("tendon", tendon.number, "path")
+        draft.note_result("tendon", tendon.number, "path")
     path = FunctionBasedPath(
         name="path",
         coordinate_paths=tuple(names),

@@ -84,7 +84,7 @@ def test_derivatives_forces_and_energy(case, code):
             continue
         _, force, *rates = ready.compute_applied_forces(float(number), y)
         ((_, records),) = ready.read_records()
-        known = element.named_values(records[-1])
+        known = element.list_named_values(records[-1])
         ours = dict(zip([f"d_{name}" for name in states(ready)], rates, strict=True))
         ours |= {theirs: known[own] for own, theirs in RECORDED.items() if row[theirs] != "n/a"}
         for name, value in ours.items():

@@ -530,14 +530,14 @@ def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
     together = Runner(made).run(rows)
     names = [item.name for item in made.variables]
     for k, row in enumerate(rows.tolist()):
-        controller = feedback.with_values(dict(zip(names, row, strict=True)))
+        controller = feedback.replace_values(dict(zip(names, row, strict=True)))
         alone = simulate(model, 0.3, controller=controller, engine="compiled")
         assert together.measures["elbow/value"][k] == alone.values[-1, -1]
     both = plan(model, {"*.K?": "0:1", "motor/optimal_force": "1:3", "elbow": "0.4:0.9"}, **choices)
     found = Runner(both).run(np.array([[0.7, 1.5, 0.5]])).measures["elbow/value"][0]
     own = model.copy_deep()
     own.tree().by_path["/forceset/motor"].optimal_force = 1.5
-    controller = feedback.with_values({"motor-elbow.KP": 0.7, "motor-elbow.KV": 0.7})
+    controller = feedback.replace_values({"motor-elbow.KP": 0.7, "motor-elbow.KV": 0.7})
     alone = simulate(own, 0.3, controller=controller, initial={"elbow": 0.5}, engine="compiled")
     assert found == alone.values[-1, -1]
 

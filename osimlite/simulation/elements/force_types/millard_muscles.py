@@ -131,7 +131,7 @@ def _check_equilibrium_muscle(builder: ElementBuilder, force: Any) -> None:
 
 def _compute_equilibrium_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
-    known = force.named_values(record)
+    known = force.list_named_values(record)
     return millard2012_energy(
         m, known["length"], known["fiber_length"], known["cos_pennation"], curves
     )
@@ -233,7 +233,7 @@ def _check_acceleration_muscle(builder: ElementBuilder, force: Any) -> None:
 
 def _compute_acceleration_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
-    known = force.named_values(record)
+    known = force.list_named_values(record)
     return millard2012_acceleration_energy(
         m, known["length"], known["fiber_length"], known["cos_pennation"], curves
     )

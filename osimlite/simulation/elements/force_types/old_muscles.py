@@ -11,12 +11,12 @@ from osimlite.mechanics.laws.deprecated_muscles import (
     ROUNDS,
     TOLERANCE,
     OldMuscle,
+    compute_schutte_activation_rate,
     cos_pennation_of_fibers,
     generic_velocity_factor,
     make_guess,
     next_length,
     rigid_cos,
-    scaled_activation_rate,
     schutte_passive_force,
     schutte_velocity,
 )
@@ -308,7 +308,7 @@ def compute_delp(
     # The fibers keep their height, so that they turn while they move: the centrifugal part of the
     # acceleration.
     turned = velocity * velocity * (1.0 - cos * cos) / (cos * cos) / (now.fiber_length / m.optimal)
-    activation_rate = scaled_activation_rate(
+    activation_rate = compute_schutte_activation_rate(
         now.excitation, now.activation, fields.more, fields.least, fields.time
     )
     known = list_recorded(now, fibers, m)
@@ -467,7 +467,7 @@ def compute_schutte(
         )
     else:
         velocity = now.rate * rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
-    activation_rate = scaled_activation_rate(
+    activation_rate = compute_schutte_activation_rate(
         now.excitation, now.activation, fields.more, fields.least, fields.time
     )
     return *list_recorded(now, fibers, m), activation_rate, velocity

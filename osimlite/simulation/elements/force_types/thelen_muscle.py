@@ -51,7 +51,7 @@ def _read_derived_fields(builder: ElementBuilder, force: Thelen2003Muscle) -> tu
 
 
 def _compute_energy(force: DeclaredForce, record: Sequence[float]) -> float:
-    known = force.named_values(record)
+    known = force.list_named_values(record)
     return thelen2003_energy(
         force.values[1], known["length"], known["fiber_length"], known["cos_pennation"]
     )

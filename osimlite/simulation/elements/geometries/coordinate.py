@@ -64,7 +64,7 @@ class OnCoordinate(ForceGeometry):
             Integers: the degree of freedom, -1 if the coordinate is locked. Numbers: the value,
             which counts only then.
         """
-        return (places.freedom(location),), (places.locked_value(location),)
+        return (places.freedom(location),), (places.get_locked_value(location),)
 
 
 COORDINATE = OnCoordinate()

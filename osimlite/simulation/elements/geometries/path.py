@@ -55,7 +55,9 @@ class AlongPath(ForceGeometry):
         """
         read_path = PATHS.find(type(force.geometry_path))
         if read_path is None:
-            raise builder.unsupported_error(force, f" on a {get_class_name(force.geometry_path)}")
+            raise builder.make_unsupported_error(
+                force, f" on a {get_class_name(force.geometry_path)}"
+            )
         path: Path = read_path(builder, force)
         return path
 

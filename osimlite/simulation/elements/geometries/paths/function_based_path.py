@@ -57,7 +57,7 @@ class CoordinatePath:
         Returns:
             The record that pulls, those of the functions, and last that of the path.
         """
-        values = [places.locked_value(coordinate) for coordinate in self.coordinates]
+        values = [places.get_locked_value(coordinate) for coordinate in self.coordinates]
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         speeds = [freedom + len(places.freedoms) if freedom >= 0 else -1 for freedom in freedoms]
         of_values = [

@@ -87,7 +87,7 @@ class Node:
         link, frame = places.placement(self.body)
         frame = frame @ self.frame
         # A locked coordinate has no number in the state, so its value goes into the record.
-        value = places.locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
+        value = places.get_locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
         station = frame[:3, :3] @ self.location + frame[:3, 3]
         numbers = [*station.tolist(), value, *self.range, *frame[:3, :3].ravel().tolist()]
         tables = []
@@ -250,7 +250,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     # Points of unknown classes have no reader.
     for point in path.path_point_set.objects:
         if type(point) not in READERS:
-            raise builder.unsupported_error(
+            raise builder.make_unsupported_error(
                 owner, f" with the {get_class_name(point)} '{point.name}'"
             )
         body, frame = builder.find_placement(
@@ -271,7 +271,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     may_leave = False
     for wrap, surface in zip(wraps, result, strict=True):
         if type(surface) not in LAWS:
-            raise builder.unsupported_error(
+            raise builder.make_unsupported_error(
                 owner, f" around the {get_class_name(surface)} '{surface.name}'"
             )
         surfaces.append(
