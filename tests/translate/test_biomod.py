@@ -104,10 +104,13 @@ def test_paths_that_biorbd_cannot_follow_have_measured_errors() -> None:
     # The range is never met: OpenSim's path is a straight line, biorbd's has a corner.
     muscle.geometry_path.path_point_set.objects.append(
         osimlite.ConditionalPathPoint(
-            name="corner", socket_parent_frame=pelvis, location=(0.0, 0.2, 0.0),
-            socket_coordinate="/jointset/tail/swing", range=(50.0, 51.0),
+            name="corner",
+            socket_parent_frame=pelvis,
+            location=(0.0, 0.2, 0.0),
+            socket_coordinate="/jointset/tail/swing",
+            range=(50.0, 51.0),
         )
-    )  # fmt: skip
+    )
     muscle.geometry_path.add_point(tail, (-0.2, 0.0, 0.05))
     model.add(muscle)
     (record,) = [record for record in to_biomod(model).fidelity if record.kind == "path"]
@@ -128,14 +131,32 @@ def test_other_time_constants_are_recorded() -> None:
 
 
 READ_ATTRIBUTES = {
-    "segment": {"parent", "rtinmatrix", "rt", "translations", "rotations", "rangesq", "mass",
-                "inertia", "com"},
+    "segment": {
+        "parent",
+        "rtinmatrix",
+        "rt",
+        "translations",
+        "rotations",
+        "rangesq",
+        "mass",
+        "inertia",
+        "com",
+    },
     "marker": {"parent", "position", "technical"},
     "musclegroup": {"originparent", "insertionparent"},
-    "muscle": {"type", "musclegroup", "originposition", "insertionposition", "optimallength",
-               "maximalforce", "tendonslacklength", "pennationangle", "maxshorteningspeed"},
+    "muscle": {
+        "type",
+        "musclegroup",
+        "originposition",
+        "insertionposition",
+        "optimallength",
+        "maximalforce",
+        "tendonslacklength",
+        "pennationangle",
+        "maxshorteningspeed",
+    },
     "viapoint": {"parent", "muscle", "musclegroup", "position"},
-}  # fmt: skip
+}
 """Attributes that biorbd 1.12.4 reads (`ModelReader.cpp`) and that are written; it ignores others."""
 
 
