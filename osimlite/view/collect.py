@@ -305,7 +305,8 @@ class _SceneCollector:
         traced_path = PATH.read(self.builder, owner)
         if not isinstance(traced_path, TraceablePath):
             raise UnsupportedError(
-                f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it"
+                f"is a {type(path).__name__}, which has a length but no points in space; "
+                "OpenSim does not draw it either"
             )
         owner_path = (self.tree.path_of(owner) if owner is not None else None) or name
         # Paths of disabled forces would look as if they pulled.

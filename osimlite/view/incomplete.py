@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from osimlite.base.text import format_count
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.lint import Finding, Severity
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
@@ -14,6 +15,9 @@ from osimlite.schema.model import Model
 
 MAX_REMARKS = 12
 """Number of single parts that are named; of more, the number is given."""
+
+MAX_SAME = 3
+"""Number of parts with the same reason that are named one by one."""
 
 _MISSING_MESH = "the mesh file"
 _QUOTED_PATH = re.compile(r"'(/[^']+)'")
@@ -112,13 +116,28 @@ def describe_left_out(parts: Sequence[tuple[str, str]]) -> Iterator[str]:
     Args:
         parts: path of each, and why.
     """
-    meshes = [path for path, reason in parts if reason.startswith(_MISSING_MESH)]
-    other_parts = [(path, reason) for path, reason in parts if not reason.startswith(_MISSING_MESH)]
-    for path, reason in other_parts[:MAX_REMARKS]:
-        yield f"not shown: {path}: {reason}"
-    if len(other_parts) > MAX_REMARKS:
-        yield f"not shown: {len(other_parts) - MAX_REMARKS} more parts"
+    # Parts with the same reason are one sentence: a model may have a hundred paths without points.
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for path, reason in parts:
+        key = _MISSING_MESH if reason.startswith(_MISSING_MESH) else reason
+        groups.setdefault(key, []).append((path, reason))
+    # Missing files are the most frequent reason, and the least surprising one: they come last.
+    meshes = groups.pop(_MISSING_MESH, [])
+    rows = [
+        row
+        for group in groups.values()
+        for row in ([group] if len(group) > MAX_SAME else [[part] for part in group])
+    ]
+    yield from map(_describe_group, rows[:MAX_REMARKS])
+    hidden_count = sum(map(len, rows[MAX_REMARKS:]))
+    if hidden_count:
+        yield f"not shown: {format_count(hidden_count, 'more part')}"
     if meshes:
-        reason = next(reason for _, reason in parts if reason.startswith(_MISSING_MESH))
-        mesh_count = f" and {len(meshes) - 1} more" if len(meshes) > 1 else ""
-        yield f"not shown: {meshes[0]}{mesh_count}: {reason}"
+        yield _describe_group(meshes)
+
+
+def _describe_group(parts: Sequence[tuple[str, str]]) -> str:
+    """Return one sentence about parts that are not shown for the reason of the first."""
+    path, reason = parts[0]
+    more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
+    return f"not shown: {path}{more}: {reason}"

@@ -18,6 +18,7 @@ from osimlite.mechanics.kernels.projection import project_speeds
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.polylines import Polylines
+from osimlite.view.tubes import MORE_RINGS, RING, TENDON, lay_tube
 
 FOR_ARMS = (move_links, clear_wrenches, pull_path, add_generalized_forces)
 """Kernels that compute the moment arms of paths."""
@@ -73,6 +74,16 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
             "law": ITEM.LAW,
             "record": ITEM.RECORD,
         },
+        "tubes": {
+            "tendon": TENDON,
+            "more": MORE_RINGS,
+            "size": RING.SIZE,
+            "center": RING.CENTER,
+            "along": RING.ALONG,
+            "across": RING.ACROSS,
+            "radius": RING.RADIUS,
+            "fibers": RING.FIBERS,
+        },
     }
 
 
@@ -81,6 +92,7 @@ def kernels_text(program: Mapping[str, Any]) -> str:
     laws = [find_function(name) for name in program["laws"]]
     functions = [
         place_links,
+        lay_tube,
         *(FOR_ARMS if program["items"] else ()),
         *(FOR_SPEEDS if program["bound"] else ()),
     ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from osimlite.io.meshes.surface import Surface
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.canvas import Canvas
 from osimlite.view.scene import Bodies, Color, Scene
+from osimlite.view.tubes import TENDON, build_tube
 
 SKY = (0.965, 0.973, 0.984)
 """Colour of the background."""
@@ -43,6 +43,9 @@ _FILL = np.array((0.7, 0.1, 0.7)) / np.linalg.norm((0.7, 0.1, 0.7))
 """Unit vector towards the fill light, as seen by the viewer."""
 
 _AMBIENT, _FROM_KEY, _FROM_FILL = 0.42, 0.46, 0.22
+
+_IN_GROUND = np.eye(4)
+"""Matrix of surfaces whose points are in ground."""
 
 _FROM_THE_EDGE = 0.02
 """Sine of the angle below which a surface counts as seen from its edge."""
@@ -172,17 +175,11 @@ def _fill_background(
             opacity,
         )
     for line, corners in zip(scene.lines, bodies.lines, strict=True):
-        if line.visible and line.layer in scene.shown:
+        # A path that cannot be traced in this pose has no corners.
+        if line.visible and line.layer in scene.shown and len(corners):
+            surface, is_tendon = build_tube(line, corners)
             color = style.colors.get(line.path, line.color)
-            # Corners of a line are balls, which close the gaps between cylinders.
-            for start, end in pairwise(corners):
-                triangles.add_surface(
-                    unit_shapes.make_cylinder(8), _make_cylinder(start, end, line.radius), color
-                )
-            for corner in corners:
-                triangles.add_surface(
-                    unit_shapes.make_ball(8, 4), _scale_shape(corner, line.radius), color
-                )
+            triangles.add_surface(surface, _IN_GROUND, np.where(is_tendon[:, None], TENDON, color))
     if "frames" in scene.shown:
         for axes in scene.axes:
             transform = bodies.transform_frame(axes.body, axes.matrix)
@@ -292,19 +289,28 @@ class _TriangleList:
         self,
         surface: Surface,
         matrix: Array,
-        color: Color | tuple[float, ...],
+        color: Color | tuple[float, ...] | Array,
         opacity: float = 1.0,
         *,
         is_lit: bool = True,
         in_front: bool = False,
     ) -> None:
-        """Add a surface placed in ground by `matrix` (4, 4); `in_front`: in front of all that is further than 1 km."""
+        """Add a surface to the list.
+
+        Args:
+            surface: the surface.
+            matrix: affine matrix (4, 4) that places it in ground.
+            color: one colour, or those of its points (n, 3).
+            opacity: 0 to 1.
+            is_lit: whether light makes its sides differ.
+            in_front: whether it is drawn in front of all that is further away than 1 km.
+        """
         points = surface.points @ matrix[:3, :3].T + matrix[:3, 3]
         vertices = self.camera.project_points(points, self.width, self.height)
         if in_front:
             # 1 km towards the viewer.
             vertices[:, 2] += 1e3
-        shades = np.tile(np.array(color, dtype=float), (len(points), 1))
+        shades = np.array(np.broadcast_to(np.asarray(color, dtype=float), points.shape))
         if is_lit:
             # Normals follow the cofactors, which also serve what is stretched or flat.
             linear_part = matrix[:3, :3]
@@ -357,10 +363,4 @@ def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3] = np.column_stack((radius * x, radius * np.cross(z, x), length * z))
     matrix[:3, 3] = 0.5 * (start + end)
-    return matrix
-
-
-def _scale_shape(center: Array, radius: float) -> Array:
-    matrix = np.diag((radius, radius, radius, 1.0))
-    matrix[:3, 3] = center
     return matrix

@@ -13,7 +13,7 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError
 from osimlite.view import Shown, incomplete
-from osimlite.view.incomplete import MAX_REMARKS, build_showable, describe_left_out
+from osimlite.view.incomplete import MAX_REMARKS, MAX_SAME, build_showable, describe_left_out
 from tests.cli.command import run
 
 
@@ -110,7 +110,7 @@ def test_a_fault_of_no_single_part_stays_an_error(monkeypatch: pytest.MonkeyPatc
 
 
 def test_many_parts_are_counted() -> None:
-    parts = [(f"/a/{number}", "it is wrong") for number in range(MAX_REMARKS + 3)]
+    parts = [(f"/a/{number}", f"fault {number} is in it") for number in range(MAX_REMARKS + 3)]
     meshes = [
         ("/b/1", "the mesh file x.vtp is missing"),
         ("/b/2", "the mesh file y.vtp is missing"),
@@ -118,3 +118,12 @@ def test_many_parts_are_counted() -> None:
     lines = [*describe_left_out([*parts, *meshes])]
     assert len(lines) == MAX_REMARKS + 2 and lines[-2] == "not shown: 3 more parts"
     assert lines[-1] == "not shown: /b/1 and 1 more: the mesh file x.vtp is missing"
+
+
+def test_parts_with_the_same_reason_are_one_sentence() -> None:
+    reason = "is a FunctionBasedPath, which has no points"
+    parts = [(f"/a/{number}", reason) for number in range(MAX_SAME + 1)]
+    assert [*describe_left_out([parts[0], ("/b", "is wrong"), *parts[1:]])] == [
+        f"not shown: /a/0 and {MAX_SAME} more: {reason}",
+        "not shown: /b: is wrong",
+    ]

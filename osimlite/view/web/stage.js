@@ -3,7 +3,7 @@
 (() => {
   const { bytes, point, Tubes } = window.osimlite;
   const T = window.THREE;
-  const FORCE = 0xd55e00, MEASURED = 0x009e73, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, TENDON = 0xe3c88c, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
+  const FORCE = 0xd55e00, MEASURED = 0x009e73, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
 
   const floats = (text) => new Float32Array(bytes(text).buffer);
   const toned = ([r, g, b]) => new T.Color().setRGB(r, g, b, T.SRGBColorSpace);
@@ -128,7 +128,7 @@
     tubes(layer) {
       const lines = [...this.data.lines.entries()].filter(([, line]) => line.layer === layer && line.visible);
       if (!lines.length) return;
-      const tubes = new Tubes(lines);
+      const tubes = new Tubes(lines, this.mechanism.tubes);
       this.layers[layer].add(tubes.mesh);
       if (layer === "geometry") this.scene.add(this.layers.geometry);
       (this.tubed ||= []).push(tubes);
@@ -247,7 +247,7 @@
 
     // Colour lines: what is selected, what something was found at, muscles by their activation, as OpenSim does.
     color(tubes) {
-      const tendon = new T.Color(TENDON);
+      const tendon = toned(this.mechanism.tubes.tendon);
       tubes.color(Object.fromEntries(tubes.lines.map(([place, line]) => {
         const [glow, strength] = this.glow(line.path), levels = this.data.motion?.activations[line.path];
         if (glow === SELECTED) return [place, [new T.Color(CHOSEN), tendon]];

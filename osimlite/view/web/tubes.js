@@ -1,15 +1,18 @@
 "use strict";
 // Lines as tubes: muscles with fibers in the middle and thin, pale tendons at their ends, springs, sticks.
+// The kernel lay_tube has the shape, which pictures without a browser share.
 (() => {
   const T = window.THREE;
-  // Corners of a ring; rings along the fibers of a muscle; rings that round off both ends.
-  const ROUND = 10, FIBERS = 14, ENDS = 6;
+  // Corners of a ring.
+  const ROUND = 10;
 
   class Tubes {
-    // lines: [place, line] each, with what `Line` of the scene says.
-    constructor(lines) {
+    // lines: [place, line] each, with what `Line` of the scene says. layout: of the rings, as the kernel writes them.
+    constructor(lines, layout) {
       this.lines = lines;
-      this.rings = lines.map(([, line]) => ENDS + (line.points ? line.points.length : line.most) + (line.fibers ? FIBERS + 3 : 0));
+      this.layout = layout;
+      this.rings = lines.map(([, line]) => layout.more + (line.points ? line.points.length : line.most));
+      this.laid = new Float64Array(layout.size * Math.max(...this.rings));
       const count = this.rings.reduce((sum, n) => sum + n, 0), index = [];
       // Which line each ring belongs to, and whether it is one of fibers.
       this.owners = new Int32Array(count);
@@ -47,29 +50,26 @@
 
     // Put the rings where the corners of the lines are. corners(place): of a line; grown(line): how much thicker it is.
     lay(corners, grown) {
-      const { position, normal } = this.mesh.geometry.attributes;
+      const { position, normal } = this.mesh.geometry.attributes, { layout, laid } = this;
       let ring = 0;
       this.lines.forEach(([place, line], k) => {
-        const stations = rounded(stationsOf(line, corners(place).map((c) => new T.Vector3(...c))), grown(line));
-        const end = ring + this.rings[k];
-        let along = null, across = null;
+        const all = corners(place), end = ring + this.rings[k];
+        const count = window.osimlite.kernels.lay_tube(
+          all.flat(), all.length, line.radius, line.fibers, line.tendon, grown(line), laid);
+        // A path that cannot be traced here is a point.
+        if (!count) laid.fill(0);
         for (let s = 0; ring < end; ring++, s++) {
           // Rings that are left over lie where the last one is.
-          const here = stations[Math.min(s, stations.length - 1)];
-          if (s < stations.length) {
-            along = here.along;
-            if (across) across.addScaledVector(along, -across.dot(along));
-            if (!across || across.lengthSq() < 1e-12) across = aside(along);
-            across.normalize();
-          }
-          const third = along.clone().cross(across);
+          const here = laid.subarray(layout.size * Math.max(0, Math.min(s, count - 1)));
+          const [center, along, across] = ["center", "along", "across"].map((name) => new T.Vector3().fromArray(here, layout[name]));
+          const third = along.cross(across), radius = here[layout.radius];
           for (let j = 0, at = ring * ROUND; j < ROUND; j++, at++) {
             const c = Math.cos(2 * Math.PI * j / ROUND), d = Math.sin(2 * Math.PI * j / ROUND);
-            const out = [0, 1, 2].map((x) => c * across.getComponent(x) + d * third.getComponent(x));
-            normal.setXYZ(at, ...out);
-            position.setXYZ(at, ...out.map((o, x) => here.at.getComponent(x) + here.radius * o));
+            const x = c * across.x + d * third.x, y = c * across.y + d * third.y, z = c * across.z + d * third.z;
+            normal.setXYZ(at, x, y, z);
+            position.setXYZ(at, center.x + radius * x, center.y + radius * y, center.z + radius * z);
           }
-          this.fibers[ring] = here.fibers;
+          this.fibers[ring] = here[layout.fibers];
         }
       });
       position.needsUpdate = normal.needsUpdate = true;
@@ -91,53 +91,6 @@
       const ring = this.owners.findIndex((owner, k) => owner === place && this.fibers[k]);
       return [...this.mesh.geometry.attributes.color.array.slice(3 * ROUND * ring, 3 * ROUND * ring + 3)];
     }
-  }
-
-  // Where a line has rings: the middle, the radius, whether fibers are there. Half of the tendon is at each end.
-  function stationsOf(line, corners) {
-    const at = [0];
-    corners.slice(1).forEach((corner, k) => at.push(at[k] + corner.distanceTo(corners[k])));
-    const whole = at[at.length - 1];
-    if (!line.fibers || !(whole > 0)) return corners.map((corner) => ({ at: corner, radius: line.radius, fibers: 1 }));
-    const first = Math.min(0.5 * line.tendon, 0.4 * whole), last = whole - first;
-    const between = (x) => {
-      const k = Math.max(1, at.findIndex((end) => end >= x)), span = at[k] - at[k - 1];
-      return corners[k - 1].clone().lerp(corners[k], span > 0 ? (x - at[k - 1]) / span : 0);
-    };
-    const thick = (x) => line.radius + (line.fibers - line.radius) * Math.sin(Math.PI * (x - first) / (last - first)) ** 0.7;
-    const belly = Array.from({ length: FIBERS + 1 }, (_, k) => first + (last - first) * k / FIBERS);
-    const inside = at.map((x, k) => [x, corners[k]]).filter(([x]) => x > first && x < last);
-    const tendon = (x, corner) => ({ at: corner, radius: line.radius, fibers: 0 });
-    return [
-      ...at.flatMap((x, k) => x < first ? [tendon(x, corners[k])] : []), ...(first > 0 ? [tendon(first, between(first))] : []),
-      ...[...belly.map((x) => [x, between(x)]), ...inside].sort((a, b) => a[0] - b[0])
-        .map(([x, corner]) => ({ at: corner, radius: Math.max(line.radius, thick(x) || 0), fibers: 1 })),
-      ...(first > 0 ? [tendon(last, between(last))] : []), ...at.flatMap((x, k) => x > last ? [tendon(x, corners[k])] : []),
-    ];
-  }
-
-  // The same with directions, grown, and with round ends.
-  function rounded(stations, grown) {
-    const count = stations.length;
-    let before = new T.Vector3(0, 1, 0);
-    const rings = stations.map(({ at, radius, fibers }, k) => {
-      const steps = [stations[Math.min(k + 1, count - 1)].at.clone().sub(at), at.clone().sub(stations[Math.max(k - 1, 0)].at)];
-      const along = new T.Vector3();
-      for (const step of steps) if (step.lengthSq() > 1e-16) along.add(step.normalize());
-      before = along.lengthSq() > 1e-12 ? along.normalize() : before.clone();
-      return { at, radius: grown * radius, fibers, along: before };
-    });
-    const cap = (ring, way) => [[1, 0], [0.7, 0.7], [0.3, 0.95]].map(([out, wide]) => (
-      { ...ring, at: ring.at.clone().addScaledVector(ring.along, way * out * ring.radius), radius: wide * ring.radius }));
-    return [...cap(rings[0], -1), ...rings, ...cap(rings[count - 1], 1).reverse()];
-  }
-
-  // A direction at right angles to another.
-  function aside(along) {
-    const { x, y, z } = along, least = Math.min(Math.abs(x), Math.abs(y), Math.abs(z));
-    const other = new T.Vector3(Number(Math.abs(x) === least), 0, 0);
-    if (!other.x) other.setComponent(Math.abs(y) === least ? 1 : 2, 1);
-    return other.cross(along);
   }
 
   Object.assign(window.osimlite, { Tubes });
