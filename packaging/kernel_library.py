@@ -241,8 +241,9 @@ def is_current(library: Path, compiler: toolchain.Compiler) -> bool:
 
 
 def recipe() -> str:
-    """Return a digest of this file, which decides how the library is made."""
-    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
+    """Return a digest of this file and of the compilers' options, which decide how the library is made."""
+    contents = (Path(path).read_bytes() for path in (__file__, toolchain.__file__))
+    return hashlib.sha256(b"".join(contents)).hexdigest()[:16]
 
 
 def build_in_place(target: str = toolchain.NATIVE) -> str:

@@ -88,6 +88,10 @@ def test_targets():
     assert "-march=native" in GCC.flags(NATIVE) and "-march=x86-64-v3" in CLANG.flags(X86_64_V3)
     assert not any(flag.startswith("-march") for flag in GCC.flags(BASELINE))
     assert "-mcpu=native" in GCC._replace(machine="aarch64").flags(NATIVE)
+    # Only g++ chooses vectors by the name of the processor.
+    assert "-mprefer-vector-width=256" in GCC.flags(NATIVE)
+    assert "-mprefer-vector-width=256" not in CLANG.flags(NATIVE)
+    assert "-mprefer-vector-width=256" not in GCC._replace(machine="aarch64").flags(NATIVE)
     # Only g++ has limits of inlining that are too low.
     assert any(flag.startswith("--param") for flag in GCC.flags(NATIVE))
     assert not any(flag.startswith("--param") for flag in CLANG.flags(NATIVE))

