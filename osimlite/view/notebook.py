@@ -80,8 +80,9 @@ def model(shown_model: Model) -> str:
 
 
 def trajectory(shown_trajectory: Trajectory) -> str:
-    """Return a one-line summary and, if the model is known, a player of the motion as HTML."""
-    return f"<div>{escape(repr(shown_trajectory))}</div>" + (
+    """Return a summary that opens to a table and, if the model is known, a player of the motion as HTML."""
+    summary = f"<summary>{escape(shown_trajectory.heading)}</summary>"
+    return f"<details>{summary}{shown_trajectory.format_html_table()}</details>" + (
         ""
         if shown_trajectory.model is None
         else _embed_viewer(shown_trajectory.model, shown_trajectory)

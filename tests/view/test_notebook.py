@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 import time
-from html import unescape
+from html import escape, unescape
 from pathlib import Path
 
 import osimlite
@@ -112,6 +112,15 @@ def test_paths_are_a_table_of_lengths_and_moment_arms():
     html = osimlite.paths(model)._repr_html_()
     # The hypotenuse of 0.05 and 0.12 m, and the area of the triangle.
     assert "<td style='text-align:left'>0.13</td>" in html and "flexion 0.04615" in html
+
+
+def test_a_motion_has_a_heading_and_a_table_of_its_columns():
+    motion = osimlite.simulate(dynamic_walker(), to=0.01)
+    html = motion._repr_html_().partition("<iframe")[0]
+    assert html.startswith(f"<details><summary>{escape(motion.heading)}</summary><table>")
+    # One row for each coordinate, below the head.
+    assert html.count("<tr>") == 1 + len(motion.coordinates)
+    assert "<td>rad</td>" in html and "smallest" in html
 
 
 def test_a_motion_is_played_in_a_frame_without_rights(open_page, tmp_path: Path):

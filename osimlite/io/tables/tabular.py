@@ -66,6 +66,13 @@ class Tabular(ABC):
         # Only notebooks need it.
         from html import escape
 
+        return f"<div>{escape(self.heading)}</div>{self.format_html_table()}"
+
+    def format_html_table(self) -> str:
+        """Return smallest and largest values of the first columns as an HTML table, without the heading."""
+        # Only notebooks need it.
+        from html import escape
+
         columns = self._listed
         header = "".join(f"<th>{word}</th>" for word in ("", "smallest", "largest", "unit"))
         rows = "".join(
@@ -79,7 +86,7 @@ class Tabular(ABC):
             else ""
         )
         table = f"<table><thead><tr>{header}</tr></thead><tbody>{rows}</tbody></table>"
-        return f"<div>{escape(self.heading)}</div>{table}{footer}"
+        return f"{table}{footer}"
 
     @property
     @abstractmethod
