@@ -7,7 +7,7 @@ longer than most commands run, so valid command lines are parsed here without it
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import UnionType
@@ -129,14 +129,17 @@ class Command:
     Args:
         function: the function; each parameter is annotated with a :class:`ParameterSpec`.
         more: returns further options, which the function takes as keyword arguments.
+        groups: names of parameters by the heading under which the help lists them.
     """
 
     def __init__(
         self,
         function: Callable[..., None],
         list_further_options: Callable[[], Iterable[OptionSpec]] = tuple,
+        groups: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         self.function, self._more = function, list_further_options
+        self.groups = groups or {}
         self.__name__, self.__doc__, self.__module__ = (
             function.__name__,
             function.__doc__,
@@ -310,6 +313,12 @@ def command(function: Callable[..., None]) -> Command:
 
 def command_with(
     list_further_options: Callable[[], Iterable[OptionSpec]],
+    groups: Mapping[str, Sequence[str]] | None = None,
 ) -> Callable[[Callable[..., None]], Command]:
-    """Decorate a function as a command with further options, which it takes as keyword arguments."""
-    return lambda function: Command(function, list_further_options)
+    """Decorate a function as a command with further options.
+
+    Args:
+        list_further_options: returns the options, which the function takes as keyword arguments.
+        groups: names of parameters by the heading under which the help lists them.
+    """
+    return lambda function: Command(function, list_further_options, groups)

@@ -35,9 +35,12 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
     for paragraph in (command.__doc__ or "").strip().split("\n\n"):
         lines += [*_wrap(" ".join(paragraph.split()), width, 0), ""]
     groups: dict[str, list[Any]] = {"Arguments": arguments} if arguments else {}
+    groups["Options"] = []
+    heading_of = {member: heading for heading, group in command.groups.items() for member in group}
     for parameter in parameters:
         if parameter.declared.maker == "Option":
-            heading = parameter.declared.settings.get("rich_help_panel") or "Options"
+            own_heading = parameter.declared.settings.get("rich_help_panel") or "Options"
+            heading = heading_of.get(parameter.name, own_heading)
             groups.setdefault(heading, []).append(parameter)
     for heading, group in groups.items():
         lines.append(f"{start}{heading}:{end}")
@@ -45,17 +48,18 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
             is_argument = parameter.declared.maker == "Argument"
             name_text = _name_argument(parameter) if is_argument else _name_option(parameter)
             lines += _format_entry(name_text, _explain(parameter), width, start, end)
+        if heading == "Options":
+            lines += _format_entry("-h, --help", "Show this text.", width, start, end)
         lines.append("")
-    # The last line is the blank one after the last group, which ends with this option.
-    lines[-1:] = [*_format_entry("-h, --help", "Show this text.", width, start, end), ""]
     return "\n".join(lines)
 
 
 def _name_argument(parameter: Any) -> str:
-    """Return an argument in capitals, with dots for several and brackets if it may be left out."""
+    """Return an argument in capitals, with dots for any number of values and brackets if it may be left out."""
     _, is_list = parameter.scalar()
     argument_name = (parameter.declared.settings.get("metavar") or parameter.name).upper()
-    argument_name = f"{argument_name}..." if is_list else argument_name
+    # Several words name each value of a list of that length, such as OLD NEW.
+    argument_name = f"{argument_name}..." if is_list and " " not in argument_name else argument_name
     return argument_name if parameter.default is ... else f"[{argument_name}]"
 
 

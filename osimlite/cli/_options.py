@@ -43,7 +43,7 @@ To = Annotated[float, Option("--to", metavar="SECONDS", help="Duration of the si
 Engine = Annotated[
     str | None,
     Option(
-        help="Engine that computes the accelerations: 'compiled' or 'bullet' (PyBullet).",
+        help="'compiled' or 'bullet' (PyBullet).",
         show_default="compiled",
     ),
 ]
@@ -109,7 +109,7 @@ Controls = Annotated[
     Option(
         "--controls",
         metavar="CONTROLS",
-        help="Controls: a table over time, or NAME=VALUE; repeatable.",
+        help="Table of controls, or NAME=VALUE; repeatable.",
         show_default=False,
     ),
 ]
@@ -118,7 +118,7 @@ Controller = Annotated[
     Option(
         "--controller",
         metavar="FILE",
-        help="Reflexes that control actuators: a file of a controller or a scenario, .yaml or .scone.",
+        help="Reflexes: a controller or a scenario, .yaml or .scone.",
         show_default=False,
     ),
 ]

@@ -17,11 +17,9 @@ Vary = Annotated[
     Option(
         "--vary",
         metavar="NAME=RANGE",
-        help="NAME: a coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a "
-        "parameter of the model function or controller (default: all of these parameters). RANGE: LOW:HIGH "
-        "(LOW:HIGH:log for a logarithmic scale, LOW:HIGH:COUNT in a sweep). MUSCLE/control@0:0.5:6 varies six nodes "
-        "from 0 to 0.5 s, @switch1 the time of a switch. Names with * and ? or commas share one value; {*} makes "
-        "one variable for each match.",
+        help="NAME: a coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY, or a parameter of the model "
+        "function or controller (default: all of these). RANGE: LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. "
+        "Wildcards, factors, and controls that change over time: docs/sweeps.md.",
         show_default=False,
     ),
 ]
@@ -66,7 +64,7 @@ Workers = Annotated[
     Option(
         min=1,
         metavar="N",
-        help="Number of threads or processes.",
+        help="Threads or processes.",
         show_default="one per core",
     ),
 ]
@@ -75,6 +73,13 @@ Cluster = Annotated[
     Option(metavar="ADDRESS", help="Use the Dask cluster of this scheduler.", show_default=False),
 ]
 
+
+SIMULATION_PARAMETERS = (
+    *("to", "engine", "stop_below", "stop_above", "planted", "foot", "report_interval", "parameter"),
+    *("controls", "controller", "par", "interpolation", "accuracy", "integrator", "equilibrate"),
+    *("wrapping", "skip_unsupported"),
+)
+"""Parameters of the simulations, which the help lists as a group."""
 
 SWEEP_OPTIONS = "wrapping", "equilibrate", "skip_unsupported"
 """Simulation options that sweeps accept besides those of integration."""

@@ -14,7 +14,16 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.optimize import Optimum
 
 
-@command_with(options.list_simulation_options(*sweeping.SWEEP_OPTIONS, integration=True))
+@command_with(
+    options.list_simulation_options(*sweeping.SWEEP_OPTIONS, integration=True),
+    {
+        "Search": (
+            *("method", "popsize", "sigma", "seed", "start", "maximize", "unbounded", "tolerance"),
+            *("measure", "workers", "cluster"),
+        ),
+        "Simulation": sweeping.SIMULATION_PARAMETERS,
+    },
+)
 def optimize(
     source: options.Source,
     objective: Annotated[
@@ -41,14 +50,14 @@ def optimize(
     ] = None,
     sigma: Annotated[
         float,
-        Option(help="Initial standard deviation, as a fraction of the ranges."),
+        Option(help="Initial standard deviation / range."),
     ] = 0.25,
     seed: Annotated[int, Option(help="Seed of the random numbers.")] = 0,
     start: Annotated[
         Path | None,
         Option(
             metavar="FOLDER",
-            help="Begin at the result of another search.",
+            help="Start from another search.",
             show_default="the model",
         ),
     ] = None,
@@ -90,7 +99,7 @@ def optimize(
             "-o",
             "--output",
             metavar="FOLDER",
-            help="Folder of the history, best.osim and summary.json.",
+            help="Folder of the results.",
         ),
     ] = Path("optimum"),
     resume: Annotated[

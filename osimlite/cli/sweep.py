@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.run import Outcome
 
 
-@command_with(options.list_simulation_options(*sweeping.SWEEP_OPTIONS, integration=True))
+@command_with(
+    options.list_simulation_options(*sweeping.SWEEP_OPTIONS, integration=True),
+    {"Simulation": sweeping.SIMULATION_PARAMETERS},
+)
 def sweep(
     source: options.Source,
     vary: sweeping.Vary = None,

@@ -38,7 +38,7 @@ MEANINGS = {
 
 SCREEN_LINES = 45
 """Lines of a terminal that fills a laptop's screen."""
-SMALL_SCREEN_LINES = 40
+SMALL_SCREEN_LINES = 38
 """Lines of a smaller terminal, on two of which the searches and sweeps fit."""
 
 
@@ -51,8 +51,29 @@ def application():
 def test_help_fits_80_columns_and_two_screens(command):
     lines = format_help(command, load_command(command), 80).splitlines()
     assert max(map(len, lines)) <= 80
-    is_short = command in ("optimize", "sweep", "simulate", "translate")
+    is_short = command in ("optimize", "sweep", "simulate")
     assert len(lines) <= 2 * (SMALL_SCREEN_LINES if is_short else SCREEN_LINES)
+
+
+def test_long_helps_have_groups_that_have_each_option_once():
+    lines = format_help("optimize", load_command("optimize"), 80).splitlines()
+    headings = [line for line in lines if line.endswith(":") and not line.startswith(" ")]
+    assert headings == ["Arguments:", "Options:", "Search:", "Simulation:"]
+    starts = [lines.index(heading) for heading in headings]
+    rows = {line.split()[0]: number for number, line in enumerate(lines) if line[:3] == "  -"}
+    assert starts[1] < rows["--objective"] < starts[2] < rows["--method"] < starts[3] < rows["--to"]
+    assert sum("--help" in line for line in lines) == 1 and starts[1] < rows["-h,"] < starts[2]
+    for name in ("optimize", "sweep"):
+        command = load_command(name)
+        names = {parameter.name for parameter in command.parameters()}
+        grouped = [member for group in command.groups.values() for member in group]
+        assert names >= set(grouped) and len(grouped) == len(set(grouped))
+
+
+def test_a_pair_of_files_has_no_dots():
+    text = format_help("diff", load_command("diff"), 80)
+    assert "OLD NEW\n" in text and "NEW..." not in text
+    assert "PATH...\n" in format_help("validate", load_command("validate"), 80)
 
 
 def test_help_names_every_option_with_its_default(application):
