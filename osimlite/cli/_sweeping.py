@@ -75,7 +75,16 @@ Cluster = Annotated[
 
 
 SIMULATION_PARAMETERS = (
-    *("to", "engine", "stop_below", "stop_above", "planted", "foot", "report_interval", "parameter"),
+    *(
+        "to",
+        "engine",
+        "stop_below",
+        "stop_above",
+        "planted",
+        "foot",
+        "report_interval",
+        "parameter",
+    ),
     *("controls", "controller", "par", "interpolation", "accuracy", "integrator", "equilibrate"),
     *("wrapping", "skip_unsupported"),
 )

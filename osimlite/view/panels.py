@@ -8,6 +8,7 @@ import textwrap
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -63,9 +64,11 @@ TITLE_HEIGHT_IN = 0.5
 """Height of the title of a page, inches."""
 PANEL_HEIGHT_IN = 2.15
 """Height of a panel with its margins, inches."""
+GAP_ROWS = 2
+"""Number of last rows whose gaps a small group fills."""
 PANEL_WIDTH_IN = 3.6
 """Width of a panel with its margins, inches."""
-PANEL_MARGINS_IN = {"left": 0.62, "right": 0.1, "bottom": 0.26, "top": 0.34}
+PANEL_MARGINS_IN = {"left": 0.62, "right": 0.16, "bottom": 0.26, "top": 0.34}
 """Margins around the axes of a panel for ticks, label and title, inches."""
 LABEL_HEIGHT_IN = 0.16
 """Height of the label of the abscissa, which only the lowest panel of a column has, inches."""
@@ -214,10 +217,10 @@ def group_columns(
     steps: Mapping[str, StepTimes] | None = None,
     style: str = "-",
     label: str = "",
-) -> tuple[list[Panel], str]:
+) -> tuple[list[Panel], dict[str, str]]:
     """Group columns into panels: one for the left and right column of a quantity.
 
-    Columns without any change have no panel, but the note names them.
+    Columns without any change have no panel, but the note of their section names them.
 
     Args:
         columns: columns, each (n,).
@@ -227,13 +230,12 @@ def group_columns(
         label: name of the curves in the legend.
 
     Returns:
-        The panels, with those of one group one after the other, and the note, "" without constant
-        columns.
+        The panels, with those of one group one after the other, and the notes by section.
     """
     all_columns = list(columns)
     sides = split_sides(column.name for column in all_columns)
     panels: dict[tuple[str, str, str], Panel] = {}
-    constant = []
+    constant: dict[str, list[str]] = {}
     largest = _find_largest(all_columns)
     for column in all_columns:
         base_name, side = sides[column.name]
@@ -241,7 +243,8 @@ def group_columns(
         if column.unit in FORCE_UNITS:
             values = np.where(np.abs(values) <= NOISE * largest[column.unit], 0.0, values)
         if is_constant(values):
-            constant.append(_describe_constant(column, values))
+            descriptions = constant.setdefault(column.section, [])
+            descriptions.append(_describe_constant(column, values))
             continue
         # A quantity without a curve on the other side keeps its name.
         panel = panels.setdefault(
@@ -261,7 +264,8 @@ def group_columns(
     groups: dict[tuple[str, str], list[Panel]] = {}
     for panel in panels.values():
         groups.setdefault((panel.section, panel.group), []).append(panel)
-    return [panel for group in groups.values() for panel in group], _describe_constants(constant)
+    notes = {section: _describe_constants(names) for section, names in constant.items()}
+    return [panel for group in groups.values() for panel in group], notes
 
 
 def _find_largest(columns: Iterable[Column]) -> dict[str, float]:
@@ -291,8 +295,7 @@ def _describe_constant(column: Column, values: Array) -> str:
 
 
 def _describe_constants(descriptions: Sequence[str]) -> str:
-    if not descriptions:
-        return ""
+    """Return the note about columns that do not change."""
     hidden_note = (
         f", and {len(descriptions) - MAX_CONSTANTS} more"
         if len(descriptions) > MAX_CONSTANTS
@@ -311,7 +314,11 @@ def merge_panels(panels: Iterable[Panel]) -> list[Panel]:
 
 
 def draw_pages(
-    title: str, panels: Sequence[Panel], *, abscissa: str = "time (s)", note: str = ""
+    title: str,
+    panels: Sequence[Panel],
+    *,
+    abscissa: str = "time (s)",
+    notes: Mapping[str, str] = MappingProxyType({}),
 ) -> Iterator[Any]:
     """Yield the figures of panels, at most `MAX_PANELS` on each.
 
@@ -322,7 +329,8 @@ def draw_pages(
         title: title of the figures; "" for none.
         panels: what to draw; without any panel there is no figure.
         abscissa: label of the abscissa, where it is not the gait cycle.
-        note: sentence below the panels of the last page.
+        notes: sentences by section, below the panels on its last page. Those of sections without
+            panels are on the last page of all.
 
     Yields:
         The figures of each section, one section after the other.
@@ -341,11 +349,23 @@ def draw_pages(
             if page_title and len(section_pages) > 1:
                 page_title += f" ({number} of {len(section_pages)})"
             label = "gait cycle (%)" if cyclic else abscissa
-            pages.append(Page(page_title, rows, label, step_note, cyclic))
+            section_note = notes.get(section, "") if number == len(section_pages) else ""
+            note = ". ".join(filter(None, (section_note, step_note)))
+            band_note = _describe_bands(rows) if cyclic else ""
+            note = "\n".join(filter(None, (note, band_note)))
+            pages.append(Page(page_title, rows, label, note, cyclic))
     if pages:
-        last_note = ". ".join(filter(None, (note, step_note)))
+        others = [note for section, note in notes.items() if section not in sections]
+        last_note = "\n".join(filter(None, (pages[-1].note, *others)))
         pages[-1] = pages[-1]._replace(note=last_note)
     yield from map(_draw_page, pages)
+
+
+def _describe_bands(rows: Iterable[Iterable[Panel]]) -> str:
+    """Return the note about the references behind the curves of a page, "" without any."""
+    bands = [panel.band for row in rows for panel in row if panel.band is not None]
+    sources = sorted({band.source for band in bands})
+    return f"Grey: mean and one standard deviation, {', '.join(sources)}" if sources else ""
 
 
 def has_cycles(panels: Iterable[Panel]) -> bool:
@@ -369,7 +389,7 @@ def _select_cycles(curve: PanelCurve) -> list[tuple[float, float]]:
 def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
     """Yield the rows of each page.
 
-    A group starts a new row where it fits in one row, but not in the rest of the row before.
+    A group stays in one row where it fits in one.
     """
     count = len(panels)
     # Four panels are two rows of two.
@@ -385,13 +405,21 @@ def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
 
 
 def _fill_rows(groups: Iterable[Sequence[Panel]], width: int) -> list[list[Panel]]:
-    """Return rows in which no group is divided that fits in one."""
+    """Return rows in which no group is divided that fits in one.
+
+    A small group fills the gap of one of the last rows, so that panels stay near their place in the
+    order of the columns.
+    """
     rows: list[list[Panel]] = []
     for group in groups:
-        for index, panel in enumerate(group):
-            free_columns = width - len(rows[-1]) if rows else 0
-            splits = index == 0 and len(group) > 1 and free_columns < len(group) <= width
-            if not free_columns or splits:
+        if len(group) <= width:
+            row = next((row for row in rows[-GAP_ROWS:] if len(row) + len(group) <= width), None)
+            if row is None:
+                rows.append(row := [])
+            row.extend(group)
+            continue
+        for panel in group:
+            if not rows or len(rows[-1]) == width:
                 rows.append([])
             rows[-1].append(panel)
     return rows

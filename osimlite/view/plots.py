@@ -134,9 +134,9 @@ def _draw_table(
         return
     rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
     table = StoTable(name or title, times, tuple(columns), rows)
-    panels, note = group_columns(describe_columns(table, names), times)
+    panels, notes = group_columns(describe_columns(table, names), times)
     file_stem = title.lower().replace(" ", "_")
-    yield from name_pages(file_stem, draw_pages(title, panels, note=note))
+    yield from name_pages(file_stem, draw_pages(title, panels, notes=notes))
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:

@@ -86,13 +86,13 @@ def plot_table(table: StoTable) -> Pages:
 
 def _plot_columns(table: StoTable, names: ColumnNames) -> Pages:
     _require_times(len(table.times))
-    panels, note = group_columns(describe_columns(table, names), table.times)
+    panels, notes = group_columns(describe_columns(table, names), table.times)
     file_stem = (
         Path(table.file).stem if table.file else table.name.lower().replace(" ", "_") or "table"
     )
 
     def draw() -> Iterator[tuple[str, Any]]:
-        yield from name_pages(file_stem, draw_pages(make_title(file_stem), panels, note=note))
+        yield from name_pages(file_stem, draw_pages(make_title(file_stem), panels, notes=notes))
 
     with plain_lettering():
         return Pages(draw())

@@ -397,17 +397,12 @@ def plot_tables(
         # A dot in the name of a tool is no ending.
         file_stem = re.sub(r"\.(sto|mot|xml|trc)$", "", PurePath(name).name)
         if len(table.times) > 1:
-            panels, note = group_columns(describe_columns(table, names), table.times, steps=steps)
+            panels, notes = group_columns(describe_columns(table, names), table.times, steps=steps)
             panels = [panel._replace(band=(bands or {}).get(panel.title)) for panel in panels]
             titles += [panel.title for panel in panels]
             is_cyclic = is_cyclic or has_cycles(panels)
-            sources = {panel.band.source for panel in panels if panel.band is not None}
-            if sources and has_cycles(panels):
-                note = (
-                    f"{note}\nGrey: mean and one standard deviation, {', '.join(sources)}".strip()
-                )
             paths += write_pages(
-                draw_pages(make_title(file_stem), panels, note=note), base, file_stem
+                draw_pages(make_title(file_stem), panels, notes=notes), base, file_stem
             )
         if report is not None:
             report(number, len(tables))

@@ -71,14 +71,14 @@ def test_left_and_right_share_a_panel_of_one_unit():
         Column("locked", "deg", 0.0 * TIMES + 3.0),
         Column("unknown", "N", np.nan * TIMES),
     ]
-    panels, note = panels_of(columns)
+    panels, notes = panels_of(columns)
     assert [(panel.title, panel.unit) for panel in panels] == [
         ("knee_angle", "deg"),
         ("pelvis_tx", "m"),
     ]
     assert [curve.side for curve in panels[0].curves] == ["r", "l"]
-    assert note == "Constant: locked 3 deg, unknown (no values)"
-    (figure,) = drawn(panels, note=note)
+    assert notes == {"": "Constant: locked 3 deg, unknown (no values)"}
+    (figure,) = drawn(panels, notes=notes)
     assert [axes.get_title(loc="left") for axes in figure.axes] == [
         "knee angle (deg)",
         "pelvis tx (m)",
@@ -104,7 +104,38 @@ def test_a_group_begins_a_row_if_it_fits_there_only():
     (figure,) = drawn(panels_of(columns)[0])
     tops = [round(axes.get_position().y1, 6) for axes in figure.axes]
     rows = [sorted({*tops}, reverse=True).index(top) for top in tops]
-    assert rows == [0, 1, 1, 1, 2]
+    # The knee fills the gap beside the pelvis.
+    assert [axes.get_title(loc="left")[:4] for axes in figure.axes] == [
+        "pelv", "knee", "hip0", "hip1", "hip2"
+    ]  # fmt: skip
+    assert rows == [0, 0, 1, 1, 1]
+
+
+def test_small_groups_fill_gaps_near_their_place():
+    sizes = (2, 2, 1, 1, 2, 2, 2, 2, 1)
+    columns = [
+        Column(f"{name}{k}", "deg", wave(k), name)
+        for name, size in zip("abcdefghi", sizes, strict=True)
+        for k in range(size)
+    ]
+    figures = drawn(panels_of(columns)[0])
+    titles = [axes.get_title(loc="left")[:2] for figure in figures for axes in figure.axes]
+    # "i" does not move to the row of "e", three rows above.
+    assert " ".join(titles) == "a0 a1 c0 b0 b1 d0 e0 e1 f0 f1 g0 g1 i0 h0 h1"
+
+
+def test_constants_are_named_on_the_pages_of_their_section():
+    columns = [
+        Column("a", "", wave(), section="activations"),
+        Column("b", "", 0.0 * TIMES, section="activations"),
+        Column("a", "m", wave(), section="lengths"),
+        Column("c", "m", 0.0 * TIMES, section="speeds"),
+    ]
+    panels, notes = panels_of(columns)
+    assert [figure.get_supxlabel() for figure in drawn(panels, notes=notes)] == [
+        "Constant: b 0",
+        "Constant: c 0 m",
+    ]
 
 
 def test_sections_have_their_own_pages():
@@ -117,8 +148,8 @@ def test_sections_have_their_own_pages():
 
 
 def test_nothing_that_changes_is_no_picture(tmp_path):
-    panels, note = panels_of([Column("still", "m", 0.0 * TIMES)])
-    assert drawn(panels, note=note) == []
+    panels, notes = panels_of([Column("still", "m", 0.0 * TIMES)])
+    assert drawn(panels, notes=notes) == []
     assert write_pages(draw_pages("", panels), tmp_path, "still") == []
     assert list(tmp_path.iterdir()) == []
 
@@ -228,7 +259,7 @@ def test_activations_and_controls_have_units() -> None:
     lowest, highest = figure.axes[0].get_ylim()
     assert lowest <= 0.0 and 1.0 <= highest < 1.1
     constant = describe_columns(table("Static Optimization", {"soleus_r": 0.5 + 0 * TIMES}), names)
-    assert panels_of(constant)[1] == "Constant: soleus_r 0.5"
+    assert panels_of(constant)[1] == {"": "Constant: soleus_r 0.5"}
 
 
 @pytest.mark.parametrize(
