@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -11,26 +12,48 @@ import pytest
 
 pytest.importorskip("pytest_lsp", reason="needs pytest-lsp and pygls (extra 'dev')")
 
+import pytest_asyncio
 import pytest_lsp
 from lsprotocol import types
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def server(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> AsyncIterator[pytest_lsp.LanguageClient]:
+    """A client of a server that the tests of a module share: a process takes longer to start than to answer."""
+    cache = str(tmp_path_factory.mktemp("server-cache"))
+    config = pytest_lsp.ClientServerConfig(
+        server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"],
+        server_env={**os.environ, "XDG_CACHE_HOME": cache, "LOCALAPPDATA": cache},
+    )
+    client = await config.start()
+    capabilities = pytest_lsp.client_capabilities("visual-studio-code")
+    await client.initialize_session(types.InitializeParams(capabilities=capabilities))
+    yield client
+    await client.shutdown_session()
+    await client.stop()
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def client(server: pytest_lsp.LanguageClient) -> AsyncIterator[pytest_lsp.LanguageClient]:
+    """The client, whose files are closed after each test."""
+    server.opened = set()
+    yield server
+    for uri in server.opened:
+        document = types.TextDocumentIdentifier(uri)
+        server.text_document_did_close(types.DidCloseTextDocumentParams(document))
+    # The answer follows whatever the server has to say of these files, so none of it reaches the next test.
+    question = types.HoverParams(types.TextDocumentIdentifier("file:///none"), types.Position(0, 0))
+    with pytest.raises(Exception, match="is not open"):
+        await server.text_document_hover_async(question)
+    assert server.error is None
 
 
 @pytest.fixture
 def editor(client):
     """Makes a file, of a path and perhaps a text, in an editor that talks to the server."""
     return functools.partial(File, client)
-
-
-@pytest_lsp.fixture(
-    config=pytest_lsp.ClientServerConfig(
-        server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"]
-    )
-)
-async def client(lsp_client: pytest_lsp.LanguageClient) -> AsyncIterator[None]:
-    capabilities = pytest_lsp.client_capabilities("visual-studio-code")
-    await lsp_client.initialize_session(types.InitializeParams(capabilities=capabilities))
-    yield
-    await lsp_client.shutdown_session()
 
 
 class File:
@@ -55,6 +78,7 @@ class File:
 
     async def open(self) -> list[types.Diagnostic]:
         item = types.TextDocumentItem(self.uri, "osim", self.version, self.text)
+        self.client.opened.add(self.uri)
         self.client.text_document_did_open(types.DidOpenTextDocumentParams(item))
         return await self.checked()
 

@@ -15,7 +15,7 @@ def of_paths(diagnostics):
     return sorted(found.message for found in diagnostics if found.code == "OSIM632")
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 @pytest.mark.full
 async def test_after_a_pause(editor, fixtures, tmp_path) -> None:
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
@@ -29,7 +29,7 @@ async def test_after_a_pause(editor, fixtures, tmp_path) -> None:
     assert len(of_paths(await file.checked())) == 2
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_not_while_somebody_types(editor, fixtures, tmp_path) -> None:
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
     file = editor(tmp_path / "legs.osim", text)

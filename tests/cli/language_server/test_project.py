@@ -65,7 +65,7 @@ def ask(client):
     return Ask()
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_task_names_a_marker_of_the_model(editor, ask, folder: Path) -> None:
     ik, model = editor(folder / "ik.xml"), editor(folder / "model.osim")
     assert not [d for d in await ik.open() if d.severity == ERROR]
@@ -86,7 +86,7 @@ async def test_a_task_names_a_marker_of_the_model(editor, ask, folder: Path) -> 
     assert "walk.trc" in await ask.completion(ik, "walk.trc", 1)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_misspelt_marker_is_mended_or_ignored(client, editor, folder: Path) -> None:
     ik = editor(folder / "ik.xml")
     await ik.open()
@@ -103,7 +103,7 @@ async def test_a_misspelt_marker_is_mended_or_ignored(client, editor, folder: Pa
     assert any("<!-- osimlite: ignore OSIM831 -->" in text for text in texts)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_what_an_open_model_says_counts_before_it_is_written(
     client, editor, folder: Path
 ) -> None:
@@ -139,7 +139,7 @@ def test_what_is_held_needs_no_encoding(tmp_path: Path) -> None:
     assert read(file).name == "é"
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_marker_is_renamed_in_the_model_and_in_setups(editor, ask, folder: Path) -> None:
     ik, model, scale = (editor(folder / name) for name in ("ik.xml", "model.osim", "scale.xml"))
     await ik.open()
@@ -157,7 +157,7 @@ async def test_a_marker_is_renamed_in_the_model_and_in_setups(editor, ask, folde
         await ask.rename(ik, "L.ASIS", 'IKMarkerTask name="R.ASIS"', 22)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_loads_name_bodies_and_columns(editor, ask, folder: Path) -> None:
     loads = editor(folder / "loads.xml")
     await loads.open()
@@ -173,7 +173,7 @@ async def test_loads_name_bodies_and_columns(editor, ask, folder: Path) -> None:
     )
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_files_and_words_that_a_property_takes(editor, ask, folder: Path) -> None:
     inverse = editor(folder / "id.xml")
     await inverse.open()
@@ -185,7 +185,7 @@ async def test_files_and_words_that_a_property_takes(editor, ask, folder: Path) 
     assert {"ALL", "hip_r"} <= {*await ask.completion(inverse, "ALL<", 2)}
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_set_in_a_file_of_its_own(editor, ask, folder: Path) -> None:
     text = (folder / "ik.xml").read_text()
     tasks = text[text.index("<IKTaskSet>") : text.index("</IKTaskSet>") + len("</IKTaskSet>")]
@@ -200,7 +200,7 @@ async def test_a_set_in_a_file_of_its_own(editor, ask, folder: Path) -> None:
     assert "in `walk.trc`" in await ask.hover(own, "R.ASIS", 2)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_controls_are_called_after_actuators(editor, ask, folder: Path) -> None:
     controls = editor(folder / "controls.xml")
     await controls.open()
@@ -219,7 +219,7 @@ MOCO = """<OpenSimDocument Version="40600">
 """
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_states_and_controls_of_moco_are_paths(editor, ask, folder: Path) -> None:
     text = MOCO.replace('<MocoPhase name="phases"><phases>', "<phases>").replace(
         "</phases></MocoPhase>", "</phases>"
@@ -244,7 +244,7 @@ async def test_states_and_controls_of_moco_are_paths(editor, ask, folder: Path) 
     assert "/jointset/knee_r/knee/value" in study.after(changes[study.uri])
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_outline_and_layout_of_a_setup(client, editor, folder: Path) -> None:
     inverse = editor(folder / "id.xml")
     await inverse.open()
@@ -260,7 +260,7 @@ async def test_outline_and_layout_of_a_setup(client, editor, folder: Path) -> No
     assert "\t\t<time_range> 0.5 1</time_range>" in inverse.after(edits)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_table_is_checked_when_it_is_written(client, editor, folder: Path) -> None:
     motion = editor(folder / "coords.mot")
     assert not await motion.open()
@@ -283,7 +283,7 @@ async def test_a_table_is_checked_when_it_is_written(client, editor, folder: Pat
     assert not validate(folder / "coords.mot").findings
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_mend_in_a_table_is_where_it_belongs_behind_letters_of_any_script(
     client, editor, folder: Path
 ) -> None:
@@ -304,7 +304,7 @@ async def test_a_mend_in_a_table_is_where_it_belongs_behind_letters_of_any_scrip
     assert motion.after(mend.edit.changes[motion.uri]) == f"Läufer \U0001f3c3\n{rest}"
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_class_of_a_plugin_is_offered_where_the_project_has_it(
     editor, ask, folder: Path
 ) -> None:
@@ -325,7 +325,7 @@ async def test_a_class_of_a_plugin_is_offered_where_the_project_has_it(
     assert "gain" in await ask.hover(mine, "gain>", 1)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_xml_of_others_is_left_alone(client, editor, ask, tmp_path: Path) -> None:
     pom = editor(
         tmp_path / "pom.xml", "<project>\n  <Body name='a'><mass>1</mass></Body>\n  <\n</project>"

@@ -18,7 +18,7 @@ def walker(editor, fixtures: Path, tmp_path: Path):
     return editor(tmp_path / "walker.osim", text)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker) -> None:
     before = await walker.open()
     assert not [found for found in before if found.severity == types.DiagnosticSeverity.Error]
@@ -54,7 +54,7 @@ def test_ctrl_c_ends_the_server_at_once_with_a_sentence() -> None:
         assert server.stderr is not None and "Traceback" not in server.stderr.read()
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_file_that_is_broken_at_the_moment(client, walker) -> None:
     await walker.open()
     found = await walker.type("<mass>1</mass>", "<mass>1</mas")
@@ -69,7 +69,7 @@ async def test_a_file_that_is_broken_at_the_moment(client, walker) -> None:
     ]
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_what_a_word_means(client, walker) -> None:
     await walker.open()
 
@@ -89,7 +89,7 @@ async def test_what_a_word_means(client, walker) -> None:
     assert await hover("<?xml", 2) == ""
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_where_a_name_leads_and_who_uses_it(client, walker) -> None:
     await walker.open()
     here = walker.place("RFootContact Platform", 4)
@@ -105,7 +105,7 @@ async def test_where_a_name_leads_and_who_uses_it(client, walker) -> None:
     assert any("<geometry>" in walker.text.splitlines()[use.range.start.line] for use in uses)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_a_name_is_changed_everywhere(client, walker) -> None:
     await walker.open()
     here = walker.place('<ContactSphere name="RFootContact"', 23)
@@ -125,7 +125,7 @@ async def test_a_name_is_changed_everywhere(client, walker) -> None:
         )
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_what_may_be_written_here(client, walker) -> None:
     await walker.open()
 
@@ -144,7 +144,7 @@ async def test_what_may_be_written_here(client, walker) -> None:
     assert await labels("</\n", 2) == ["HuntCrossleyForce"]
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_outline_folds_and_layout(client, walker) -> None:
     await walker.open()
     (model,) = await client.text_document_document_symbol_async(
@@ -167,7 +167,7 @@ async def test_outline_folds_and_layout(client, walker) -> None:
     assert "\t\t\t<objects>" in walker.after(edits)
 
 
-@pytest.mark.asyncio
+@pytest.mark.asyncio(loop_scope="module")
 async def test_layout_of_an_older_format(client, editor, tmp_path: Path) -> None:
     text = '<OpenSimDocument Version="20302"><Model name="m"><gravity> 0 -9.810 0\n</gravity></Model></OpenSimDocument>'
     old = editor(tmp_path / "old.osim", text)
