@@ -6,6 +6,7 @@ It also ends a process in which a test hangs, and tells pytest-xdist to go on wh
 from __future__ import annotations
 
 import faulthandler
+import gc
 import random
 from collections.abc import Generator, Sequence
 from types import SimpleNamespace
@@ -65,6 +66,15 @@ class Suite:
             items[:] = [item for item in items if not item.get_closest_marker("full")]
             config.hook.pytest_deselected(items=slow)
         _state["deselected"] = len(slow)
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Leave all that has been imported and collected out of the searches of Python's garbage collector.
+
+        These objects live as long as the process, and are far more than those of any test.
+        """
+        if not separate.is_server(session.config):
+            gc.freeze()
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> Any:

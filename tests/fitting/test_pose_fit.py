@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 import osimlite
 from osimlite import Body, Model, PhysicalOffsetFrame, PinJoint
@@ -30,6 +29,13 @@ from tests.suite import choose
 
 ROUND = "ConstantCurvatureJoint"
 """Its functions of several coordinates are bent, which Newton's matrix leaves out."""
+
+
+def rotation_class() -> Any:
+    """Return SciPy's class of rotations, which takes too long to import while tests are collected."""
+    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
+    return Rotation
 
 
 def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) -> list[MarkerTarget]:
@@ -117,7 +123,7 @@ def orientations_at(mechanism: Mechanism, sensors: list[SensorTarget], q: Any) -
 
 def turns_between(wanted: Any, found: Any) -> Any:
     """The turns (k, 3) in ground that take rotations to others, rad."""
-    return Rotation.from_matrix(found @ np.swapaxes(wanted, -1, -2)).as_rotvec()
+    return rotation_class().from_matrix(found @ np.swapaxes(wanted, -1, -2)).as_rotvec()
 
 
 @given(cases(max_bodies=4), st.integers(0, 99), st.floats(0.0, 2.9))
@@ -129,7 +135,9 @@ def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, 
         return
     sensors = sensors_of(mechanism, rng)
     axes = rng.normal(size=(len(sensors), 3))
-    off = Rotation.from_rotvec(far * axes / np.linalg.norm(axes, axis=1)[:, None]).as_matrix()
+    off = (
+        rotation_class().from_rotvec(far * axes / np.linalg.norm(axes, axis=1)[:, None]).as_matrix()
+    )
     measured = off @ orientations_at(mechanism, sensors, case.q)
     measured[-1, 1, 1] = np.nan if len(sensors) > 2 else measured[-1, 1, 1]
     fit = PoseFit(mechanism, [], sensors, code=PYTHON_CODE)
@@ -351,7 +359,7 @@ def test_a_sensor_that_is_half_a_turn_off_is_found(
     """A cost without a slope is none: whichever way round, the whole half turn counts."""
     mechanism = _free_body()
     sensor = SensorTarget(FramePlacement(0, np.eye(4)))
-    wanted = Rotation.from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
+    wanted = rotation_class().from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
     value, _, _ = derivatives(
         PoseFit(mechanism, [], [sensor], code=PYTHON_CODE), wanted.ravel(), np.zeros(6)
     )
@@ -371,7 +379,7 @@ def test_markers_and_sensors_count_as_shares() -> None:
     )
     q = np.array((0.3, 0.2, -0.1, 0.4, 0.5, 0.6))
     measured = places_at(mechanism, markers, q) + rng.normal(0.0, 0.02, (3, 3))
-    noise = Rotation.from_rotvec(rng.normal(0.0, 0.1, (3, 3))).as_matrix()
+    noise = rotation_class().from_rotvec(rng.normal(0.0, 0.1, (3, 3))).as_matrix()
     rotations = noise @ orientations_at(mechanism, sensors, q)
     rotations[1] = np.nan
     poses = PoseFit(mechanism, markers, sensors).fit_frames(

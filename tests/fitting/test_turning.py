@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
 import osimlite
 from tests.fitting.support import FACING, poses, trial_of, turner
@@ -77,6 +76,9 @@ def test_every_frame_is_at_the_least_of_all_minima(low: float, high: float) -> N
             return (
                 np.array([state.point(*station) for station in stations]) - wanted
             ).ravel() / np.sqrt(len(stations))
+
+        # Collecting the tests does not need it, and would wait for its import.
+        from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
         least = np.inf
         for start in np.linspace(ends[0] + 0.1, ends[1] - 0.1, 3):

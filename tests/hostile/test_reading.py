@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -60,8 +61,15 @@ ALLOWED = {
 """Modules that open files in another way, and why they may."""
 
 
+_CALLED = "|".join({"open", *METHODS, *(name for names in OF_MODULES.values() for name in names)})
+_ANY_CALL = re.compile(rf"\b(?:{_CALLED})\s*\(")
+"""What stands in every source with such a call: most sources need not be parsed."""
+
+
 def find_reads(text: str) -> Iterator[tuple[int, str]]:
     """Yield line and name of each call in a source that may open a file."""
+    if not _ANY_CALL.search(text):
+        return
     for node in ast.walk(ast.parse(text)):
         if not isinstance(node, ast.Call):
             continue

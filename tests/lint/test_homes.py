@@ -8,11 +8,15 @@ from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import get_field_specs
 
 
-def find_homes(tag: str, package: str) -> list[str]:
-    """Return the classes of a package that declare a property, by looking into all classes."""
-    specs = (get_field_specs(find_class(name) or Object).get(tag) for name in list_tags())
-    declaring = {spec.declared_in for spec in specs if spec is not None}
-    return sorted(cls.__name__ for cls in declaring if cls.__module__.rpartition(".")[0] == package)
+def find_homes(classes: list[type[Object]]) -> dict[tuple[str, str], list[str]]:
+    """Return the classes that declare a property, by its tag and their package, by looking into all classes."""
+    declaring = {
+        (tag, spec.declared_in) for cls in classes for tag, spec in get_field_specs(cls).items()
+    }
+    homes: dict[tuple[str, str], list[str]] = {}
+    for tag, cls in declaring:
+        homes.setdefault((tag, cls.__module__.rpartition(".")[0]), []).append(cls.__name__)
+    return {place: sorted(names) for place, names in homes.items()}
 
 
 def test_every_property_is_found_in_the_classes_that_declare_it() -> None:
@@ -20,7 +24,8 @@ def test_every_property_is_found_in_the_classes_that_declare_it() -> None:
     owners = {cls.__module__.rpartition(".")[0]: cls for cls in classes}
     properties = {tag for cls in classes for tag in get_field_specs(cls)}
     assert len(owners) == 3 and len(properties) > 700
+    homes = find_homes(classes)
     for tag in sorted(properties):
         for package, owner in owners.items():
-            assert list_homes(tag, owner) == find_homes(tag, package)
+            assert list_homes(tag, owner) == homes.get((tag, package), [])
     assert list_homes("isDisabled", Object) == []

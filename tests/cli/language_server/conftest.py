@@ -16,6 +16,9 @@ import pytest_asyncio
 import pytest_lsp
 from lsprotocol import types
 
+OPENED: set[str] = set()
+"""Files that the present test has opened."""
+
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def server(
@@ -23,11 +26,11 @@ async def server(
 ) -> AsyncIterator[pytest_lsp.LanguageClient]:
     """A client of a server that the tests of a module share: a process takes longer to start than to answer."""
     cache = str(tmp_path_factory.mktemp("server-cache"))
-    config = pytest_lsp.ClientServerConfig(
-        server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"],
-        server_env={**os.environ, "XDG_CACHE_HOME": cache, "LOCALAPPDATA": cache},
+    client = pytest_lsp.make_test_lsp_client()
+    await client.start_io(
+        *(sys.executable, "-m", "osimlite", "lsp", "--stdio"),
+        env={**os.environ, "XDG_CACHE_HOME": cache, "LOCALAPPDATA": cache},
     )
-    client = await config.start()
     capabilities = pytest_lsp.client_capabilities("visual-studio-code")
     await client.initialize_session(types.InitializeParams(capabilities=capabilities))
     yield client
@@ -38,9 +41,9 @@ async def server(
 @pytest_asyncio.fixture(loop_scope="module")
 async def client(server: pytest_lsp.LanguageClient) -> AsyncIterator[pytest_lsp.LanguageClient]:
     """The client, whose files are closed after each test."""
-    server.opened = set()
+    OPENED.clear()
     yield server
-    for uri in server.opened:
+    for uri in OPENED:
         document = types.TextDocumentIdentifier(uri)
         server.text_document_did_close(types.DidCloseTextDocumentParams(document))
     # The answer follows whatever the server has to say of these files, so none of it reaches the next test.
@@ -78,7 +81,7 @@ class File:
 
     async def open(self) -> list[types.Diagnostic]:
         item = types.TextDocumentItem(self.uri, "osim", self.version, self.text)
-        self.client.opened.add(self.uri)
+        OPENED.add(self.uri)
         self.client.text_document_did_open(types.DidOpenTextDocumentParams(item))
         return await self.checked()
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 import pytest
 
@@ -27,7 +28,8 @@ from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.sampling import choose_samples
 from tests.studies.sweep.support import pulled
 
-distributed = pytest.importorskip("distributed", reason="needs dask.distributed (extra 'sweep')")
+if find_spec("distributed") is None:
+    pytest.skip("needs dask.distributed (extra 'sweep')", allow_module_level=True)
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 
 WORKER = ["worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1"]
@@ -250,6 +252,8 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(
         def end(done, of):
             if done > 40:
                 lost.processes[0].kill()
+
+        import distributed
 
         # Workers start slowly on a busy machine; only the wait for a scheduler that has gone is to
         # be short.
