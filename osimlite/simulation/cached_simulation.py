@@ -89,7 +89,8 @@ def _borrow_simulation(
         Simulation of the model as it is now.
     """
     check_is_model(model)
-    tree, options = model.tree(), Options.parse(choices)
+    tree = model.tree()
+    options = Options.parse(choices)
     engine = None if engine is None else engine_name(engine)
     key = (
         engine_name(engine),

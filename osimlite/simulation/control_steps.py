@@ -243,11 +243,13 @@ class ControllerRuns:
         to: float,
         earlier_record: StoTable | None,
     ) -> None:
-        first_controller, count = controllers[0], len(controllers)
+        first_controller = controllers[0]
+        count = len(controllers)
         self.controller = first_controller
         self._before = earlier_record
         self.next_step: float | None = None
-        plan, senses = first_controller.plan.copy(), first_controller.senses
+        plan = first_controller.plan.copy()
+        senses = first_controller.senses
         # All runs use the memory of the longest delay.
         plan[REFLEXES.KEPT] = max(controller.plan[REFLEXES.KEPT] for controller in controllers)
         plan[REFLEXES.MEMORY_SIZE] = max(

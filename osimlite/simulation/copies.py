@@ -144,7 +144,8 @@ class Copies:
         self.engine.program.code.make_ready((law,))
         # One iterator for all threads: each takes the next part when it is ready, so that slow
         # copies do not hold up the others. The lock of the interpreter makes `next` safe.
-        remaining_ranges, statuses = iter(ranges), [0]
+        remaining_ranges = iter(ranges)
+        statuses = [0]
 
         def run_ranges(workspace: Floats, numbers: Floats) -> None:
             for first, last in remaining_ranges:

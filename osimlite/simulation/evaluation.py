@@ -286,8 +286,10 @@ class StateEvaluator:
         result, failed = self._equilibrate_all(t, y)
         if failed is None:
             return result, {}
-        reasons, count = {}, int(self.structure[MODEL.EQUILIBRIA])
-        code, work_vectors = self.program.code, (self._w, self._y, self._f)
+        reasons = {}
+        count = int(self.structure[MODEL.EQUILIBRIA])
+        code = self.program.code
+        work_vectors = (self._w, self._y, self._f)
         code.make_ready(("equilibrate",))
         while failed is not None:
             item = int(self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM])
@@ -332,7 +334,9 @@ class StateEvaluator:
         """
         if not self.structure[MODEL.EQUILIBRIA]:
             return list(y), None
-        code, ints, work_vectors = self.program.code, self.program.ints, (self._w, self._y, self._f)
+        code = self.program.code
+        ints = self.program.ints
+        work_vectors = (self._w, self._y, self._f)
         if self._equilibrate is None:
             # Most models never need these kernels, so they are linked at their first use.
             self.program.link_equilibria()

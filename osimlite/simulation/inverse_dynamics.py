@@ -123,7 +123,8 @@ def inverse_dynamics(
         UnsupportedError: osimlite cannot compute a force of the model.
     """
     external_loads = resolve_loads(external_loads, applied_to)
-    excluded, pushed = [*exclude], model
+    excluded = [*exclude]
+    pushed = model
     if find_excluded_forces(model, excluded):
         # The caller's model stays as it is; a copy is needed only if forces are switched off.
         pushed = model.copy_deep()

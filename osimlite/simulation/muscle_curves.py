@@ -107,7 +107,8 @@ class MuscleCurves(Tabular):
         Returns:
             Key columns ``muscle`` and the coordinates, and the other columns, by name.
         """
-        poses, count = self.poses, len(self.muscles)
+        poses = self.poses
+        count = len(self.muscles)
         rows = {"muscle": np.tile(np.array(self.muscles, dtype=object), len(poses))}
         rows |= {name: poses[:, index].repeat(count) for index, name in enumerate(self.values)}
         return rows, {name: column.ravel() for name, column in self.columns.items()}

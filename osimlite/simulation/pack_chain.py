@@ -50,7 +50,8 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         packer: writer of the kernel vectors, in which the mechanism is written already.
         chain: the chain.
     """
-    ints, count = packer.ints, len(chain.joints)
+    ints = packer.ints
+    count = len(chain.joints)
     if not count:
         return
     start = ints[MODEL.CHAIN] = len(ints)
@@ -100,7 +101,8 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
         Kind of the joint (`JOINT_KIND`), source (index of an operation or of a degree of freedom),
         part (a component, or the index of a number), and the degrees of freedom that move it.
     """
-    function, coordinates = joint.function, list(joint.coordinates)
+    function = joint.function
+    coordinates = list(joint.coordinates)
     freedoms = [packer.places.freedom(coordinate) for coordinate in coordinates]
     for number, operation in enumerate(packer.operations):
         if operation.joint != joint.source:

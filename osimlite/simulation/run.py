@@ -222,7 +222,8 @@ class Simulation:
             }
             for numbers in (initial, options.initial_speeds)
         )
-        controls, extra_settings = self.forces.controls, {}
+        controls = self.forces.controls
+        extra_settings = {}
         if options.controls is not None or any(controls.functions):
             from osimlite.simulation.run_controls import add_controls, describe_controls
 
@@ -314,7 +315,8 @@ class Simulation:
         """
         from osimlite.simulation.run_controls import require_table_span
 
-        times, states = [start], [list(y)]
+        times = [start]
+        states = [list(y)]
 
         def note(t: float, y: list[float]) -> None:
             times.append(t)

@@ -196,7 +196,8 @@ class StaticOptimization:
             Required generalized forces (t, m), contributions of each actuator at a control of 1 (t,
             a, m), and forces of muscles (t, a), which are 1 for other actuators.
         """
-        system, order = self._system, list(self._system.order)
+        system = self._system
+        order = list(self._system.order)
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
         required_forces, unit_forces, strengths = system.compute_unit_forces(
             moments, np.ascontiguousarray(accelerations[:, order]), self._paths
@@ -349,7 +350,8 @@ class StaticOptimization:
             Accelerations without actuators (n,), by a force of 1 of each actuator (n, a), and by a
             generalized force of 1 of each coordinate (n, n).
         """
-        system, order = self._system, list(self._system.order)
+        system = self._system
+        order = list(self._system.order)
         udot, directions = self._project_accelerations(times, values, speeds, np.zeros_like(values))
         moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
         required_forces, unit_forces, _ = system.compute_unit_forces(
@@ -391,7 +393,8 @@ class StaticOptimization:
         Returns:
             Accelerations (t, n), and the motion of all coordinates with each free one (t, n, m).
         """
-        size, free = len(self.mechanism.coordinates), self._free
+        size = len(self.mechanism.coordinates)
+        free = self._free
         directions = np.zeros((len(times), size, len(free)))
         directions[:, free, range(len(free))] = 1.0
         udot = target_accelerations.copy()
@@ -557,7 +560,8 @@ def minimize_effort(
     numbers = np.array([exponent, *bounds.ravel()])
     inputs = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
     result = np.zeros((frames, count + size + 1))
-    entry, work = code.get_entry("least_effort"), np.zeros(effort_size(size, count))
+    entry = code.get_entry("least_effort")
+    work = np.zeros(effort_size(size, count))
     for rows in divide_rows("sharing forces between muscles", frames):
         sizes[0] = rows.stop - rows.start
         entry(sizes, numbers, inputs[rows], result[rows], work)

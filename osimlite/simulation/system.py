@@ -114,7 +114,8 @@ class System(StateEvaluator):
         if not self.columns:
             return result
         copied, sources, computed = self._sort_columns()
-        slices, offsets = [], list[int](sources)
+        slices = []
+        offsets = list[int](sources)
         for number, columns in computed:
             record_slices = []
             for offset, record_size in self._items[number]:
@@ -157,7 +158,9 @@ class System(StateEvaluator):
             Copied columns, their places in the work vector, and numbers and columns of the elements
             that compute theirs.
         """
-        copied, sources, computed = list[int](), list[int](), list[tuple[int, slice]]()
+        copied = list[int]()
+        sources = list[int]()
+        computed = list[tuple[int, slice]]()
         first = 0
         for number, element in enumerate(self.forces.elements):
             columns = slice(first, first := first + len(element.columns))
@@ -312,7 +315,8 @@ class System(StateEvaluator):
             actuator (k, a, n), and the forces (N) of muscles (k, a), which are 1 for other
             actuators.
         """
-        code, size = self.program.code, len(self.order)
+        code = self.program.code
+        size = len(self.order)
         code.make_ready(("push_each_actuator", "inverse"))
         item_offsets = {
             self.forces.elements[owner].path: offset for offset, owner in self._owners.items()
@@ -320,7 +324,9 @@ class System(StateEvaluator):
         controls = dict(zip(self._controls.names, self.control_offsets, strict=True))
         order = [0, len(names)]
         for name in names:
-            item, path, strength = item_offsets[name], -1, -1
+            item = item_offsets[name]
+            path = -1
+            strength = -1
             # A muscle pulls along its path with its strength; the other actuators apply their
             # optimal force.
             if self.has_quantity(name, STRENGTH):
@@ -339,7 +345,8 @@ class System(StateEvaluator):
             self._f,
             code.get_address("inverse"),
         )
-        entry, plan = code.get_entry("push_each_actuator"), np.array(order, dtype=np.int64)
+        entry = code.get_entry("push_each_actuator")
+        plan = np.array(order, dtype=np.int64)
         for rows in divide_rows("computing the force of each muscle", len(moments)):
             plan[0] = rows.stop - rows.start
             status = self._run_kernel(entry, *arguments, inputs[rows], plan, result[rows])

@@ -134,7 +134,8 @@ def write_javascript(laws: Sequence[Function], named_functions: Sequence[Functio
     Raises:
         TranslationError: a kernel uses something that has no counterpart in JavaScript.
     """
-    writers, pending = [], dict.fromkeys((*laws, *named_functions))
+    writers = []
+    pending = dict.fromkeys((*laws, *named_functions))
     while pending:
         writers.append(_write_function(next(iter(pending))))
         pending.update(dict.fromkeys(writers[-1].functions))
@@ -420,7 +421,8 @@ class _JavaScriptWriter(Kernel):
         first, *others = values
         if not others:
             return self.expression(first)
-        temporary, remainder = self.temporary(), self.either(op, others)
+        temporary = self.temporary()
+        remainder = self.either(op, others)
         test = f"({temporary} = {self.expression(first)}) != 0"
         return (
             f"({test} ? {remainder} : {temporary})"
@@ -430,7 +432,8 @@ class _JavaScriptWriter(Kernel):
 
     def compare(self, node: ast.Compare) -> str:
         """Return the text of a chain of comparisons, whose operands are evaluated once."""
-        left, tests = self.expression(node.left), []
+        left = self.expression(node.left)
+        tests = []
         for k, (op, operand) in enumerate(zip(node.ops, node.comparators, strict=True)):
             if isinstance(op, ast.In | ast.NotIn) and isinstance(operand, ast.Tuple):
                 if len(node.ops) > 1:

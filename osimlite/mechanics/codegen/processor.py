@@ -61,7 +61,8 @@ def _read_cpuinfo(path: str) -> frozenset[str]:
 
 def _query_sysctl(name: bytes) -> bool:
     """Return whether macOS reports a feature of the processor."""
-    value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
+    value = ctypes.c_int(0)
+    size = ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
     system = ctypes.CDLL(None)
     status = system.sysctlbyname(name, ctypes.byref(value), ctypes.byref(size), None, 0)
     return status == 0 and value.value != 0

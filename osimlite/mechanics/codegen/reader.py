@@ -133,7 +133,8 @@ def find_tree(function: Function) -> ast.FunctionDef:
 
 def list_functions(tree: ast.AST) -> list[ast.FunctionDef]:
     """Return the functions in a module, without descending into expressions as `ast.walk` does."""
-    result, pending = list[ast.FunctionDef](), [tree]
+    result = list[ast.FunctionDef]()
+    pending = [tree]
     while pending:
         node = pending.pop()
         if isinstance(node, ast.FunctionDef):

@@ -49,7 +49,8 @@ def collect_functions(function: Any) -> Iterator[FunctionType]:
 
     Functions that are called by their address are not included: they are kernels of their own.
     """
-    pending, seen = [function], set()
+    pending = [function]
+    seen = set()
     while pending:
         current = pending.pop()
         if current in seen:

@@ -48,7 +48,8 @@ def place_drift(
     Returns:
         `OUTCOME.OK`.
     """
-    operation_record, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
+    operation_record = operation_work(model, data, operation)
+    frame = at(data, WORK.SCRATCH)
     copy_numbers(12, frame, operation_record)
     return OUTCOME.OK
 
@@ -74,12 +75,11 @@ def move_drift(
         `OUTCOME.OK`.
     """
     drift_ints = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
-    operation_record, result, u = (
-        operation_work(model, data, operation),
-        at(data, WORK.SCRATCH),
-        at(y, model[MODEL.DOFS]),
-    )
-    arm, total = minus(vector(operation_record, OPERATION_WORK.POINT), vector(result, 0)), ZERO
+    operation_record = operation_work(model, data, operation)
+    result = at(data, WORK.SCRATCH)
+    u = at(y, model[MODEL.DOFS])
+    arm = minus(vector(operation_record, OPERATION_WORK.POINT), vector(result, 0))
+    total = ZERO
     # The first axis is fixed in the parent, so that only the second and third rotation have an
     # error.
     for row in range(1, 3):
@@ -143,7 +143,8 @@ def operation_gradient(model: Ints, data: Floats, operation: int, freedom: int) 
         operation: number of the operation.
         freedom: degree of freedom.
     """
-    j, total = operation_ints(model, operation), 0.0
+    j = operation_ints(model, operation)
+    total = 0.0
     if j[OPERATION.DOF] >= 0:
         # An operation that is a coordinate itself has derivative 1 by it.
         return 1.0 if j[OPERATION.DOF] == freedom else 0.0

@@ -110,7 +110,8 @@ def assemble_poses(
             `POSE_STATUS`.
         count: number of poses.
     """
-    a, size = Assembly(model, reals, data, y, f, p, c, w), model[MODEL.DOFS]
+    a = Assembly(model, reals, data, y, f, p, c, w)
+    size = model[MODEL.DOFS]
     # Speeds stay 0: only positions are evaluated, and laws must not see old speeds.
     for k in range(2 * size):
         y[k] = f[k] = 0.0
@@ -134,12 +135,11 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     Returns:
         Whether there is one.
     """
-    size, status, ranges = (
-        a.model[MODEL.DOFS],
-        at(a.p, ASSEMBLY.HEAD),
-        at(a.c, ASSEMBLY_NUMBERS.RANGES),
-    )
-    clamped, fixed = at(status, ASSEMBLY_ARRAY.CLAMPED * size), a.w
+    size = a.model[MODEL.DOFS]
+    status = at(a.p, ASSEMBLY.HEAD)
+    ranges = at(a.c, ASSEMBLY_NUMBERS.RANGES)
+    clamped = at(status, ASSEMBLY_ARRAY.CLAMPED * size)
+    fixed = a.w
     for k in range(size):
         fixed[k] = target[k]
         # A coordinate that an earlier pose left at the end of its range is free again.
@@ -189,7 +189,9 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     if is_assembled:
         return True
     # Minimize the change of the coordinates along the constraints.
-    previous_length, has_curvature, step = inf, False, at(a.w, size)
+    previous_length = inf
+    has_curvature = False
+    step = at(a.w, size)
     for _ in range(MAX_STEPS):
         value = measure_change(a, target, q)
         # Squares of changes below the tolerance do not count as motion.
@@ -209,7 +211,8 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
             return True
         # Within rounding the cost cannot be compared; a step that is at most half as long as the
         # last one is taken as progress.
-        is_tiny, fraction = length < TINY_STEP and length <= 0.5 * previous_length, 1.0
+        is_tiny = length < TINY_STEP and length <= 0.5 * previous_length
+        fraction = 1.0
         while True:
             for k in range(size):
                 trial[k] = q[k] + fraction * step[k]
@@ -241,7 +244,8 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
         target: desired values of the coordinates (n,).
         q: present values (n,).
     """
-    size, total = a.model[MODEL.DOFS], 0.0
+    size = a.model[MODEL.DOFS]
+    total = 0.0
     counted = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.COUNTED * size)
     for k in range(size):
         if counted[k] > 0:
@@ -256,11 +260,10 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
         a: the assembly.
         q: pose (n,); changed.
     """
-    size, status = a.model[MODEL.DOFS], at(a.p, ASSEMBLY.HEAD)
-    counted, couplers = (
-        at(status, ASSEMBLY_ARRAY.COUNTED * size),
-        at(status, ASSEMBLY_ARRAY.COUPLER_AT * size),
-    )
+    size = a.model[MODEL.DOFS]
+    status = at(a.p, ASSEMBLY.HEAD)
+    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    couplers = at(status, ASSEMBLY_ARRAY.COUPLER_AT * size)
     start = a.model[MODEL.CONSTRAINED]
     for k in range(a.p[ASSEMBLY.COUPLERS]):
         dependent = couplers[2 * k]
@@ -283,19 +286,21 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     Returns:
         Whether they do.
     """
-    size, count, tolerance = (
-        a.model[MODEL.DOFS],
-        count_equations(a),
-        a.c[ASSEMBLY_NUMBERS.TOLERANCE],
-    )
-    status, errors, factor = at(a.p, ASSEMBLY.HEAD), at(a.w, 7 * size), equation_factor(a)
-    counted, free_list = (
-        at(status, ASSEMBLY_ARRAY.COUNTED * size),
-        at(status, ASSEMBLY_ARRAY.FREE * size),
-    )
-    step, trial, work = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_size(count, size))
-    lengths, values = at(errors, count), at(errors, 2 * count)
-    free, largest = list_freed(a), evaluate_equations(a, q)
+    size = a.model[MODEL.DOFS]
+    count = count_equations(a)
+    tolerance = a.c[ASSEMBLY_NUMBERS.TOLERANCE]
+    status = at(a.p, ASSEMBLY.HEAD)
+    errors = at(a.w, 7 * size)
+    factor = equation_factor(a)
+    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    free_list = at(status, ASSEMBLY_ARRAY.FREE * size)
+    step = at(a.w, 2 * size)
+    trial = at(a.w, 3 * size)
+    work = at(factor, factor_size(count, size))
+    lengths = at(errors, count)
+    values = at(errors, 2 * count)
+    free = list_freed(a)
+    largest = evaluate_equations(a, q)
     for _ in range(MAX_STEPS):
         # The first condition is false for infinite and undefined errors.
         if not largest < inf or largest <= EXACT:
@@ -335,21 +340,21 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     Returns:
         The largest change of a coordinate (rad or m).
     """
-    size, count = a.model[MODEL.DOFS], count_equations(a)
-    status, factor, step = at(a.p, ASSEMBLY.HEAD), equation_factor(a), at(a.w, size)
-    counted, free_list = (
-        at(status, ASSEMBLY_ARRAY.COUNTED * size),
-        at(status, ASSEMBLY_ARRAY.FREE * size),
-    )
-    gradient, null_space = (
-        at(a.w, 5 * size),
-        at(factor, factor_size(count, size) + count * size + count * count),
-    )
+    size = a.model[MODEL.DOFS]
+    count = count_equations(a)
+    status = at(a.p, ASSEMBLY.HEAD)
+    factor = equation_factor(a)
+    step = at(a.w, size)
+    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    free_list = at(status, ASSEMBLY_ARRAY.FREE * size)
+    gradient = at(a.w, 5 * size)
+    null_space = at(factor, factor_size(count, size) + count * size + count * count)
     evaluate_equations(a, q)
     free = list_freed(a)
     rank = factorise_rows(a, free, False)
     dimension = free - rank
-    curvature, spare = at(null_space, size * size), at(null_space, 2 * size * size)
+    curvature = at(null_space, size * size)
+    spare = at(null_space, 2 * size * size)
     # The cost is half the sum of squares, so that its Hessian is the identity for the coordinates
     # that count.
     for k in range(free):
@@ -408,16 +413,18 @@ def add_curvature(
         null_space: basis of the null space, by rows (left, free).
         curvature: reduced Hessian (left, left); changed.
     """
-    size, count = a.model[MODEL.DOFS], count_equations(a)
-    factor, gradient = equation_factor(a), at(a.w, 5 * size)
-    rows, lengths, multipliers = (
-        equation_rows(a),
-        at(a.w, 7 * size + count),
-        at(a.w, 7 * size + 2 * count),
-    )
-    free_list, trial = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.FREE * size), at(a.w, 3 * size)
+    size = a.model[MODEL.DOFS]
+    count = count_equations(a)
+    factor = equation_factor(a)
+    gradient = at(a.w, 5 * size)
+    rows = equation_rows(a)
+    lengths = at(a.w, 7 * size + count)
+    multipliers = at(a.w, 7 * size + 2 * count)
+    free_list = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.FREE * size)
+    trial = at(a.w, 3 * size)
     unit = at(factor, factor_size(count, size))
-    normal, row_change = at(unit, count * size), at(null_space, 2 * size * size)
+    normal = at(unit, count * size)
+    row_change = at(null_space, 2 * size * size)
     for i in range(count):
         multipliers[i] = 0.0
         for k in range(free):
@@ -469,7 +476,8 @@ def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, 
     """
     diagonalize(count, curvature, vectors)
     for k in range(count):
-        total, value = 0.0, abs(curvature[count * k + k])
+        total = 0.0
+        value = abs(curvature[count * k + k])
         for j in range(count):
             total += vectors[count * k + j] * x[j]
         # The absolute value turns a direction of negative curvature downhill.

@@ -101,7 +101,9 @@ def list_freed(a: Assembly) -> int:
     Returns:
         Their number.
     """
-    size, status, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY.HEAD), 0
+    size = a.model[MODEL.DOFS]
+    status = at(a.p, ASSEMBLY.HEAD)
+    count = 0
     free = at(status, ASSEMBLY_ARRAY.FREE * size)
     for k in range(size):
         if status[k] == HOLD.FREED:
@@ -120,13 +122,15 @@ def evaluate_equations(a: Assembly, q: Floats) -> float:
     Returns:
         The largest error, infinite if undefined.
     """
-    model, size = a.model, a.model[MODEL.DOFS]
+    model = a.model
+    size = a.model[MODEL.DOFS]
     copy_numbers(size, q, a.y)
     # Equations between coordinates only do not need the links, whose evaluation costs most.
     if a.p[ASSEMBLY.MOVES_LINKS] > 0:
         call(model[MODEL.LAWS], model, a.reals, a.data, a.y, a.f, STAGE.VELOCITY)
     evaluate_constraints(model, a.reals, a.data, a.y, a.f)
-    count, errors = count_equations(a), at(a.w, 7 * size)
+    count = count_equations(a)
+    errors = at(a.w, 7 * size)
     collect_position_errors(model, a.data, errors)
     write_position_jacobian(model, a.data, a.y, equation_rows(a))
     if not is_finite(count, errors):
@@ -165,13 +169,15 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
     Returns:
         Their rank.
     """
-    size, count = a.model[MODEL.DOFS], count_equations(a)
-    status, rows, factor = at(a.p, ASSEMBLY.HEAD), equation_rows(a), equation_factor(a)
-    counted, free_list = (
-        at(status, ASSEMBLY_ARRAY.COUNTED * size),
-        at(status, ASSEMBLY_ARRAY.FREE * size),
-    )
-    lengths, longest = at(a.w, 7 * size + count), 1.0
+    size = a.model[MODEL.DOFS]
+    count = count_equations(a)
+    status = at(a.p, ASSEMBLY.HEAD)
+    rows = equation_rows(a)
+    factor = equation_factor(a)
+    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    free_list = at(status, ASSEMBLY_ARRAY.FREE * size)
+    lengths = at(a.w, 7 * size + count)
+    longest = 1.0
     for i in range(count):
         total = 0.0
         for k in range(free):

@@ -66,16 +66,15 @@ def place_ball(
         `OUTCOME.OK`.
     """
     j = operation_ints(model, operation)
-    operation_record, frame, radii = (
-        operation_work(model, data, operation),
-        at(data, WORK.SCRATCH),
-        at(reals, j[OPERATION.EXTRA]),
-    )
+    operation_record = operation_work(model, data, operation)
+    frame = at(data, WORK.SCRATCH)
+    radii = at(reals, j[OPERATION.EXTRA])
     angles = at(model, j[OPERATION.ARGUMENTS])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     s3, c3 = sine_cosine(y[angles[2]])
-    axes, turned_by = axes_from_rows(frame), rotation_from_xyz(s1, c1, s2, c2, s3, c3)
+    axes = axes_from_rows(frame)
+    turned_by = rotation_from_xyz(s1, c1, s2, c2, s3, c3)
     end = multiply_elementwise(vector(radii, 0), turned_by[2])
     # The frame that the speeds are about is that of the parent: before the motion, or, if the joint
     # is traversed from its end, behind it.
@@ -113,19 +112,15 @@ def move_ball(
         `OUTCOME.SINGULAR_RATES` where the second angle is a right angle, else `OUTCOME.OK`.
     """
     j = operation_ints(model, operation)
-    operation_record, result, radii = (
-        operation_work(model, data, operation),
-        at(data, WORK.SCRATCH),
-        at(reals, j[OPERATION.EXTRA]),
-    )
+    operation_record = operation_work(model, data, operation)
+    result = at(data, WORK.SCRATCH)
+    radii = at(reals, j[OPERATION.EXTRA])
     angles, u = at(model, j[OPERATION.ARGUMENTS]), at(y, model[MODEL.DOFS])
     # Traversed from end to start, all velocities are opposite.
     sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
     n, end_radii = third_axis(y, angles), vector(radii, 0)
-    arm, spin = (
-        minus(vector(operation_record, OPERATION_WORK.POINT), vector(result, 0)),
-        (u[angles[0]], u[angles[1]], u[angles[2]]),
-    )
+    arm = minus(vector(operation_record, OPERATION_WORK.POINT), vector(result, 0))
+    spin = (u[angles[0]], u[angles[1]], u[angles[2]])
     turn = shift = ZERO
     # The column of speed k: a turn about axis k of the parent, and the velocity of the end of the
     # ellipsoid.

@@ -184,10 +184,8 @@ def step_lane(lanes: Any, lane: int) -> None:
         lanes: workspace of the requests.
         lane: number of the lane.
     """
-    previous_u, is_going = (
-        lanes[LANES * CURVE_ROW.U + lane],
-        lanes[LANES * CURVE_ROW.GOES_ON + lane] > 0.0,
-    )
+    previous_u = lanes[LANES * CURVE_ROW.U + lane]
+    is_going = lanes[LANES * CURVE_ROW.GOES_ON + lane] > 0.0
     u, goes_on = take_halley_step(
         lanes,
         LANES * CURVE_ROW.OF_X + lane,

@@ -94,11 +94,9 @@ def correct_geodesics(
     for k in range(first + 1, last):
         obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            line, next_line, row = (
-                at(lines, 4 * number),
-                at(lines, 4 * number + 4),
-                at(a, 4 * number * size),
-            )
+            line = at(lines, 4 * number)
+            next_line = at(lines, 4 * number + 4)
+            row = at(a, 4 * number * size)
             set_rows(obstacle_record, OBSTACLE_WORK.GROUND_START, line, at(row, 4 * number), size)
             set_rows(
                 obstacle_record,
@@ -133,7 +131,8 @@ def correct_geodesics(
             # Penalize changes of the length in proportion to the kinks, as Scholz et al. do.
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
-            number, previous_obstacle = number + 1, k
+            number = number + 1
+            previous_obstacle = k
     # The threshold of independence is Simbody's.
     rank = factorise_equations(equations, size, a, SIGNIFICANT * equations)
     solve_minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
@@ -254,11 +253,9 @@ def differentiate_end(
     """
     a, r, a_rate, r_rate = jacobi_fields(obstacle_record, end)
     frame = at(obstacle_record, end)
-    t, n, b = (
-        vector(frame, END_NUMBERS.ALONG),
-        vector(frame, END_NUMBERS.NORMAL),
-        vector(frame, END_NUMBERS.ACROSS),
-    )
+    t = vector(frame, END_NUMBERS.ALONG)
+    n = vector(frame, END_NUMBERS.NORMAL)
+    b = vector(frame, END_NUMBERS.ACROSS)
     # The Darboux frame along the geodesic: moving forwards rotates it by torsion about t and by
     # normal curvature about b.
     tt, nt, bt = dot(t, turn), dot(n, turn), dot(b, turn)
@@ -286,11 +283,9 @@ def largest_turn(obstacle_record: Floats, corrections: Floats) -> float:
     for end in (OBSTACLE_WORK.GROUND_START, OBSTACLE_WORK.GROUND_END):
         a, r, a_rate, r_rate = jacobi_fields(obstacle_record, end)
         frame = at(obstacle_record, end)
-        t, n, b = (
-            vector(frame, END_NUMBERS.ALONG),
-            vector(frame, END_NUMBERS.NORMAL),
-            vector(frame, END_NUMBERS.ACROSS),
-        )
+        t = vector(frame, END_NUMBERS.ALONG)
+        n = vector(frame, END_NUMBERS.NORMAL)
+        b = vector(frame, END_NUMBERS.ACROSS)
         forwards = add_scaled(
             times(frame[END_NUMBERS.TORSION], t), frame[END_NUMBERS.ALONG_BENDS], b
         )
@@ -337,11 +332,9 @@ def shoot_again(
         forwards += 0.5 * length
         length = 0.0
     start = at(geodesic, GEODESIC.START)
-    t, n, b = (
-        vector(start, END_NUMBERS.ALONG),
-        vector(start, END_NUMBERS.NORMAL),
-        vector(start, END_NUMBERS.ACROSS),
-    )
+    t = vector(start, END_NUMBERS.ALONG)
+    n = vector(start, END_NUMBERS.NORMAL)
+    b = vector(start, END_NUMBERS.ACROSS)
     point = add_scaled(add_scaled(vector(start, END_NUMBERS.POINT), forwards, t), sideways, b)
     # The tangent turns with the surface as the start moves, and by the correction of the direction.
     tilt = start[END_NUMBERS.ALONG_BENDS] * forwards - start[END_NUMBERS.TORSION] * sideways

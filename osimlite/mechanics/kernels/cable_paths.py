@@ -75,7 +75,8 @@ def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     Returns:
         `OUTCOME.OK`.
     """
-    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
     elements = at(i, CABLE.ELEMENTS)
     for k in range(i[CABLE.COUNT]):
@@ -102,11 +103,9 @@ def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: F
         p: numbers of the cable.
         record: record of the cable; the part of the element is filled.
     """
-    numbers, element_record, link = (
-        at(p, element[ELEMENT.AT]),
-        at(record, element[ELEMENT.KEPT]),
-        element[ELEMENT.LINK],
-    )
+    numbers = at(p, element[ELEMENT.AT])
+    element_record = at(record, element[ELEMENT.KEPT])
+    link = element[ELEMENT.LINK]
     if element[ELEMENT.IS_OBSTACLE] == 0:
         store_vector(
             element_record, 0, station(model, data, link, vector(numbers, CABLE_POINT.PLACE))
@@ -205,11 +204,9 @@ def update_contact(
     """
     element = at(elements, ELEMENT.SIZE * number)
     numbers, obstacle_record = at(p, element[ELEMENT.AT]), at(record, element[ELEMENT.KEPT])
-    geodesic, pose, surface = (
-        at(obstacle_record, OBSTACLE_WORK.CURVE),
-        at(obstacle_record, OBSTACLE_WORK.IN_GROUND),
-        at(numbers, OBSTACLE.SURFACE),
-    )
+    geodesic = at(obstacle_record, OBSTACLE_WORK.CURVE)
+    pose = at(obstacle_record, OBSTACLE_WORK.IN_GROUND)
+    surface = at(numbers, OBSTACLE.SURFACE)
     # A geodesic with a length touches for certain; only one that has shrunk to a point may lift
     # off.
     if (
@@ -229,10 +226,8 @@ def update_contact(
             ):
                 return False
         elif obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            point, normal = (
-                vector(geodesic, GEODESIC.START + END_NUMBERS.POINT),
-                vector(geodesic, GEODESIC.START + END_NUMBERS.NORMAL),
-            )
+            point = vector(geodesic, GEODESIC.START + END_NUMBERS.POINT)
+            normal = vector(geodesic, GEODESIC.START + END_NUMBERS.NORMAL)
             # Both neighbours above the tangent plane: the line passes over the surface.
             if (
                 dot(minus(previous_end, point), normal) > 0.0
@@ -440,18 +435,19 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     Returns:
         `OUTCOME.OK`.
     """
-    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
-    result, elements = at(data, i[ITEM.RECORD]), at(i, CABLE.ELEMENTS)
-    tension, last_element = result[PATH_WORK.TENSION], i[CABLE.COUNT] - 1
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, i[ITEM.RECORD])
+    elements = at(i, CABLE.ELEMENTS)
+    tension = result[PATH_WORK.TENSION]
+    last_element = i[CABLE.COUNT] - 1
     if tension < 0.0:
         return OUTCOME.OK
     for k in range(last_element + 1):
         element = at(elements, ELEMENT.SIZE * k)
-        numbers, element_record, link = (
-            at(p, element[ELEMENT.AT]),
-            at(result, element[ELEMENT.KEPT]),
-            element[ELEMENT.LINK],
-        )
+        numbers = at(p, element[ELEMENT.AT])
+        element_record = at(result, element[ELEMENT.KEPT])
+        link = element[ELEMENT.LINK]
         if element[ELEMENT.IS_OBSTACLE] == 0:
             # The station at which the cable pulls may differ from the point that it passes.
             point = station(model, data, link, vector(numbers, CABLE_POINT.PULLED))
@@ -472,10 +468,8 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
                     times(tension, vector(element_record, CABLE_POINT_WORK.AFTER)),
                 )
         elif element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
-            start, end = (
-                at(element_record, OBSTACLE_WORK.GROUND_START),
-                at(element_record, OBSTACLE_WORK.GROUND_END),
-            )
+            start = at(element_record, OBSTACLE_WORK.GROUND_START)
+            end = at(element_record, OBSTACLE_WORK.GROUND_END)
             apply_force(
                 model,
                 data,

@@ -170,7 +170,8 @@ def surface_gradient(p: Floats, a: Vector) -> Vector:
     """
     if p[SURFACE.KIND] == SURFACE_TYPE.TORUS:
         x, y, z = a
-        scale, distance = -2.0 / (p[SURFACE.TUBE] * p[SURFACE.TUBE]), sqrt(x * x + y * y)
+        scale = -2.0 / (p[SURFACE.TUBE] * p[SURFACE.TUBE])
+        distance = sqrt(x * x + y * y)
         inwards = 1.0 - p[SURFACE.RADIUS] / distance
         return scale * inwards * x, scale * inwards * y, scale * z
     if p[SURFACE.KIND] == SURFACE_TYPE.PLANE:
@@ -190,7 +191,8 @@ def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
     """
     if p[SURFACE.KIND] == SURFACE_TYPE.TORUS:
         x, y, _ = a
-        scale, square = -2.0 / (p[SURFACE.TUBE] * p[SURFACE.TUBE]), x * x + y * y
+        scale = -2.0 / (p[SURFACE.TUBE] * p[SURFACE.TUBE])
+        square = x * x + y * y
         ring = p[SURFACE.RADIUS] / (square * sqrt(square))
         return (
             scale * (1.0 - ring * y * y),
@@ -274,10 +276,8 @@ def shoot_geodesic(
         normal = unit(point)
         tangent = cross(normal, unit(cross(direction, normal)))
         c, s = cos(length / radius), sin(length / radius)
-        end, end_tangent = (
-            add_scaled(times(c, normal), s, tangent),
-            add_scaled(times(c, tangent), -s, normal),
-        )
+        end = add_scaled(times(c, normal), s, tangent)
+        end_tangent = add_scaled(times(c, tangent), -s, normal)
         store_end(p, times(radius, normal), tangent, at(geodesic, GEODESIC.START))
         store_end(p, times(radius, end), end_tangent, at(geodesic, GEODESIC.END))
         (
@@ -352,7 +352,9 @@ def integrate_by_merson(
     Returns:
         Whether the geodesic exists.
     """
-    y, rates, trial = work, at(work, SIZE), at(work, 2 * SIZE)
+    y = work
+    rates = at(work, SIZE)
+    trial = at(work, 2 * SIZE)
     store_vector(y, 0, point)
     store_vector(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
@@ -360,7 +362,11 @@ def integrate_by_merson(
         return False
     geodesic_derivative(p, y, rates)
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.START))
-    t, step, first, second, step_count = 0.0, geodesic[GEODESIC.STEP], 0.0, 0.0, 0
+    t = 0.0
+    step = geodesic[GEODESIC.STEP]
+    first = 0.0
+    second = 0.0
+    step_count = 0
     while t != length:
         next_t = t + step
         # Stretch the last step rather than add a tiny one.
@@ -465,9 +471,13 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
     Returns:
         Whether it is exact.
     """
-    y, f, old, columns = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
+    y = work
+    f = at(work, SIZE)
+    old = at(work, 2 * SIZE)
+    columns = at(work, 3 * SIZE)
     for column in range(COLUMNS):
-        new, substeps = at(columns, column * SIZE), 2 * column + 2
+        new = at(columns, column * SIZE)
+        substeps = 2 * column + 2
         h = step / substeps
         geodesic_derivative(p, y, f)
         for k in range(SIZE):
@@ -479,11 +489,9 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
         # Neville's scheme towards h = 0: each row overwrites the previous one, from its end on.
         error = 0.0
         for lower in range(column - 1, -1, -1):
-            row, finer_row, ratio = (
-                at(columns, lower * SIZE),
-                at(columns, (lower + 1) * SIZE),
-                (column + 1.0) / (lower + 1.0),
-            )
+            row = at(columns, lower * SIZE)
+            finer_row = at(columns, (lower + 1) * SIZE)
+            ratio = (column + 1.0) / (lower + 1.0)
             error = 0.0
             for k in range(SIZE):
                 # The error of Gragg's midpoint rule contains even powers of h only, hence squared
@@ -564,7 +572,10 @@ def merson_step(p: Floats, h: float, work: Floats) -> float:
     Returns:
         Largest estimated error of an entry of the state.
     """
-    y, f0, y1, rough = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
+    y = work
+    f0 = at(work, SIZE)
+    y1 = at(work, 2 * SIZE)
+    rough = at(work, 3 * SIZE)
     f1, f2, f3, f4 = at(work, 4 * SIZE), at(work, 5 * SIZE), at(work, 6 * SIZE), at(work, 7 * SIZE)
     for k in range(SIZE):
         y1[k] = y[k] + h / 3.0 * f0[k]

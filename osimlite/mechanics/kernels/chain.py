@@ -64,10 +64,8 @@ def chain_dynamics(
         return status
     # Joint forces follow the values, rates and accelerations of the joints, and the matrix follows
     # them.
-    forces, shares = (
-        at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]),
-        at(data, h[CHAIN.WORK_SHARES]),
-    )
+    forces = at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS])
+    shares = at(data, h[CHAIN.WORK_SHARES])
     matrix = at(forces, h[CHAIN.JOINTS])
     for k in range(h[CHAIN.SHARES]):
         share = at(model, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
@@ -116,14 +114,12 @@ def subtract_inertia(
     """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     while freedom >= 0:
-        a, row, ancestor, column = (
-            at(columns, 6 * freedom),
-            at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]),
-            freedom,
-            # Entries of a row belong to the degrees of freedom on the path to ground, beginning with
-            # the degree of freedom of the row.
-            0,
-        )
+        a = at(columns, 6 * freedom)
+        row = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW])
+        ancestor = freedom
+        # Entries of a row belong to the degrees of freedom on the path to ground, beginning with
+        # the degree of freedom of the row.
+        column = 0
         right[freedom] += moment * (
             a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2]
         )
@@ -148,16 +144,12 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
     h = at(model, model[MODEL.CHAIN])
     count = h[CHAIN.JOINTS]
     for number in range(count):
-        joint, moves = (
-            at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number),
-            at(data, h[CHAIN.WORK_JOINTS] + number),
-        )
-        joint_kind, source, component_index, shares = (
-            joint[JOINT.KIND],
-            joint[JOINT.SOURCE],
-            joint[JOINT.PART],
-            at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
-        )
+        joint = at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number)
+        moves = at(data, h[CHAIN.WORK_JOINTS] + number)
+        joint_kind = joint[JOINT.KIND]
+        source = joint[JOINT.SOURCE]
+        component_index = joint[JOINT.PART]
+        shares = at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE])
         # A joint that is a coordinate, or a multiple of one, is the usual case.
         if joint_kind == JOINT_KIND.LINE:
             factor = reals[component_index]
@@ -231,7 +223,8 @@ def move_end(
     Returns:
         Value (m), rate (m/s) and acceleration while udot = 0 (m/s²).
     """
-    n, spin = third_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
+    n = third_axis(y, angles)
+    spin = (u[angles[0]], u[angles[1]], u[angles[2]])
     # n moves by u x n, and that by u x (u x n).
     store_vector(row, 0, times(radius, cross(n, replace_component(ZERO, axis, 1.0))))
     centripetal = spin[axis] * dot(spin, n) - n[axis] * dot(spin, spin)

@@ -174,7 +174,8 @@ def linearise_state(
     Returns:
         `OUTCOME.OK`, or the outcome of a kernel that failed.
     """
-    size, status = model[MODEL.DOFS], OUTCOME.OK
+    size = model[MODEL.DOFS]
+    status = OUTCOME.OK
     right = at(f, size)
     if is_evaluated == 0.0:
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION)
@@ -187,18 +188,14 @@ def linearise_state(
     spatial_inertias_and_bias(model, reals, data)
     composite_rigid_body(model, data, right)
     fill_mass_matrix(model, data, work)
-    stiffness, damping = (
-        at(work, MATRIX.STIFFNESS * size * size),
-        at(work, MATRIX.DAMPING * size * size),
-    )
+    stiffness = at(work, MATRIX.STIFFNESS * size * size)
+    damping = at(work, MATRIX.DAMPING * size * size)
     for k in range(size * size):
         stiffness[k] = damping[k] = 0.0
     add_geometric_stiffness(model, reals, data, stiffness)
     for number in range(model[MODEL.RESPONSES]):
-        response, record = (
-            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            response_record(model, work, number),
-        )
+        response = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number)
+        record = response_record(model, work, number)
         # The kernel of a response applies 1 N to the wrenches and generalized forces, and writes
         # derivatives to SCRATCH; what it writes to f is the change of the force by the coordinates,
         # if it is not along its own displacement.
@@ -219,14 +216,13 @@ def linearise_state(
         for k in range(size):
             record[k] = right[k]
             if abs(right[k]) > SLIGHT:
-                first, end = min(first, k), k + 1
+                first = min(first, k)
+                end = k + 1
         record[size + RESPONSE_WORK.FIRST], record[size + RESPONSE_WORK.END] = first, end
         if changes:
-            sense, by_displacement, by_speed = (
-                response[RESPONSE.SENSE],
-                record[size],
-                record[size + 1],
-            )
+            sense = response[RESPONSE.SENSE]
+            by_displacement = record[size]
+            by_speed = record[size + 1]
             # The derivative by the displacement acts along the generalized force per newton: a
             # rank-one matrix.
             add_outer_product(size, 1.0, record, first, end, f, 0, size, stiffness)
@@ -265,11 +261,14 @@ def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
         data: results with the sparse rows of the mass matrix and the constraint equations.
         mass: filled with the matrix (n, n).
     """
-    size, freedoms, largest = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0.0
+    size = model[MODEL.DOFS]
+    freedoms = at(model, model[MODEL.DOF_AT])
+    largest = 0.0
     for k in range(size * size):
         mass[k] = 0.0
     for k in range(size):
-        j, i = at(freedoms, DOF.SIZE * k), k
+        j = at(freedoms, DOF.SIZE * k)
+        i = k
         row = at(data, j[DOF.ROW])
         largest = max(largest, row[0])
         # A sparse row stores the entries of the degrees of freedom on the path to ground.
@@ -279,7 +278,8 @@ def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
     if model[MODEL.CONSTRAINED] > 0:
         h = at(model, model[MODEL.CONSTRAINED])
         for equation in range(h[CONSTRAINED.EQUATIONS]):
-            row, square = at(data, h[CONSTRAINED.WORK_ROWS] + size * equation), 0.0
+            row = at(data, h[CONSTRAINED.WORK_ROWS] + size * equation)
+            square = 0.0
             # Divide by the squared length, so that equations in metres and radians weigh the same.
             for k in range(size):
                 square += row[k] * row[k]
@@ -303,10 +303,8 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
     """
     size = model[MODEL.DOFS]
     for link in range(model[MODEL.LINKS]):
-        b, load = (
-            at(reals, REALS.INERTIA + INERTIA.SIZE * link),
-            at(link_work(model, data, link), LINK_WORK.INERTIA),
-        )
+        b = at(reals, REALS.INERTIA + INERTIA.SIZE * link)
+        load = at(link_work(model, data, link), LINK_WORK.INERTIA)
         for k in range(LOAD):
             load[k] = 0.0
         weight = times(b[INERTIA.MASS], vector(reals, REALS.GRAVITY))
@@ -316,8 +314,10 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
     for pair in range(model[MODEL.CONTACTS]):
         i = at(model, model[model[MODEL.CONTACT_AT] + pair])
         contact = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
-        force, point = vector(contact, CONTACT_WORK.FORCE), vector(contact, CONTACT_WORK.FORCE + 3)
-        first_link, second_link = i[ITEM.OWN], i[ITEM.OWN + 1]
+        force = vector(contact, CONTACT_WORK.FORCE)
+        point = vector(contact, CONTACT_WORK.FORCE + 3)
+        first_link = i[ITEM.OWN]
+        second_link = i[ITEM.OWN + 1]
         # Contacts with ground only move one link; pairs of surfaces on ground have no degrees of
         # freedom.
         if contact[CONTACT_WORK.DEPTH] > 0.0 and max(first_link, second_link) >= 0:
@@ -328,7 +328,8 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
             add_load(model, data, first_link, point, times(-1.0, force), ZERO)
     # Inwards from the leaves: the load of a link contains those of its subtree.
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        i, link_record = link_ints(model, link), link_work(model, data, link)
+        i = link_ints(model, link)
+        link_record = link_work(model, data, link)
         load, origin = at(link_record, LINK_WORK.INERTIA), vector(link_record, LINK_WORK.ORIGIN)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             j = operation_ints(model, operation)
@@ -388,10 +389,8 @@ def add_load(
     """
     if link >= 0:
         link_record = link_work(model, data, link)
-        load, arm = (
-            at(link_record, LINK_WORK.INERTIA),
-            minus(point, vector(link_record, LINK_WORK.ORIGIN)),
-        )
+        load = at(link_record, LINK_WORK.INERTIA)
+        arm = minus(point, vector(link_record, LINK_WORK.ORIGIN))
         store_vector(load, 0, plus(vector(load, 0), force))
         # The products contain the motion of the point where the material point is not the point of
         # action.
@@ -429,7 +428,8 @@ def add_outer_product(
     """
     for i in range(first, end):
         if a[i] != 0.0:
-            scaled, target = factor * a[i], at(matrix, size * i)
+            scaled = factor * a[i]
+            target = at(matrix, size * i)
             for k in range(start, stop):
                 target[k] += scaled * b[k]
 
@@ -447,30 +447,25 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
     """
     size = model[MODEL.DOFS]
     system, levers = at(work, MATRIX.SYSTEM * size * size), at(work, MATRIX.LEVERS * size * size)
-    stiffness, damping = (
-        at(work, MATRIX.STIFFNESS * size * size),
-        at(work, MATRIX.DAMPING * size * size),
-    )
+    stiffness = at(work, MATRIX.STIFFNESS * size * size)
+    damping = at(work, MATRIX.DAMPING * size * size)
     for k in range(size * size):
         # Coordinates follow the speeds as dq = c du, so that stiffness counts with c^2.
         system[k] = work[k] - c * (damping[k] + c * stiffness[k])
         levers[k] = stiffness[k]
     for number in range(model[MODEL.RESPONSES]):
-        response, record = (
-            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            response_record(model, work, number),
-        )
-        count, a = response[RESPONSE.STATES], at(record, size)
+        response = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number)
+        record = response_record(model, work, number)
+        count = response[RESPONSE.STATES]
+        a = at(record, size)
         states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         # Forces without states are complete in the stiffness and damping matrices.
         if count == 0:
             continue
-        inverse, gains, pulls, driven = (
-            at(a, RESPONSE_WORK.INVERSE),
-            at(a, RESPONSE_WORK.GAINS),
-            at(a, RESPONSE_WORK.PULLS),
-            at(a, RESPONSE_WORK.RIGHT),
-        )
+        inverse = at(a, RESPONSE_WORK.INVERSE)
+        gains = at(a, RESPONSE_WORK.GAINS)
+        pulls = at(a, RESPONSE_WORK.PULLS)
+        driven = at(a, RESPONSE_WORK.RIGHT)
         for i in range(count):
             rates = at(a, WIDTH * (1 + i))
             # A negative index stands for a state that the model does not have; its row is that of
@@ -494,11 +489,9 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
             if states[i] >= 0:
                 by_speed += a[2 + i] * gains[i]
                 by_displacement += c * pulls[i] * a[WIDTH * (1 + i)]
-        first, end, sense = (
-            int(a[RESPONSE_WORK.FIRST]),
-            int(a[RESPONSE_WORK.END]),
-            response[RESPONSE.SENSE],
-        )
+        first = int(a[RESPONSE_WORK.FIRST])
+        end = int(a[RESPONSE_WORK.END])
+        sense = response[RESPONSE.SENSE]
         add_outer_product(
             size, -c * sense * by_speed, record, first, end, record, first, end, system
         )
@@ -518,11 +511,9 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
         d: right side r of coordinates, speeds and states, replaced by the solution.
     """
     size = model[MODEL.DOFS]
-    du, system, right = (
-        at(d, size),
-        at(work, MATRIX.SYSTEM * size * size),
-        at(work, MATRIX.COUNT * size * size),
-    )
+    du = at(d, size)
+    system = at(work, MATRIX.SYSTEM * size * size)
+    right = at(work, MATRIX.COUNT * size * size)
     levers = at(work, MATRIX.LEVERS * size * size)
     # Multiply the right sides of speeds by the mass matrix, and add those of the eliminated
     # coordinates and states.
@@ -531,15 +522,11 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
         for k in range(size):
             right[i] += work[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
     for number in range(model[MODEL.RESPONSES]):
-        response, record = (
-            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            response_record(model, work, number),
-        )
-        states, a, force = (
-            at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]),
-            at(record, size),
-            0.0,
-        )
+        response = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number)
+        record = response_record(model, work, number)
+        states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
+        a = at(record, size)
+        force = 0.0
         for k in range(response[RESPONSE.STATES]):
             if states[k] >= 0:
                 force += c * a[RESPONSE_WORK.PULLS + k] * d[states[k]]
@@ -549,11 +536,10 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
     solve_factorised(size, system, right)
     # Back-substitution: the states follow from displacement and speed along each force.
     for number in range(model[MODEL.RESPONSES]):
-        response, record = (
-            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            response_record(model, work, number),
-        )
-        count, a = response[RESPONSE.STATES], at(record, size)
+        response = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number)
+        record = response_record(model, work, number)
+        count = response[RESPONSE.STATES]
+        a = at(record, size)
         states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue

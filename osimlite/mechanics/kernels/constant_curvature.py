@@ -45,22 +45,17 @@ def amount_by_arc(
     Returns:
         `OUTCOME.OK`.
     """
-    j, operation_record = (
-        operation_ints(model, operation),
-        operation_work(model, data, operation),
-    )
-    first_freedom, second_freedom, p = (
-        model[j[OPERATION.ARGUMENTS]],
-        model[j[OPERATION.ARGUMENTS] + 1],
-        at(reals, j[OPERATION.EXTRA]),
-    )
-    table, u = at(p, 2), at(y, model[MODEL.DOFS])
+    j = operation_ints(model, operation)
+    operation_record = operation_work(model, data, operation)
+    first_freedom = model[j[OPERATION.ARGUMENTS]]
+    second_freedom = model[j[OPERATION.ARGUMENTS] + 1]
+    p = at(reals, j[OPERATION.EXTRA])
+    table = at(p, 2)
+    u = at(y, model[MODEL.DOFS])
     a = (y[first_freedom] if first_freedom >= 0 else p[0]) + table[ROD.NEUTRAL]
     b = (y[second_freedom] if second_freedom >= 0 else p[1]) + table[ROD.NEUTRAL + 1]
-    ua, ub = (
-        u[first_freedom] if first_freedom >= 0 else 0.0,
-        u[second_freedom] if second_freedom >= 0 else 0.0,
-    )
+    ua = u[first_freedom] if first_freedom >= 0 else 0.0
+    ub = u[second_freedom] if second_freedom >= 0 else 0.0
     value, da, db, daa, dab, dbb = evaluate_arc(table, a, b)
     data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
     operation_record[OPERATION_WORK.AMOUNT], operation_record[OPERATION_WORK.RATE] = (
@@ -93,11 +88,9 @@ def evaluate_arc(
     # out, so that a factor (1 - cos(theta)) / (theta sin(theta)) remains.
     share, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
     # Chain rule from cos(theta) to both angles.
-    oaa, oab, obb = (
-        first * haa + second * ga * ga,
-        first * hab + second * ga * gb,
-        first * hbb + second * gb * gb,
-    )
+    oaa = first * haa + second * ga * ga
+    oab = first * hab + second * ga * gb
+    obb = first * hbb + second * gb * gb
     oa, ob = first * ga, first * gb
     # Factor for the direction in which the rod bends.
     v, va, vb, vaa, vab, vbb = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -138,12 +131,14 @@ def transverse_ratio(table: Floats, cosine: float) -> tuple[float, float, float]
     Returns:
         Value, first and second derivative.
     """
-    square, count = angle_squared(cosine), int(table[ROD.TERMS])
+    square = angle_squared(cosine)
+    count = int(table[ROD.TERMS])
     h, h1, h2 = evaluate_series(at(table, ROD.SERIES), count, square)
     m, m1, m2 = evaluate_series(at(table, ROD.SERIES + count), count, square)
     # Reciprocal of h with its derivatives, by which the series of (1 - cos) / theta^2 is
     # multiplied.
-    k, k1 = 1.0 / h, -h1 / (h * h)
+    k = 1.0 / h
+    k1 = -h1 / (h * h)
     k2 = 2.0 * h1 * h1 / (h * h * h) - h2 / (h * h)
     return differentiate_by_cosine(m * k, m1 * k + m * k1, m2 * k + 2.0 * m1 * k1 + m * k2, h, h1)
 
@@ -190,5 +185,6 @@ def differentiate_by_cosine(
     Returns:
         Value, first and second derivative by cos θ.
     """
-    rate, rate1 = -2.0 / h, 2.0 * h1 / (h * h)
+    rate = -2.0 / h
+    rate1 = 2.0 * h1 / (h * h)
     return value, rate * first, rate * (rate1 * first + rate * second)

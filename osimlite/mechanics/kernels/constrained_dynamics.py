@@ -50,14 +50,13 @@ def constrained_dynamics(
     Returns:
         `OUTCOME.OK`, or SINGULAR_MASS.
     """
-    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
+    h = at(model, model[MODEL.CONSTRAINED])
+    size = model[MODEL.DOFS]
     right = at(f, size)
     evaluate_constraints(model, reals, data, y, f)
     # Copy mass matrix and forces, as the solver overwrites them.
-    system, matrix = (
-        at(data, h[CONSTRAINED.WORK_SYSTEM]),
-        at(data, model[model[MODEL.DOF_AT] + DOF.ROW]),
-    )
+    system = at(data, h[CONSTRAINED.WORK_SYSTEM])
+    matrix = at(data, model[model[MODEL.DOF_AT] + DOF.ROW])
     for k in range(h[CONSTRAINED.ENTRIES]):
         system[k] = matrix[k]
     forces = at(system, h[CONSTRAINED.ENTRIES])
@@ -81,7 +80,8 @@ def evaluate_constraints(model: Ints, reals: Floats, data: Floats, y: Floats, f:
         y: state.
         f: rates of the coordinates.
     """
-    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
+    h = at(model, model[MODEL.CONSTRAINED])
+    size = model[MODEL.DOFS]
     rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for k in range(h[CONSTRAINED.EQUATIONS] * size):
         rows[k] = 0.0
@@ -107,31 +107,28 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
     Returns:
         Whether M is well conditioned; if not, nothing is changed.
     """
-    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
-    count, freedoms, pivots = (
-        h[CONSTRAINED.EQUATIONS],
-        at(model, model[MODEL.DOF_AT]),
-        at(data, model[MODEL.WORK_PIVOT]),
-    )
-    scales, push, values, spare = (
-        work,
-        at(work, size),
-        at(work, 2 * size),
-        at(work, 2 * size + count),
-    )
+    h = at(model, model[MODEL.CONSTRAINED])
+    size = model[MODEL.DOFS]
+    count = h[CONSTRAINED.EQUATIONS]
+    freedoms = at(model, model[MODEL.DOF_AT])
+    pivots = at(data, model[MODEL.WORK_PIVOT])
+    scales = work
+    push = at(work, size)
+    values = at(work, 2 * size)
+    spare = at(work, 2 * size + count)
     for k in range(size):
         pivot = data[freedoms[DOF.SIZE * k + DOF.ROW]]
         if not pivot > SAFE_MASS * pivots[k]:
             return False
         scales[k] = 1.0 / sqrt(pivot)
-    rows, drifts, weighted = (
-        at(data, h[CONSTRAINED.WORK_ROWS]),
-        at(data, h[CONSTRAINED.WORK_DRIFTS]),
-        at(data, h[CONSTRAINED.WORK_FACTOR]),
-    )
+    rows = at(data, h[CONSTRAINED.WORK_ROWS])
+    drifts = at(data, h[CONSTRAINED.WORK_DRIFTS])
+    weighted = at(data, h[CONSTRAINED.WORK_FACTOR])
     for i in range(count):
         # An equation of rounding errors must not be enlarged by a light degree of freedom.
-        row, weighted_row, longest = at(rows, size * i), at(weighted, size * i), 0.0
+        row = at(rows, size * i)
+        weighted_row = at(weighted, size * i)
+        longest = 0.0
         for k in range(size):
             longest = max(longest, abs(row[k]))
         for k in range(size):
@@ -143,7 +140,8 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
     # The second pass removes rounding errors of the first.
     for _ in range(2):
         for i in range(count):
-            row, missing = at(rows, size * i), drifts[i]
+            row = at(rows, size * i)
+            missing = drifts[i]
             for k in range(size):
                 missing -= row[k] * right[k]
             values[i] = missing
@@ -168,10 +166,12 @@ def solve_transposed_factor(model: Ints, data: Floats, right: Floats) -> None:
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS] - 1, -1, -1):
         # Skip zeros: rows of G touch few degrees of freedom.
-        j, load = at(freedoms, DOF.SIZE * k), right[k]
+        j = at(freedoms, DOF.SIZE * k)
+        load = right[k]
         if is_exact_zero(load):
             continue
-        row, i = at(data, j[DOF.ROW]), j[DOF.ABOVE]
+        row = at(data, j[DOF.ROW])
+        i = j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):
             right[i] -= row[m] * load
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
@@ -187,8 +187,10 @@ def solve_factor(model: Ints, data: Floats, right: Floats) -> None:
     """
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS]):
-        j, total = at(freedoms, DOF.SIZE * k), right[k]
-        row, i = at(data, j[DOF.ROW]), j[DOF.ABOVE]
+        j = at(freedoms, DOF.SIZE * k)
+        total = right[k]
+        row = at(data, j[DOF.ROW])
+        i = j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):
             total -= row[m] * right[i]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
@@ -211,15 +213,15 @@ def solve_in_null_space(
     Returns:
         `OUTCOME.OK`, or SINGULAR_MASS if the reduced mass matrix is not positive definite.
     """
-    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
-    count, rows, drifts, equations = (
-        h[CONSTRAINED.EQUATIONS],
-        at(data, h[CONSTRAINED.WORK_ROWS]),
-        at(data, h[CONSTRAINED.WORK_DRIFTS]),
-        at(data, h[CONSTRAINED.WORK_FACTOR]),
-    )
+    h = at(model, model[MODEL.CONSTRAINED])
+    size = model[MODEL.DOFS]
+    count = h[CONSTRAINED.EQUATIONS]
+    rows = at(data, h[CONSTRAINED.WORK_ROWS])
+    drifts = at(data, h[CONSTRAINED.WORK_DRIFTS])
+    equations = at(data, h[CONSTRAINED.WORK_FACTOR])
     # Scale all equations to unit length, and drop those that are rounding errors.
-    values, spare = work, at(work, count)
+    values = work
+    spare = at(work, count)
     longest = 0.0
     for i in range(count):
         square = 0.0
@@ -237,11 +239,9 @@ def solve_in_null_space(
     free = size - rank
     # A particular solution of the equations; the free motion is added to it.
     solve_by_law(model, count, equations, values, spare, right)
-    pushed, reduced, basis = (
-        at(spare, count),
-        at(spare, count + 2 * size),
-        at(spare, count + 2 * size + size * size),
-    )
+    pushed = at(spare, count)
+    reduced = at(spare, count + 2 * size)
+    basis = at(spare, count + 2 * size + size * size)
     reduced_rhs = at(pushed, size)
     # Its inertial forces reduce the forces of the free motion.
     multiply_mass(model, matrix, right, pushed)
@@ -281,7 +281,9 @@ def multiply_mass(model: Ints, matrix: Floats, u: Floats, product: Floats) -> No
         u: vector (n,).
         product: filled with M u (n,).
     """
-    size, freedoms, start = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0
+    size = model[MODEL.DOFS]
+    freedoms = at(model, model[MODEL.DOF_AT])
+    start = 0
     for k in range(size):
         product[k] = 0.0
     for k in range(size):

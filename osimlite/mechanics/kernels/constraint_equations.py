@@ -100,8 +100,10 @@ def prescribe(
     Returns:
         `OUTCOME.OK`.
     """
-    i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
-    row, coordinate_ints = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
+    i = at(model, constraint)
+    h = at(model, model[MODEL.CONSTRAINED])
+    row = i[CONSTRAINT.FIRST_EQUATION]
+    coordinate_ints = at(i, CONSTRAINT.OWN)
     value, slope, curvature = evaluate_function(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
     data[h[CONSTRAINED.WORK_ERRORS] + row] = y[coordinate_ints[0]] - value
     data[h[CONSTRAINED.WORK_RATES] + row] = slope
@@ -137,18 +139,16 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     Returns:
         `OUTCOME.OK`.
     """
-    i, h, p = (
-        at(model, constraint),
-        at(model, model[MODEL.CONSTRAINED]),
-        at(reals, model[constraint + CONSTRAINT.NUMBERS]),
-    )
-    row, coupler_ints = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
-    size, freedoms = coupler_ints[COORDINATE.SIZE + 1], at(coupler_ints, COORDINATE.SIZE + 2)
-    coordinate_records, gradient, constants = (
-        at(freedoms, size),
-        at(data, coupler_ints[COORDINATE.SIZE]),
-        at(p, 1),
-    )
+    i = at(model, constraint)
+    h = at(model, model[MODEL.CONSTRAINED])
+    p = at(reals, model[constraint + CONSTRAINT.NUMBERS])
+    row = i[CONSTRAINT.FIRST_EQUATION]
+    coupler_ints = at(i, CONSTRAINT.OWN)
+    size = coupler_ints[COORDINATE.SIZE + 1]
+    freedoms = at(coupler_ints, COORDINATE.SIZE + 2)
+    coordinate_records = at(freedoms, size)
+    gradient = at(data, coupler_ints[COORDINATE.SIZE])
+    constants = at(p, 1)
     if int(constants[size]) >= FUNCTION_TYPE.MONOMIALS:
         # A function of one coordinate, or a constant.
         value, _, curvature = evaluate_monomials(size, freedoms, constants, y, f, gradient)
@@ -223,18 +223,15 @@ def bind_bodies(
     Returns:
         `OUTCOME.OK`.
     """
-    i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
+    i = at(model, constraint)
+    h = at(model, model[MODEL.CONSTRAINED])
     first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
     for row in range(first, i[CONSTRAINT.END_EQUATION]):
-        equation_ints, p = (
-            at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first)),
-            at(reals, i[CONSTRAINT.NUMBERS] + EQUATION_NUMBERS * (row - first)),
-        )
-        first_vector, second_vector, target_value = (
-            at(equation_ints, 1),
-            at(equation_ints, 1 + VECTOR_INTS),
-            p[12],
-        )
+        equation_ints = at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first))
+        p = at(reals, i[CONSTRAINT.NUMBERS] + EQUATION_NUMBERS * (row - first))
+        first_vector = at(equation_ints, 1)
+        second_vector = at(equation_ints, 1 + VECTOR_INTS)
+        target_value = p[12]
         target_row = at(data, h[CONSTRAINED.WORK_ROWS] + size * row)
         a, a_rate, a_bias = differentiate_vector(model, reals, data, first_vector, p)
         b, b_rate, b_bias = differentiate_vector(model, reals, data, second_vector, at(p, 6))
@@ -251,7 +248,8 @@ def bind_bodies(
             length = norm(b)
             error = length - target_value
             # At zero distance any direction of the rate is as good.
-            e, stretch = (1.0, 0.0, 0.0), 0.0
+            e = (1.0, 0.0, 0.0)
+            stretch = 0.0
             if length > 0.0:
                 e = divide(b, length)
                 stretch = (dot(b_rate, b_rate) - dot(e, b_rate) ** 2) / length
@@ -259,17 +257,13 @@ def bind_bodies(
             add_vector_row(model, data, second_vector, at(p, 6), e, target_row)
         else:
             # A roller must not slip on the surface at the point of the surface that it touches.
-            surface, roller, point = (
-                second_vector[1],
-                second_vector[2],
-                station(model, data, second_vector[1], vector(p, 6)),
-            )
+            surface = second_vector[1]
+            roller = second_vector[2]
+            point = station(model, data, second_vector[1], vector(p, 6))
             add_force_row(model, data, surface, point, times(-1.0, a), target_row)
             add_force_row(model, data, roller, point, a, target_row)
-            turning, turning_bias = (
-                angular_velocity(model, data, roller),
-                angular_acceleration_bias(model, data, roller),
-            )
+            turning = angular_velocity(model, data, roller)
+            turning_bias = angular_acceleration_bias(model, data, roller)
             # The rate of the arm contains the rotation of the roller, which is not slip.
             drift = dot(a_rate, minus(b_rate, cross(turning, b)))
             drift += dot(a, minus(minus(b_bias, cross(turning_bias, b)), cross(turning, b_rate)))
@@ -297,10 +291,8 @@ def differentiate_vector(
     """
     first_link, second_link = vector_ints[1], vector_ints[2]
     if vector_ints[0] == VECTOR_TYPE.AXIS:
-        axis, turning = (
-            direction(model, data, first_link, vector(p, 0)),
-            angular_velocity(model, data, first_link),
-        )
+        axis = direction(model, data, first_link, vector(p, 0))
+        turning = angular_velocity(model, data, first_link)
         rate = cross(turning, axis)
         return (
             axis,
@@ -310,10 +302,8 @@ def differentiate_vector(
                 cross(turning, rate),
             ),
         )
-    start, end = (
-        station(model, data, first_link, vector(p, 0)),
-        station(model, data, second_link, vector(p, 3)),
-    )
+    start = station(model, data, first_link, vector(p, 0))
+    end = station(model, data, second_link, vector(p, 3))
     arm = minus(end, start)
     # Both velocities at the same point of ground: what remains is the motion of the end relative to
     # link 1.
@@ -360,10 +350,8 @@ def add_vector_row(
             row,
         )
         return
-    start, end = (
-        station(model, data, first_link, vector(p, 0)),
-        station(model, data, second_link, vector(p, 3)),
-    )
+    start = station(model, data, first_link, vector(p, 0))
+    end = station(model, data, second_link, vector(p, 3))
     if vector_ints[0] == VECTOR_TYPE.MEETING:
         start = end
     add_force_row(model, data, first_link, start, times(-1.0, projection), row)

@@ -116,11 +116,11 @@ def measure_half_space(
         Depth (m), effective radius (m), normal, and point of application (m).
     """
     i = at(model, item)
-    first_link, second_link, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
-    o, n = (
-        station(model, data, first_link, vector(p, 0)),
-        direction(model, data, first_link, vector(p, 3)),
-    )
+    first_link = i[ITEM.OWN]
+    second_link = i[ITEM.OWN + 1]
+    p = at(reals, i[ITEM.NUMBERS])
+    o = station(model, data, first_link, vector(p, 0))
+    n = direction(model, data, first_link, vector(p, 3))
     d, point = half_space_sphere(
         o, n, station(model, data, second_link, vector(p, 7)), p[10], p[12]
     )
@@ -143,10 +143,8 @@ def measure_spheres(
     """
     i = at(model, item)
     p = at(reals, i[ITEM.NUMBERS])
-    first_center, second_center = (
-        station(model, data, i[ITEM.OWN], vector(p, 0)),
-        station(model, data, i[ITEM.OWN + 1], vector(p, 7)),
-    )
+    first_center = station(model, data, i[ITEM.OWN], vector(p, 0))
+    second_center = station(model, data, i[ITEM.OWN + 1], vector(p, 7))
     return sphere_sphere(first_center, p[6], second_center, p[10], p[12])
 
 
@@ -171,7 +169,8 @@ def contact_response(
         `OUTCOME.OK`.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
-    pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
+    pair = item - i[ITEM.OWN]
+    axis = i[ITEM.OWN + 1]
     for k in range(RESPONSE_WORK.INVERSE):
         change[k] = 0.0
     d, radius, n, point = (
@@ -180,11 +179,9 @@ def contact_response(
         else measure_spheres(model, reals, data, pair)
     )
     if d > 0.0:
-        first_link, second_link, p = (
-            model[pair + ITEM.OWN],
-            model[pair + ITEM.OWN + 1],
-            at(reals, model[pair + ITEM.NUMBERS]),
-        )
+        first_link = model[pair + ITEM.OWN]
+        second_link = model[pair + ITEM.OWN + 1]
+        p = at(reals, model[pair + ITEM.NUMBERS])
         v = minus(
             velocity(model, data, first_link, point), velocity(model, data, second_link, point)
         )
@@ -221,12 +218,11 @@ def smooth_contact_response(
     for k in range(RESPONSE_WORK.INVERSE):
         change[k] = 0.0
     contact = item + i[ITEM.OWN]
-    p, g = at(reals, model[contact + ITEM.NUMBERS]), at(model, contact + ITEM.OWN)
+    p = at(reals, model[contact + ITEM.NUMBERS])
+    g = at(model, contact + ITEM.OWN)
     geometry = at(p, SMOOTH)
-    n, center = (
-        direction(model, data, g[0], vector(geometry, 3)),
-        station(model, data, g[1], vector(geometry, 6)),
-    )
+    n = direction(model, data, g[0], vector(geometry, 3))
+    center = station(model, data, g[1], vector(geometry, 6))
     d = geometry[9] - dot(minus(center, station(model, data, g[0], vector(geometry, 0))), n)
     # The force acts midway between the two surfaces.
     point = add_scaled(center, 0.5 * d - geometry[9], n)
@@ -282,13 +278,11 @@ def write_response(
         growth: relative derivative of the force by the depth (1/m).
     """
     change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
-    first_link, second_link, point, n, v = (
-        contact.one,
-        contact.two,
-        contact.point,
-        contact.n,
-        contact.v,
-    )
+    first_link = contact.one
+    second_link = contact.two
+    point = contact.point
+    n = contact.n
+    v = contact.v
     push_direction, by_depth = n, 0.0
     if axis > 0:
         # Any two directions perpendicular to the normal and each other serve.
@@ -341,12 +335,16 @@ def add_rotation_terms(
     origin, spin = vector(link_record, LINK_WORK.ORIGIN), vector(link_record, LINK_WORK.VELOCITY)
     # From the link to ground: `turning` and `shifting` are the velocity of the operations passed so
     # far, which the current one carries along.
-    arm, turning, shifting = minus(contact.point, origin), ZERO, ZERO
-    n, sinks = contact.n, times(contact.sinks, contact.n)
+    arm = minus(contact.point, origin)
+    turning = ZERO
+    shifting = ZERO
+    n = contact.n
+    sinks = times(contact.sinks, contact.n)
     while link >= 0:
         i = link_ints(model, link)
         for operation in range(i[LINK.END_OPERATION] - 1, i[LINK.FIRST_OPERATION] - 1, -1):
-            j, a = operation_ints(model, operation), operation_work(model, data, operation)
+            j = operation_ints(model, operation)
+            a = operation_work(model, data, operation)
             if j[OPERATION.MOTION] >= MOTION.BALL:
                 continue
             turn, shift = unit_twist(j, a, origin)
@@ -392,12 +390,10 @@ def apply_contact_force(
         point: point of application (m).
     """
     i = at(model, item)
-    first_link, second_link, p, result = (
-        i[ITEM.OWN],
-        i[ITEM.OWN + 1],
-        at(reals, i[ITEM.NUMBERS]),
-        at(data, i[ITEM.RECORD]),
-    )
+    first_link = i[ITEM.OWN]
+    second_link = i[ITEM.OWN + 1]
+    p = at(reals, i[ITEM.NUMBERS])
+    result = at(data, i[ITEM.RECORD])
     # Relative velocity at the point of application, of surface 1 relative to surface 2.
     v = minus(velocity(model, data, first_link, point), velocity(model, data, second_link, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
@@ -441,11 +437,11 @@ def contact_places(
         x = at(vectors, number_count * rows[k])
         call(model[MODEL.LAWS], model, x, data, at(states, size * k), rates, STAGE.POSITION)
         for pair in range(pairs):
-            i, result_row = (
-                at(model, model[model[MODEL.CONTACT_AT] + pair]),
-                at(positions, 9 * (pairs * k + pair)),
-            )
-            a, first_link, second_link = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
+            i = at(model, model[model[MODEL.CONTACT_AT] + pair])
+            result_row = at(positions, 9 * (pairs * k + pair))
+            a = at(x, i[ITEM.NUMBERS])
+            first_link = i[ITEM.OWN]
+            second_link = i[ITEM.OWN + 1]
             store_vector(result_row, 0, station(model, data, first_link, vector(a, 0)))
             store_vector(result_row, 3, direction(model, data, first_link, vector(a, 3)))
             store_vector(result_row, 6, station(model, data, second_link, vector(a, 7)))

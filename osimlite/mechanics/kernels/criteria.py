@@ -139,7 +139,8 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
     """
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        noted, centre = at(work, criterion[CRITERION.WORKSPACE]), senses[SENSES.CENTRE]
+        noted = at(work, criterion[CRITERION.WORKSPACE])
+        centre = senses[SENSES.CENTRE]
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
             noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = compute_walked_distance(senses, row)
             noted[GAIT_WORK.HEIGHT] = row[centre + 1]
@@ -242,11 +243,9 @@ def compute_walked_distance(senses: Ints, row: Floats) -> float:
         senses: plan of the sensor row.
         row: sensor row.
     """
-    centre, first_foot, second_foot = (
-        row[senses[SENSES.CENTRE]],
-        foot_position(senses, row, 0),
-        foot_position(senses, row, 1),
-    )
+    centre = row[senses[SENSES.CENTRE]]
+    first_foot = foot_position(senses, row, 0)
+    second_foot = foot_position(senses, row, 1)
     # SCONE takes the two smallest of three, so that a trunk that falls forwards adds little.
     if centre >= first_foot and centre >= second_foot:
         return 0.5 * (first_foot + second_foot)
@@ -301,11 +300,9 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         row: sensor row.
         noted: workspace of the criterion, see `JUMP_WORK`.
     """
-    height, rise, does = (
-        row[senses[SENSES.CENTRE] + 1],
-        row[senses[SENSES.RISE]],
-        noted[JUMP_WORK.DOES],
-    )
+    height = row[senses[SENSES.CENTRE] + 1]
+    rise = row[senses[SENSES.RISE]]
+    does = noted[JUMP_WORK.DOES]
     has_load = row[senses[SENSES.LOADS]] + row[senses[SENSES.LOADS] + 1] > 0.0
     noted[JUMP_WORK.HERE], noted[JUMP_WORK.PEAK] = height, max(noted[JUMP_WORK.PEAK], height)
     if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_WORK.START]:
@@ -336,9 +333,11 @@ def range_penalty(
         numbers: numbers of the criterion.
         row: sensor row.
     """
-    first_value, second_value = row[offset], 0.0
+    first_value = row[offset]
+    second_value = 0.0
     if criterion_type != CRITERION_TYPE.NUMBER:
-        first_value, second_value = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
+        first_value = row[senses[SENSES.LOADS]]
+        second_value = row[senses[SENSES.LOADS] + 1]
         first_value, second_value = (
             (max(first_value, second_value), 0.0)
             if criterion_type == CRITERION_TYPE.LARGEST_LOAD
@@ -365,7 +364,8 @@ def muscle_effort(
         power: exponent of the activations.
         row: sensor row.
     """
-    count, total = senses[SENSES.MUSCLES], 1.0 if criterion_type == CRITERION_TYPE.TENSIONS else 0.0
+    count = senses[SENSES.MUSCLES]
+    total = 1.0 if criterion_type == CRITERION_TYPE.TENSIONS else 0.0
     strengths = at(sensor_numbers, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
         contribution = 1.0
@@ -398,13 +398,14 @@ def metabolic_power(
         row: sensor row.
         excitations: excitations of the muscles.
     """
-    count, slow, total = senses[SENSES.MUSCLES], numbers[CRITERION_NUMBERS.SLOW], 0.0
-    optimal, strengths = (
-        at(sensor_numbers, SENSOR_NUMBERS.HEAD),
-        at(sensor_numbers, SENSOR_NUMBERS.HEAD + count),
-    )
+    count = senses[SENSES.MUSCLES]
+    slow = numbers[CRITERION_NUMBERS.SLOW]
+    total = 0.0
+    optimal = at(sensor_numbers, SENSOR_NUMBERS.HEAD)
+    strengths = at(sensor_numbers, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
-        u, a = QUARTER * excitations[k], QUARTER * row[senses[SENSES.ACTIVATIONS] + k]
+        u = QUARTER * excitations[k]
+        a = QUARTER * row[senses[SENSES.ACTIVATIONS] + k]
         n = row[senses[SENSES.LENGTHS] + k]
         of_activation = 40.0 * slow * sin(u) + 133.0 * (1.0 - slow) * (1.0 - cos(u))
         of_maintenance = 74.0 * slow * sin(a) + 111.0 * (1.0 - slow) * (1.0 - cos(a))

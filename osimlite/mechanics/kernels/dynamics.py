@@ -208,15 +208,11 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         data: results with poses, velocities and accelerations; filled with inertias and wrenches.
     """
     for link in range(model[MODEL.LINKS]):
-        b, link_record = (
-            at(reals, REALS.INERTIA + INERTIA.SIZE * link),
-            link_work(model, data, link),
-        )
-        r, i, m = (
-            at(link_record, LINK_WORK.ROTATION),
-            at(link_record, LINK_WORK.INERTIA),
-            b[INERTIA.MASS],
-        )
+        b = at(reals, REALS.INERTIA + INERTIA.SIZE * link)
+        link_record = link_work(model, data, link)
+        r = at(link_record, LINK_WORK.ROTATION)
+        i = at(link_record, LINK_WORK.INERTIA)
+        m = b[INERTIA.MASS]
         center = plus(
             minus(vector(link_record, LINK_WORK.POSITION), vector(link_record, LINK_WORK.ORIGIN)),
             rotate(r, vector(b, INERTIA.CENTER)),
@@ -226,10 +222,8 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         # Rows of the rotation, since I in ground is R I Rᵀ.
         x_row, y_row, z_row = vector(r, 0), vector(r, 3), vector(r, 6)
         # Rows of R I, where I is the inertia in the link.
-        first, second = (
-            multiply_symmetric(at(b, INERTIA.MOMENTS), x_row),
-            multiply_symmetric(at(b, INERTIA.MOMENTS), y_row),
-        )
+        first = multiply_symmetric(at(b, INERTIA.MOMENTS), x_row)
+        second = multiply_symmetric(at(b, INERTIA.MOMENTS), y_row)
         third = multiply_symmetric(at(b, INERTIA.MOMENTS), z_row)
         i[0], i[1], i[2], i[3] = m, mx, my, mz
         # Inertia about the origin: R I Rᵀ plus the parallel axis terms.
@@ -239,10 +233,8 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         i[7] = dot(first, y_row) - mx * cy
         i[8] = dot(first, z_row) - mx * cz
         i[9] = dot(second, z_row) - my * cz
-        spin, velocity = (
-            vector(link_record, LINK_WORK.VELOCITY),
-            vector(link_record, LINK_WORK.VELOCITY + 3),
-        )
+        spin = vector(link_record, LINK_WORK.VELOCITY)
+        velocity = vector(link_record, LINK_WORK.VELOCITY + 3)
         # Newton-Euler equation: wrench = I a + v x* (I v).
         angular, linear = spatial_momentum(i, spin, velocity)
         torque, force = spatial_momentum(
@@ -268,7 +260,8 @@ def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
     """
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS]):
-        j, link_record = link_ints(model, link), link_work(model, data, link)
+        j = link_ints(model, link)
+        link_record = link_work(model, data, link)
         # The wrench is not needed yet: its entries hold the accelerations that parents contribute.
         turn, shift = ZERO, ZERO
         if j[LINK.PARENT] >= 0:
@@ -276,10 +269,8 @@ def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
             turn, shift = vector(parent_change, 0), vector(parent_change, 3)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
-            turn, shift = (
-                add_scaled(turn, udot[freedom], vector(c, 0)),
-                add_scaled(shift, udot[freedom], vector(c, 3)),
-            )
+            turn = add_scaled(turn, udot[freedom], vector(c, 0))
+            shift = add_scaled(shift, udot[freedom], vector(c, 3))
         store_vector(link_record, LINK_WORK.WRENCH, turn)
         store_vector(link_record, LINK_WORK.WRENCH + 3, shift)
         store_vector(
@@ -358,10 +349,8 @@ def add_generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
     columns = at(data, model[MODEL.WORK_COLUMN])
     # Children have larger numbers than their parents, so that this order goes inwards.
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        j, load = (
-            link_ints(model, link),
-            at(link_work(model, data, link), LINK_WORK.WRENCH),
-        )
+        j = link_ints(model, link)
+        load = at(link_work(model, data, link), LINK_WORK.WRENCH)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             for k in range(6):
@@ -382,7 +371,8 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
     """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        j, link_record = link_ints(model, link), link_work(model, data, link)
+        j = link_ints(model, link)
+        link_record = link_work(model, data, link)
         i, load = at(link_record, LINK_WORK.INERTIA), at(link_record, LINK_WORK.WRENCH)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
@@ -391,7 +381,9 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
             # Force that accelerates the subtree along this degree of freedom by 1; its products
             # with the columns above are the entries of M.
             angular, linear = spatial_momentum(i, turn, shift)
-            row, k, column = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
+            row = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW])
+            k = freedom
+            column = 0
             while k >= 0:
                 c = at(columns, 6 * k)
                 row[column] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
@@ -415,24 +407,25 @@ def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:
     Returns:
         -1, or the degree of freedom that moves no mass.
     """
-    size, freedoms, pivots = (
-        model[MODEL.DOFS],
-        at(model, model[MODEL.DOF_AT]),
-        at(data, model[MODEL.WORK_PIVOT]),
-    )
+    size = model[MODEL.DOFS]
+    freedoms = at(model, model[MODEL.DOF_AT])
+    pivots = at(data, model[MODEL.WORK_PIVOT])
     # Keep the diagonal: pivots are compared with it, and `solve_by_multipliers` needs it.
     for k in range(size):
         pivots[k] = data[freedoms[DOF.SIZE * k + DOF.ROW]]
     # Factorise M = Lᵀ D L from the leaves to the root, and solve with Lᵀ and D on the way.
     for k in range(size - 1, -1, -1):
         j = at(freedoms, DOF.SIZE * k)
-        row, depth, i = at(data, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]
+        row = at(data, j[DOF.ROW])
+        depth = j[DOF.DEPTH]
+        i = j[DOF.ABOVE]
         pivot = row[0]
         # A pivot of rounding errors means that a degree of freedom moves no mass; also true for
         # NaN.
         if not pivot > SMALLEST_PIVOT * pivots[k]:
             return k
-        inverse, load = 1.0 / pivot, right[k]
+        inverse = 1.0 / pivot
+        load = right[k]
         for m in range(1, depth + 1):
             a = row[m] * inverse
             target = at(data, freedoms[DOF.SIZE * i + DOF.ROW])
@@ -447,7 +440,9 @@ def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:
     # Solve with L from the root to the leaves.
     for k in range(size):
         j = at(freedoms, DOF.SIZE * k)
-        row, i, total = at(data, j[DOF.ROW]), j[DOF.ABOVE], right[k]
+        row = at(data, j[DOF.ROW])
+        i = j[DOF.ABOVE]
+        total = right[k]
         for m in range(1, j[DOF.DEPTH] + 1):
             total -= row[m] * right[i]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]

@@ -107,10 +107,15 @@ def least_effort(
     """
     m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     # Multipliers of the previous frame are stored for unscaled equations, since scales change.
-    scales, previous, multipliers, inner_work = work, at(work, m), at(work, 2 * m), at(work, 3 * m)
-    targets, compliances = inner_work, at(inner_work, n)
+    scales = work
+    previous = at(work, m)
+    multipliers = at(work, 2 * m)
+    inner_work = at(work, 3 * m)
+    targets = inner_work
+    compliances = at(inner_work, n)
     for frame in range(sizes[EFFORT_SIZES.FRAMES]):
-        columns, x = at(problems, (n + 1) * m * frame), at(solutions, (n + m + 1) * frame)
+        columns = at(problems, (n + 1) * m * frame)
+        x = at(solutions, (n + m + 1) * frame)
         scale_equations(sizes, columns, scales)
         # With targets 0 and compliances 1 the weighted problem is that for p = 2.
         for j in range(n):
@@ -160,7 +165,8 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
     for j in range(m * n):
         largest_entry = max(largest_entry, abs(columns[j]))
     for j in range(n):
-        column, largest = at(columns, m * j), 0.0
+        column = at(columns, m * j)
+        largest = 0.0
         for k in range(m):
             largest = max(largest, abs(column[k]))
         for k in range(m):
@@ -174,11 +180,9 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
         rhs[k] *= scales[k]
     # The list of nonzeros is made per frame, because moment arms vanish and appear.
     for j in range(n):
-        column, entries, count = (
-            at(columns, m * j),
-            at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j),
-            0,
-        )
+        column = at(columns, m * j)
+        entries = at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
+        count = 0
         for k in range(m):
             if column[k] != 0.0:
                 count += 1
@@ -200,12 +204,12 @@ def minimize_powers(
         multipliers: workspace for the multipliers (m,).
         work: workspace, which begins with targets and compliances, see `solve_weighted_least_squares`.
     """
-    m, n, power = (
-        sizes[EFFORT_SIZES.EQUATIONS],
-        sizes[EFFORT_SIZES.UNKNOWNS],
-        numbers[EFFORT_NUMBERS.POWER],
-    )
-    targets, compliances, tried = work, at(work, n), at(work, 4 * n + m * (m + 5))
+    m = sizes[EFFORT_SIZES.EQUATIONS]
+    n = sizes[EFFORT_SIZES.UNKNOWNS]
+    power = numbers[EFFORT_NUMBERS.POWER]
+    targets = work
+    compliances = at(work, n)
+    tried = at(work, 4 * n + m * (m + 5))
     terms = at(work, 4 * n + 3 * m)
     for _ in range(NEWTON_STEPS):
         # Scale by the largest |x|, so that its powers neither overflow nor underflow.
@@ -237,7 +241,8 @@ def minimize_powers(
         ):
             break
         # The sum must decrease; halve the step until it does.
-        previous_cost, step_length = sum_powers(n, power, unit, x, tried, 0.0), 1.0
+        previous_cost = sum_powers(n, power, unit, x, tried, 0.0)
+        step_length = 1.0
         trial_cost = sum_powers(n, power, unit, x, tried, step_length)
         for _ in range(HALVINGS):
             if trial_cost < previous_cost:
@@ -298,7 +303,8 @@ def solve_weighted_least_squares(
     m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     rhs = at(columns, m * n)
     y, change, centre = at(work, 2 * n), at(work, 3 * n), at(work, 4 * n)
-    slope, step = at(centre, m), at(centre, 2 * m)
+    slope = at(centre, m)
+    step = at(centre, 2 * m)
     terms, slight, matrix = at(centre, 3 * m), at(centre, 4 * m), at(centre, 5 * m)
     error_before = error = 0.0
     # Each proximal step moves the centre λ' to the last multipliers.
@@ -395,11 +401,9 @@ def transpose_times(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats
     """
     m = sizes[EFFORT_SIZES.EQUATIONS]
     for j in range(sizes[EFFORT_SIZES.UNKNOWNS]):
-        column, entries, total = (
-            at(columns, m * j),
-            at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j),
-            0.0,
-        )
+        column = at(columns, m * j)
+        entries = at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
+        total = 0.0
         for e in range(1, entries[0] + 1):
             total += column[entries[e]] * multipliers[entries[e]]
         y[j] = total
@@ -466,11 +470,13 @@ def compute_residual(
         The largest ratio of residual to terms.
     """
     m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
-    rhs, largest = at(columns, m * n), 0.0
+    rhs = at(columns, m * n)
+    largest = 0.0
     for k in range(m):
         residual[k], terms[k] = rhs[k], abs(rhs[k])
     for j in range(n):
-        column, entries = at(columns, m * j), at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
+        column = at(columns, m * j)
+        entries = at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
         for e in range(1, entries[0] + 1):
             k = entries[e]
             term = column[k] * x[j]
@@ -506,10 +512,12 @@ def fill_dual_hessian(
         x = work[j] + work[n + j] * work[2 * n + j]
         if not numbers[EFFORT_NUMBERS.BOUNDS + j] < x < numbers[EFFORT_NUMBERS.BOUNDS + n + j]:
             continue
-        column, entries = at(columns, m * j), at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
+        column = at(columns, m * j)
+        entries = at(sizes, EFFORT_SIZES.ENTRIES + (1 + m) * j)
         for e in range(1, entries[0] + 1):
             k = entries[e]
-            row, factor = at(matrix, m * k), work[n + j] * column[k]
+            row = at(matrix, m * k)
+            factor = work[n + j] * column[k]
             for g in range(1, e + 1):
                 row[entries[g]] += factor * column[entries[g]]
 
@@ -530,20 +538,16 @@ def line_search(
         multipliers: multipliers at the start of the step (m,).
         work: workspace of `solve_weighted_least_squares`, with y = Aᵀ λ and its change along the step.
     """
-    m, n, low, high, step_length, start = (
-        sizes[EFFORT_SIZES.EQUATIONS],
-        sizes[EFFORT_SIZES.UNKNOWNS],
-        0.0,
-        1.0,
-        0.0,
-        0.0,
-    )
-    y, change, centre, slight = (
-        at(work, 2 * n),
-        at(work, 3 * n),
-        at(work, 4 * n),
-        at(work, 4 * n + 4 * m),
-    )
+    m = sizes[EFFORT_SIZES.EQUATIONS]
+    n = sizes[EFFORT_SIZES.UNKNOWNS]
+    low = 0.0
+    high = 1.0
+    step_length = 0.0
+    start = 0.0
+    y = at(work, 2 * n)
+    change = at(work, 3 * n)
+    centre = at(work, 4 * n)
+    slight = at(work, 4 * n + 4 * m)
     for _ in range(HALVINGS):
         # Slope of the dual function along the step, including the proximal term.
         rise = 0.0

@@ -32,11 +32,11 @@ def touch_ellipsoid(
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    first_link, second_link, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
-    o, n = (
-        station(model, data, first_link, vector(p, 0)),
-        direction(model, data, first_link, vector(p, 3)),
-    )
+    first_link = i[ITEM.OWN]
+    second_link = i[ITEM.OWN + 1]
+    p = at(reals, i[ITEM.NUMBERS])
+    o = station(model, data, first_link, vector(p, 0))
+    n = direction(model, data, first_link, vector(p, 3))
     center = station(model, data, second_link, vector(p, 7))
     d, radius, point = half_space_ellipsoid(
         o, n, center, ellipsoid_axes(model, data, second_link, at(p, 18)), vector(p, 27), p[12]
@@ -65,19 +65,17 @@ def touch_ellipsoids(
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    first_link, second_link, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
-    a, b = (
-        station(model, data, first_link, vector(p, 0)),
-        station(model, data, second_link, vector(p, 7)),
-    )
+    first_link = i[ITEM.OWN]
+    second_link = i[ITEM.OWN + 1]
+    p = at(reals, i[ITEM.NUMBERS])
+    a = station(model, data, first_link, vector(p, 0))
+    b = station(model, data, second_link, vector(p, 7))
     centre_line = minus(b, a)
     # Bounding spheres: their radii are stored where a pair of spheres has its radii.
     if dot(centre_line, centre_line) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
-    axes1, axes2 = (
-        ellipsoid_axes(model, data, first_link, at(p, 18)),
-        ellipsoid_axes(model, data, second_link, at(p, 30)),
-    )
+    axes1 = ellipsoid_axes(model, data, first_link, at(p, 18))
+    axes2 = ellipsoid_axes(model, data, second_link, at(p, 30))
     d, radius, n, point = ellipsoid_ellipsoid(
         a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12]
     )
@@ -98,10 +96,8 @@ def ellipsoid_axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
     Returns:
         Three unit vectors.
     """
-    x_axis, y_axis = (
-        direction(model, data, link, vector(p, 0)),
-        direction(model, data, link, vector(p, 3)),
-    )
+    x_axis = direction(model, data, link, vector(p, 0))
+    y_axis = direction(model, data, link, vector(p, 3))
     return x_axis, y_axis, direction(model, data, link, vector(p, 6))
 
 
@@ -125,14 +121,14 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    count, pairs, links, p, work = (
-        i[ITEM.OWN],
-        i[ITEM.OWN + 1],
-        at(i, ITEM.OWN + 2),
-        at(reals, i[ITEM.NUMBERS]),
-        at(data, i[ITEM.RECORD]),
-    )
-    centers, start, order = work, at(work, 3 * count), at(work, 4 * count)
+    count = i[ITEM.OWN]
+    pairs = i[ITEM.OWN + 1]
+    links = at(i, ITEM.OWN + 2)
+    p = at(reals, i[ITEM.NUMBERS])
+    work = at(data, i[ITEM.RECORD])
+    centers = work
+    start = at(work, 3 * count)
+    order = at(work, 4 * count)
     for k in range(count):
         store_vector(centers, 3 * k, station(model, data, links[k], vector(p, 4 * k)))
     axis = 0
@@ -210,7 +206,8 @@ def find_pair(surfaces: Ints, pairs: int, first_surface: int, second_surface: in
         second_surface: number of the second surface.
     """
     for pair in range(pairs):
-        a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
+        a = surfaces[2 * pair]
+        b = surfaces[2 * pair + 1]
         if (a == first_surface and b == second_surface) or (
             a == second_surface and b == first_surface
         ):

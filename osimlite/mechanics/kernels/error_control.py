@@ -121,11 +121,9 @@ def judge_step(h: Floats, t1: float, error: float, order: float) -> None:
         error: norm of its error.
         order: order of the error.
     """
-    limit, step, accuracy = (
-        h[METHOD_WORK.LAST_TIME],
-        h[METHOD_WORK.NEXT_STEP],
-        h[METHOD_WORK.ACCEPTED],
-    )
+    limit = h[METHOD_WORK.LAST_TIME]
+    step = h[METHOD_WORK.NEXT_STEP]
+    accuracy = h[METHOD_WORK.ACCEPTED]
     # A step that was cut much shorter is no basis for the size of the next one.
     cut = limit < h[METHOD_WORK.REACHED] + 0.95 * step
     h[METHOD_WORK.NEXT_STEP] = min(

@@ -47,9 +47,12 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, off
     """
     h = at(data, offset)
     size = model[MODEL.STATE_SIZE]
-    errors, full_step_end = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
+    errors = at(data, model[MODEL.WORK_STATE] + ERRORS * size)
+    full_step_end = at(h, HEAD)
     # Constraints hold to a tenth of the accuracy, as in Simbody.
-    t0, t1, tolerance = h[METHOD_WORK.REACHED], step_end(h), h[METHOD_WORK.ACCEPTED] / 10.0
+    t0 = h[METHOD_WORK.REACHED]
+    t1 = step_end(h)
+    tolerance = h[METHOD_WORK.ACCEPTED] / 10.0
     h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 1.0, 0.0
     error = inf
     if (
@@ -95,7 +98,8 @@ def take_half_steps(
         `OUTCOME.OK`, or the outcome of an evaluation that failed.
     """
     size = model[MODEL.STATE_SIZE]
-    f, half = at(middle, size), 0.5 * (t1 - t0)
+    f = at(middle, size)
+    half = 0.5 * (t1 - t0)
     f0 = at(y0, size)
     # Both first evaluations share the derivative at the start, so that a step costs one evaluation.
     status = advance_state(model, reals, data, t1, t1 - t0, y0, f0, full_step_end, f)

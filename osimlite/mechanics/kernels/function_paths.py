@@ -72,8 +72,10 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     Returns:
         `OUTCOME.OK`.
     """
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    count, coordinates = i[FUNCTION_PATH.COUNT], at(i, FUNCTION_PATH.COORDINATES)
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
+    count = i[FUNCTION_PATH.COUNT]
+    coordinates = at(i, FUNCTION_PATH.COORDINATES)
     length = evaluate_item(model, reals, data, y, f, item - i[FUNCTION_PATH.LENGTH_BACK])
     speed = 0.0
     for k in range(count):
@@ -126,7 +128,8 @@ def pull_coordinates(
     Returns:
         `OUTCOME.OK`.
     """
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
     for k in range(i[FUNCTION_PATH.COUNT]):
         freedom = i[FUNCTION_PATH.COORDINATES + k]
         if freedom >= 0:
@@ -152,11 +155,9 @@ def function_of_one(
     Returns:
         `OUTCOME.OK`.
     """
-    i, p, result = (
-        at(model, item),
-        at(reals, model[item + ITEM.NUMBERS]),
-        at(data, model[item + ITEM.RECORD]),
-    )
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, model[item + ITEM.RECORD])
     freedom = i[FUNCTION.ARGUMENTS]
     result[0], result[FUNCTION_WORK.DERIVATIVES], _ = evaluate_function(
         at(p, 1), y[freedom] if freedom >= 0 else p[0]
@@ -182,14 +183,14 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     Returns:
         `OUTCOME.OK`.
     """
-    i, p, result = (
-        at(model, item),
-        at(reals, model[item + ITEM.NUMBERS]),
-        at(data, model[item + ITEM.RECORD]),
-    )
-    size, width = i[FUNCTION.COUNT], i[FUNCTION.ORDER] + 1
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, model[item + ITEM.RECORD])
+    size = i[FUNCTION.COUNT]
+    width = i[FUNCTION.ORDER] + 1
     powers = at(result, FUNCTION_WORK.DERIVATIVES + size)
-    exponents, factors = at(powers, size * width), at(powers, size * width + size)
+    exponents = at(powers, size * width)
+    factors = at(powers, size * width + size)
     for k in range(size):
         freedom = i[FUNCTION.ARGUMENTS + k]
         # Powers once per argument, since many terms share them.
@@ -247,16 +248,12 @@ def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item
     Returns:
         `OUTCOME.OK`.
     """
-    i, p, result = (
-        at(model, item),
-        at(reals, model[item + ITEM.NUMBERS]),
-        at(data, model[item + ITEM.RECORD]),
-    )
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, model[item + ITEM.RECORD])
     size = i[FUNCTION.COUNT]
-    program, registers = (
-        at(i, FUNCTION.ARGUMENTS + size),
-        at(result, FUNCTION_WORK.DERIVATIVES + size),
-    )
+    program = at(i, FUNCTION.ARGUMENTS + size)
+    registers = at(result, FUNCTION_WORK.DERIVATIVES + size)
     for number in range(i[FUNCTION.ORDER]):
         for k in range(size):
             freedom = i[FUNCTION.ARGUMENTS + k]

@@ -54,7 +54,8 @@ def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
     Returns:
         Value, first and second derivative.
     """
-    function_type, factor = int(table[0]), table[1]
+    function_type = int(table[0])
+    factor = table[1]
     value = slope = curvature = 0.0
     if function_type == FUNCTION_TYPE.SINE:
         angle = table[3] * z + table[4]
@@ -64,7 +65,8 @@ def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
     elif function_type == FUNCTION_TYPE.STEP:
         # Quintic step: S(t) = 10 t^3 - 15 t^4 + 6 t^5 between both ends, constant outside.
         rate = 1.0 / (table[3] - table[2])
-        t, rise = (z - table[2]) * rate, table[5] - table[4]
+        t = (z - table[2]) * rate
+        rise = table[5] - table[4]
         if 0.0 < t < 1.0:
             slope = 30.0 * rise * rate * t * t * (1.0 - t) * (1.0 - t)
             curvature = 60.0 * rise * rate * rate * t * (1.0 - t) * (1.0 - 2.0 * t)
@@ -96,7 +98,8 @@ def evaluate_piecewise(table: Floats, z: float, function_type: int) -> tuple[flo
             high = middle
         else:
             low = middle
-    piece, t = at(table, 4 + knots + low * width), z - table[4 + low]
+    piece = at(table, 4 + knots + low * width)
+    t = z - table[4 + low]
     # Horner's rule for value and derivatives at once; `curvature` is half of the second derivative.
     for k in range(width - 1, -1, -1):
         curvature = curvature * t + slope
@@ -126,10 +129,8 @@ def amount_by_one(
     Returns:
         `OUTCOME.OK`.
     """
-    j, a = (
-        operation_ints(model, operation),
-        operation_work(model, data, operation),
-    )
+    j = operation_ints(model, operation)
+    a = operation_work(model, data, operation)
     freedom = model[j[OPERATION.ARGUMENTS]]
     value, slope, curvature = evaluate_function(
         at(reals, j[OPERATION.EXTRA] + 1), y[freedom] if freedom >= 0 else reals[j[OPERATION.EXTRA]]
@@ -160,16 +161,12 @@ def amount_by_several(
     Returns:
         `OUTCOME.OK`.
     """
-    j, a = (
-        operation_ints(model, operation),
-        operation_work(model, data, operation),
-    )
-    size, arguments, constants, gradient = (
-        j[OPERATION.ARGUMENT_COUNT],
-        at(model, j[OPERATION.ARGUMENTS]),
-        at(reals, j[OPERATION.EXTRA]),
-        at(data, j[OPERATION.GRADIENT]),
-    )
+    j = operation_ints(model, operation)
+    a = operation_work(model, data, operation)
+    size = j[OPERATION.ARGUMENT_COUNT]
+    arguments = at(model, j[OPERATION.ARGUMENTS])
+    constants = at(reals, j[OPERATION.EXTRA])
+    gradient = at(data, j[OPERATION.GRADIENT])
     a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = (
         evaluate_monomials(size, arguments, constants, y, at(y, model[MODEL.DOFS]), gradient)
     )
@@ -193,12 +190,14 @@ def evaluate_monomials(
         Value, rate, and the second derivative by time at constant rates.
     """
     table = at(constants, size)
-    factor, count = table[1], int(table[2])
+    factor = table[1]
+    count = int(table[2])
     value = rate = curvature = 0.0
     for index in range(size):
         gradient[index] = 0.0
     for term in range(count):
-        coefficient, powers = factor * table[3 + term], at(table, 3 + count + term * size)
+        coefficient = factor * table[3 + term]
+        powers = at(table, 3 + count + term * size)
         # Each derivative is a product of powers of its own: dividing the value by an argument would
         # fail at 0.
         value += coefficient * multiply_powers(size, arguments, constants, y, powers, -1, -1)
@@ -291,8 +290,11 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    count, numbers, values = i[ITEM.OWN], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
-    ends, tables = at(i, ITEM.OWN + 1), at(i, ITEM.OWN + 1 + count)
+    count = i[ITEM.OWN]
+    numbers = at(reals, i[ITEM.NUMBERS])
+    values = at(data, i[ITEM.RECORD])
+    ends = at(i, ITEM.OWN + 1)
+    tables = at(i, ITEM.OWN + 1 + count)
     function_number = 0
     for control in range(count):
         total = 0.0

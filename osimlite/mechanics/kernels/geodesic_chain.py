@@ -138,11 +138,10 @@ def lay_chain(
     Returns:
         Whether it touches.
     """
-    first, second = (
-        point_in_surface(pose, line_start(chain, k)),
-        point_in_surface(pose, line_end(chain, k, count)),
-    )
-    about, slot = vector(pose, SURFACE_POSE.ABOUT), at(chain, SLOT.SIZE * k)
+    first = point_in_surface(pose, line_start(chain, k))
+    second = point_in_surface(pose, line_end(chain, k, count))
+    about = vector(pose, SURFACE_POSE.ABOUT)
+    slot = at(chain, SLOT.SIZE * k)
     turn, point, start_direction, arc = start_on_surface(
         p,
         first,

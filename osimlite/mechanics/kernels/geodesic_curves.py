@@ -37,24 +37,16 @@ def trace_geodesics(
     Returns:
         Number of corners.
     """
-    i, p, result = (
-        at(model, item),
-        at(reals, model[item + ITEM.NUMBERS]),
-        at(data, model[item + ITEM.RECORD]),
-    )
-    points, wraps = (
-        i[PATH.POINTS],
-        at(i, PATH.NODES_AT + NODE.SIZE * (i[PATH.POINTS] + 2 * i[PATH.WRAPS])),
-    )
-    order, work = (
-        at(result, PATH_WORK.ORDER),
-        at(result, PATH_WORK.ORDER + points + 2 * i[PATH.WRAPS]),
-    )
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, model[item + ITEM.RECORD])
+    points = i[PATH.POINTS]
+    wraps = at(i, PATH.NODES_AT + NODE.SIZE * (i[PATH.POINTS] + 2 * i[PATH.WRAPS]))
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + points + 2 * i[PATH.WRAPS])
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
-    geodesic, work_vector = (
-        at(result, slots[GEODESIC_PATH.CHAIN] + OBSTACLE_WORK.CURVE),
-        at(result, slots[GEODESIC_PATH.SEARCH]),
-    )
+    geodesic = at(result, slots[GEODESIC_PATH.CHAIN] + OBSTACLE_WORK.CURVE)
+    work_vector = at(result, slots[GEODESIC_PATH.SEARCH])
     count = 0
     for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
@@ -64,13 +56,11 @@ def trace_geodesics(
         wrap = (number - points) // 2
         # Of the two nodes of a wrap, the first is that where the geodesic begins.
         if number >= points and number == points + 2 * wrap:
-            surface, pose = (
-                at(
-                    p,
-                    wraps[GEODESIC_WRAP.SIZE * wrap + GEODESIC_WRAP.PLACES] + WRAP_NUMBERS.SURFACE,
-                ),
-                at(result, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * wrap),
+            surface = at(
+                p,
+                wraps[GEODESIC_WRAP.SIZE * wrap + GEODESIC_WRAP.PLACES] + WRAP_NUMBERS.SURFACE,
             )
+            pose = at(result, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * wrap)
             point = point_in_surface(pose, vector(node_record, NODE_WORK.PLACE))
             # The geodesic starts in the direction of the line before it.
             start_direction = rotate_back(
@@ -104,11 +94,9 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     Returns:
         Number of corners.
     """
-    i, p, result = (
-        at(model, item),
-        at(reals, model[item + ITEM.NUMBERS]),
-        at(data, model[item + ITEM.RECORD]),
-    )
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, model[item + ITEM.RECORD])
     count = 0
     for k in range(i[CABLE.COUNT]):
         element = at(i, CABLE.ELEMENTS + ELEMENT.SIZE * k)
@@ -118,15 +106,11 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
             count += 1
         elif element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             geodesic = at(element_record, OBSTACLE_WORK.CURVE)
-            point, start_direction = (
-                vector(geodesic, GEODESIC.START + END_NUMBERS.POINT),
-                vector(geodesic, GEODESIC.START + END_NUMBERS.ALONG),
-            )
-            surface, pose, work = (
-                at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE),
-                at(element_record, OBSTACLE_WORK.IN_GROUND),
-                at(result, i[CABLE.SOLVER]),
-            )
+            point = vector(geodesic, GEODESIC.START + END_NUMBERS.POINT)
+            start_direction = vector(geodesic, GEODESIC.START + END_NUMBERS.ALONG)
+            surface = at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE)
+            pose = at(element_record, OBSTACLE_WORK.IN_GROUND)
+            work = at(result, i[CABLE.SOLVER])
             store_vector(
                 f, 3 * count, vector(element_record, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT)
             )

@@ -142,13 +142,13 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         `OUTCOME.OK`.
     """
     place_points(model, reals, data, y, item)
-    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
-    result, points, size = (
-        at(data, i[ITEM.RECORD]),
-        i[PATH.POINTS],
-        i[PATH.POINTS] + 2 * i[PATH.WRAPS],
-    )
-    order, work = at(result, PATH_WORK.ORDER), at(result, PATH_WORK.ORDER + size)
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, i[ITEM.RECORD])
+    points = i[PATH.POINTS]
+    size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + size)
     slots = at(i, PATH.NODES_AT + NODE.SIZE * size + GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
     place_surfaces(model, data, i, p)
     for k in range(1, int(result[PATH_WORK.COUNT])):
@@ -163,10 +163,8 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         for number in range(count):
             slot = at(result, slots[GEODESIC_PATH.BEST] + SLOT.SIZE * (number + 1))
             node = points + 2 * int(slot[SLOT.OWNER])
-            first_node, second_node = (
-                at(work, NODE_WORK.SIZE * node),
-                at(work, NODE_WORK.SIZE * (node + 1)),
-            )
+            first_node = at(work, NODE_WORK.SIZE * node)
+            second_node = at(work, NODE_WORK.SIZE * (node + 1))
             store_vector(
                 first_node,
                 NODE_WORK.PLACE,
@@ -209,10 +207,8 @@ def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
         ],
     )
     for number in range(i[PATH.WRAPS]):
-        node, pose = (
-            at(i, PATH.NODES_AT + NODE.SIZE * (i[PATH.POINTS] + 2 * number)),
-            at(poses, SURFACE_POSE.SIZE * number),
-        )
+        node = at(i, PATH.NODES_AT + NODE.SIZE * (i[PATH.POINTS] + 2 * number))
+        pose = at(poses, SURFACE_POSE.SIZE * number)
         n = at(p, node[NODE.AT])
         place_frame(
             model,
@@ -238,14 +234,14 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
     Returns:
         The number of surfaces, which are in the slots of the shortest path.
     """
-    size, near_count = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0
-    wraps, work = at(i, PATH.NODES_AT + NODE.SIZE * size), at(record, PATH_WORK.ORDER + size)
+    size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
+    near_count = 0
+    wraps = at(i, PATH.NODES_AT + NODE.SIZE * size)
+    work = at(record, PATH_WORK.ORDER + size)
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
-    chain, best, poses = (
-        at(record, slots[GEODESIC_PATH.CHAIN]),
-        at(record, slots[GEODESIC_PATH.BEST]),
-        at(record, slots[GEODESIC_PATH.POSES]),
-    )
+    chain = at(record, slots[GEODESIC_PATH.CHAIN])
+    best = at(record, slots[GEODESIC_PATH.BEST])
+    poses = at(record, slots[GEODESIC_PATH.POSES])
     for number in range(i[PATH.WRAPS]):
         if (
             wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.FIRST] == first_node
@@ -269,7 +265,8 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
         # On an ellipsoid there may be no geodesic near the start, but a shortest one exists; where
         # surfaces intersect, no smooth path may exist, and one surface alone must do.
         if combination == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
-            combination, stage = 0, stage + 1
+            combination = 0
+            stage = stage + 1
     return best_count
 
 
@@ -301,14 +298,15 @@ def fill_slots(
         The number of surfaces, -1 if there is no such path that is shorter; and the increment to the
         number of the next combination with another direction past a surface that was touched.
     """
-    size, count, step = i[PATH.POINTS] + 2 * i[PATH.WRAPS], 0, WAYS
-    work, wraps = at(record, PATH_WORK.ORDER + size), at(i, PATH.NODES_AT + NODE.SIZE * size)
+    size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
+    count = 0
+    step = WAYS
+    work = at(record, PATH_WORK.ORDER + size)
+    wraps = at(i, PATH.NODES_AT + NODE.SIZE * size)
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
-    chain, search_work, poses = (
-        at(record, slots[GEODESIC_PATH.CHAIN]),
-        at(record, slots[GEODESIC_PATH.SEARCH]),
-        at(record, slots[GEODESIC_PATH.POSES]),
-    )
+    chain = at(record, slots[GEODESIC_PATH.CHAIN])
+    search_work = at(record, slots[GEODESIC_PATH.SEARCH])
+    poses = at(record, slots[GEODESIC_PATH.POSES])
     for number in range(i[PATH.WRAPS]):
         store_vector(poses, SURFACE_POSE.SIZE * number + SURFACE_POSE.ABOUT, (0.0, 0.0, 0.0))
     # A surface that is passed in another direction needs the others in place before the chain is
@@ -330,10 +328,8 @@ def fill_slots(
                 return count, step
             waits = False
             if slot_index > 0:
-                numbers, pose = (
-                    at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.PLACES]),
-                    at(poses, SURFACE_POSE.SIZE * number),
-                )
+                numbers = at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.PLACES])
+                pose = at(poses, SURFACE_POSE.SIZE * number)
                 is_open = (
                     numbers[WRAP_NUMBERS.SIDE] == 0.0
                     and numbers[WRAP_NUMBERS.SURFACE + SURFACE.KIND] != SURFACE_TYPE.TORUS
@@ -342,10 +338,8 @@ def fill_slots(
                 if is_open and norm(vector(pose, SURFACE_POSE.ABOUT)) == 0.0:
                     # The direction past an open surface is chosen when it is first touched, and
                     # kept from then on.
-                    a, b = (
-                        node_in_surface(pose, work, first_node),
-                        node_in_surface(pose, work, second_node),
-                    )
+                    a = node_in_surface(pose, work, first_node)
+                    b = node_in_surface(pose, work, second_node)
                     way_count = min(
                         count_ways(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near_count == 1), step
                     )
@@ -393,21 +387,18 @@ def mark_near_wraps(
         second_node: second point.
     """
     size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
-    wraps, work = at(i, PATH.NODES_AT + NODE.SIZE * size), at(record, PATH_WORK.ORDER + size)
+    wraps = at(i, PATH.NODES_AT + NODE.SIZE * size)
+    work = at(record, PATH_WORK.ORDER + size)
     for number in range(i[PATH.WRAPS]):
-        wrap_ints, pose = (
-            at(wraps, GEODESIC_WRAP.SIZE * number),
-            at(record, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * number),
-        )
+        wrap_ints = at(wraps, GEODESIC_WRAP.SIZE * number)
+        pose = at(record, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * number)
         if wrap_ints[GEODESIC_WRAP.FIRST] == first_node:
             numbers = at(p, wrap_ints[GEODESIC_WRAP.PLACES])
             surface = at(numbers, WRAP_NUMBERS.SURFACE)
             # An end inside the surface makes OpenSim ignore it.
-            largest_value, a, b = (
-                INSIDE * surface[SURFACE.SQUARE],
-                node_in_surface(pose, work, first_node),
-                node_in_surface(pose, work, second_node),
-            )
+            largest_value = INSIDE * surface[SURFACE.SQUARE]
+            a = node_in_surface(pose, work, first_node)
+            b = node_in_surface(pose, work, second_node)
             is_near = (
                 second_node <= wrap_ints[GEODESIC_WRAP.LAST]
                 and surface_value(surface, a) <= largest_value
@@ -424,10 +415,8 @@ def mark_near_wraps(
             ):
                 deepest = squared_depth(surface, a, b)
                 for k in range(1, int(record[PATH_WORK.COUNT])):
-                    previous_node, next_node = (
-                        int(record[PATH_WORK.ORDER + k - 1]),
-                        int(record[PATH_WORK.ORDER + k]),
-                    )
+                    previous_node = int(record[PATH_WORK.ORDER + k - 1])
+                    next_node = int(record[PATH_WORK.ORDER + k])
                     is_other_segment = (
                         wrap_ints[GEODESIC_WRAP.RANGE] <= previous_node != first_node
                         and next_node <= wrap_ints[GEODESIC_WRAP.LAST]
@@ -482,31 +471,26 @@ def find_largest_turn(
     Returns:
         The wrap, the slot after the line (0 if no wrap turns a line), and the axis of the turn.
     """
-    result, slot_index, largest_turn_angle, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
+    result = 0
+    slot_index = 0
+    largest_turn_angle = 0.0
+    axis = (0.0, 0.0, 0.0)
     for number in range(i[PATH.WRAPS]):
-        wrap_ints, pose = (
-            at(wraps, GEODESIC_WRAP.SIZE * number),
-            at(poses, SURFACE_POSE.SIZE * number),
-        )
+        wrap_ints = at(wraps, GEODESIC_WRAP.SIZE * number)
+        pose = at(poses, SURFACE_POSE.SIZE * number)
         if (
             wrap_ints[GEODESIC_WRAP.FIRST] == first_node
             and pose[SURFACE_POSE.HOW] != BENDING.NOT
             and find_slot(chain, count, number) == 0
         ):
-            numbers, about = (
-                at(p, wrap_ints[GEODESIC_WRAP.PLACES]),
-                vector(pose, SURFACE_POSE.ABOUT),
-            )
-            surface, priority = (
-                at(numbers, WRAP_NUMBERS.SURFACE),
-                WHOLE if numbers[WRAP_NUMBERS.SIDE] != 0.0 else 0.0,
-            )
+            numbers = at(p, wrap_ints[GEODESIC_WRAP.PLACES])
+            about = vector(pose, SURFACE_POSE.ABOUT)
+            surface = at(numbers, WRAP_NUMBERS.SURFACE)
+            priority = WHOLE if numbers[WRAP_NUMBERS.SIDE] != 0.0 else 0.0
             largest_value = INSIDE * surface[SURFACE.SQUARE]
             for k in range(count + 1):
-                a, b = (
-                    point_in_surface(pose, line_start(chain, k + 1)),
-                    point_in_surface(pose, line_end(chain, k, count)),
-                )
+                a = point_in_surface(pose, line_start(chain, k + 1))
+                b = point_in_surface(pose, line_end(chain, k, count))
                 if (
                     surface_value(surface, a) <= largest_value
                     and surface_value(surface, b) <= largest_value
@@ -523,10 +507,8 @@ def find_largest_turn(
                         if turn_about > TOUCH:
                             turn, point, start_direction = turn_about, point_about, direction_about
                     if turn > TOUCH and turn + priority > largest_turn_angle:
-                        result, slot_index, largest_turn_angle, axis = (
-                            number,
-                            k + 1,
-                            turn + priority,
-                            cross(point, start_direction),
-                        )
+                        result = number
+                        slot_index = k + 1
+                        largest_turn_angle = turn + priority
+                        axis = cross(point, start_direction)
     return result, slot_index, axis

@@ -180,7 +180,8 @@ def compute_accepted_part(slot: Floats, corrections: Floats) -> float:
         slot: slot; its length may be set to zero.
         corrections: corrections of its four variations; that of the length may be bounded.
     """
-    start, arc = at(slot, OBSTACLE_WORK.GROUND_START), slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
+    start = at(slot, OBSTACLE_WORK.GROUND_START)
+    arc = slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
     # Rotation of the ends by displacements, estimated by the curvature at the start.
     bends = max(abs(start[END_NUMBERS.ALONG_BENDS]), abs(start[END_NUMBERS.ACROSS_BENDS]))
     turn = max(
@@ -207,7 +208,9 @@ def determinant_sign(size: int, a: Floats) -> float:
         size: number of equations.
         a: factor of the equations.
     """
-    diagonal, order, sign = at(a, size * size), at(a, size * size + size), 1.0
+    diagonal = at(a, size * size)
+    order = at(a, size * size + size)
+    sign = 1.0
     for r in range(size):
         sign = -sign if diagonal[r] < 0.0 else sign
         for k in range(r):
@@ -229,7 +232,8 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
     Returns:
         The largest kink (rad).
     """
-    size, largest_kink = UNKNOWNS * count, 0.0
+    size = UNKNOWNS * count
+    largest_kink = 0.0
     for k in range(size * size):
         a[k] = 0.0
     for k in range(1, count + 1):
@@ -267,10 +271,10 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 # The other end of the line is on a neighbouring geodesic: its displacement has the
                 # opposite effect.
                 if 0 < neighbour <= count:
-                    neighbour_end, neighbour_row = (
-                        OBSTACLE_WORK.GROUND_END if side == 0 else OBSTACLE_WORK.GROUND_START,
-                        at(a, size * row + UNKNOWNS * (neighbour - 1)),
+                    neighbour_end = (
+                        OBSTACLE_WORK.GROUND_END if side == 0 else OBSTACLE_WORK.GROUND_START
                     )
+                    neighbour_row = at(a, size * row + UNKNOWNS * (neighbour - 1))
                     differentiate_end(
                         at(chain, SLOT.SIZE * neighbour),
                         neighbour_end,

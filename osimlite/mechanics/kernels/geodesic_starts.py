@@ -104,11 +104,9 @@ def start_on_surface(
             rule; zeros for either direction.
         work: workspace of a string.
     """
-    axis, side, surface = (
-        int(p[WRAP_NUMBERS.AXIS]),
-        p[WRAP_NUMBERS.SIDE],
-        at(p, WRAP_NUMBERS.SURFACE),
-    )
+    axis = int(p[WRAP_NUMBERS.AXIS])
+    side = p[WRAP_NUMBERS.SIDE]
+    surface = at(p, WRAP_NUMBERS.SURFACE)
     if surface[SURFACE.KIND] == SURFACE_TYPE.TORUS:
         return start_on_torus(
             surface[SURFACE.RADIUS], surface[SURFACE.TUBE], first, second, axis, side, bending
@@ -163,16 +161,12 @@ def start_on_cylinder(
     # Angles are measured from the middle of the active side, or from the first end.
     if is_open:
         ux, uy = px, py
-    first_angle, second_angle = (
-        atan2(ux * py - uy * px, ux * px + uy * py),
-        atan2(ux * qy - uy * qx, ux * qx + uy * qy),
-    )
+    first_angle = atan2(ux * py - uy * px, ux * px + uy * py)
+    second_angle = atan2(ux * qy - uy * qx, ux * qx + uy * qy)
     far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
     # Lengths of the tangents, 0 for ends inside, which count as on the surface.
-    line1, line2 = (
-        sqrt(max(far1 * far1 - radius * radius, 0.0)),
-        sqrt(max(far2 * far2 - radius * radius, 0.0)),
-    )
+    line1 = sqrt(max(far1 * far1 - radius * radius, 0.0))
+    line2 = sqrt(max(far2 * far2 - radius * radius, 0.0))
     # Angles between the ends and their tangent points, seen from the axis.
     first_tangent_angle, second_tangent_angle = atan2(line1, radius), atan2(line2, radius)
     sweep = (second_angle - first_angle) % (2.0 * pi)
@@ -195,11 +189,10 @@ def start_on_cylinder(
         - second_tangent_angle
     )
     size = sqrt(ux * ux + uy * uy)
-    c, s = (
-        cos(first_angle + rotation_sense * first_tangent_angle) / size,
-        sin(first_angle + rotation_sense * first_tangent_angle) / size,
-    )
-    nx, ny = c * ux - s * uy, c * uy + s * ux
+    c = cos(first_angle + rotation_sense * first_tangent_angle) / size
+    s = sin(first_angle + rotation_sense * first_tangent_angle) / size
+    nx = c * ux - s * uy
+    ny = c * uy + s * ux
     # On the unrolled cylinder the path is a straight line of constant slope.
     slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, LEAST)
     z = pz + slope * line1
@@ -236,14 +229,10 @@ def turns_left(
         second_tangent_angle: angle from there to its tangents (rad).
         sweep: angle from end to end to the left, not negative (rad).
     """
-    left1, right1 = (
-        cos(first_angle + first_tangent_angle) >= 0.0,
-        cos(first_angle - first_tangent_angle) >= 0.0,
-    )
-    left2, right2 = (
-        cos(second_angle - second_tangent_angle) >= 0.0,
-        cos(second_angle + second_tangent_angle) >= 0.0,
-    )
+    left1 = cos(first_angle + first_tangent_angle) >= 0.0
+    right1 = cos(first_angle - first_tangent_angle) >= 0.0
+    left2 = cos(second_angle - second_tangent_angle) >= 0.0
+    right2 = cos(second_angle + second_tangent_angle) >= 0.0
     if left1 != right1:
         return left1
     if left2 != right2:
@@ -279,10 +268,8 @@ def start_on_ellipsoid(
     wx, wy, wz = times(1.0 / p[SURFACE.SQUARE], weights)
     scale = sx, sy, sz = sqrt(wx), sqrt(wy), sqrt(wz)
     radii = 1.0 / sx, 1.0 / sy, 1.0 / sz
-    scaled_first, scaled_second = (
-        multiply_elementwise(scale, first),
-        multiply_elementwise(scale, second),
-    )
+    scaled_first = multiply_elementwise(scale, first)
+    scaled_second = multiply_elementwise(scale, second)
     scaled_chord = minus(scaled_second, scaled_first)
     fraction = min(
         max(-dot(scaled_first, scaled_chord) / max(dot(scaled_chord, scaled_chord), LEAST), 0.0),
@@ -351,10 +338,8 @@ def start_on_section(
     normal = unit(across)
     centre = times(dot(normal, scaled_first), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
-    a1, a2 = (
-        find_tangent(minus(scaled_first, centre), radius, normal, 1.0),
-        find_tangent(minus(scaled_second, centre), radius, normal, -1.0),
-    )
+    a1 = find_tangent(minus(scaled_first, centre), radius, normal, 1.0)
+    a2 = find_tangent(minus(scaled_second, centre), radius, normal, -1.0)
     across = cross(normal, a1)
     turn = atan2(dot(across, a2), dot(a1, a2))
     # A small negative angle is rounding of a path that just touches; others are turns by more than
@@ -417,12 +402,14 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
                         )
                     # In the last sweep note the first and last bead that touch.
                     if stride == 1 and pull == PULLS:
-                        first_bead, last_bead = min(first_bead, k), k
+                        first_bead = min(first_bead, k)
+                        last_bead = k
                 store_vector(work, 3 * k, bead)
         stride //= 2
     if last_bead == 0:
         return 0.0, first, second, 0.0
-    begin, end = vector(work, 3 * first_bead - 3), vector(work, 3 * first_bead)
+    begin = vector(work, 3 * first_bead - 3)
+    end = vector(work, 3 * first_bead)
     # The first and last segment are half on the surface.
     length = 0.5 * (
         norm(minus(end, begin))
@@ -470,11 +457,10 @@ def start_on_torus(
     if side != 0.0 and not is_on_side(ring_point, axis, side):
         return 0.0, first, ring_point, 0.0
     rx, ry, _ = inwards = unit((-x, -y, 0.0))
-    centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
-    local_first, local_second = (
-        vector_in_cylinder(minus(first, centre), inwards, tangent),
-        vector_in_cylinder(minus(second, centre), inwards, tangent),
-    )
+    centre = times(-ring, inwards)
+    tangent = (-ry, rx, 0.0)
+    local_first = vector_in_cylinder(minus(first, centre), inwards, tangent)
+    local_second = vector_in_cylinder(minus(second, centre), inwards, tangent)
     turn, point, start_direction, length = start_on_cylinder(
         # The active side of the cylinder is the inside of the ring, since a path passes through the
         # hole.

@@ -156,7 +156,9 @@ def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> in
     Returns:
         The rank, which is the number of independent equations.
     """
-    diagonal, order, rank = at(a, count * size), at(a, count * size + count), 0
+    diagonal = at(a, count * size)
+    order = at(a, count * size + count)
+    rank = 0
     for r in range(count):
         order[r] = r
     least = 0.0
@@ -261,7 +263,8 @@ def solve_minimum_norm(
         work: workspace (count,).
         x: filled with the solution (size,).
     """
-    diagonal, order = at(a, count * size), at(a, count * size + count)
+    diagonal = at(a, count * size)
+    order = at(a, count * size + count)
     for i in range(count):
         work[i] = values[int(order[i])]
     # Least squares over all equations, redundant ones included.
@@ -330,9 +333,11 @@ def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
         Whether each pivot is more than `smallest` times its entry of the matrix.
     """
     for i in range(size):
-        row, entry = at(a, size * i), a[size * i + i]
+        row = at(a, size * i)
+        entry = a[size * i + i]
         for k in range(i + 1):
-            upper_row, total = at(a, size * k), row[k]
+            upper_row = at(a, size * k)
+            total = row[k]
             for j in range(k):
                 total -= row[j] * upper_row[j]
             if k < i:

@@ -44,11 +44,10 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, off
         `OUTCOME.OK`; the record says whether the step was accepted.
     """
     h = at(data, offset)
-    errors, stages = (
-        at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]),
-        at(h, HEAD),
-    )
-    t0, t1 = h[METHOD_WORK.REACHED], step_end(h)
+    errors = at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE])
+    stages = at(h, HEAD)
+    t0 = h[METHOD_WORK.REACHED]
+    t1 = step_end(h)
     h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
     if compute_stages(model, reals, data, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
@@ -84,8 +83,12 @@ def compute_stages(
     Returns:
         `OUTCOME.OK`, or the outcome of an evaluation that failed.
     """
-    size, h = model[MODEL.STATE_SIZE], t1 - t0
-    f0, fa, fb, fc = at(y0, size), stages, at(stages, size), at(stages, 2 * size)
+    size = model[MODEL.STATE_SIZE]
+    h = t1 - t0
+    f0 = at(y0, size)
+    fa = stages
+    fb = at(stages, size)
+    fc = at(stages, 2 * size)
     for stage in range(4):
         # Choose the argument and the time of the next evaluation.
         f, t = fa, t1
@@ -95,11 +98,15 @@ def compute_stages(
             for k in range(size):
                 ya[k] = y0[k] + c * f0[k]
         elif stage == 1:
-            c, f, t = h / 6.0, fb, t0 + h / 3.0
+            c = h / 6.0
+            f = fb
+            t = t0 + h / 3.0
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] + fa[k])
         elif stage == 2:
-            c, f, t = h / 8.0, fc, t0 + h / 2.0
+            c = h / 8.0
+            f = fc
+            t = t0 + h / 2.0
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] + 3.0 * fb[k])
         else:

@@ -57,20 +57,17 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    first_link, second_link, count, is_plane = (
-        i[ITEM.OWN],
-        i[ITEM.OWN + 1],
-        i[ITEM.OWN + 3],
-        i[ITEM.OWN + 4],
-    )
+    first_link = i[ITEM.OWN]
+    second_link = i[ITEM.OWN + 1]
+    count = i[ITEM.OWN + 3]
+    is_plane = i[ITEM.OWN + 4]
     p, result = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
     for k in range(MESH_WORK):
         result[k] = 0.0
-    o, about = (
-        station(model, data, first_link, vector(p, 0)),
-        station(model, data, second_link, vector(p, 7)),
-    )
-    n, mesh_offset = direction(model, data, first_link, vector(p, 3)), minus(about, o)
+    o = station(model, data, first_link, vector(p, 0))
+    about = station(model, data, second_link, vector(p, 7))
+    n = direction(model, data, first_link, vector(p, 3))
+    mesh_offset = minus(about, o)
     # Skip all springs if the bounding sphere of the mesh does not reach the other surface.
     if is_plane:
         if dot(mesh_offset, n) >= p[10]:
@@ -93,7 +90,9 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         if d > 0.0:
             constants = FoundationSpring(spring[0], p[11], p[12], p[13], p[14], p[15])
             push, turn, stored_energy = spring_load(constants, middle, end, about, v, turning)
-            force, torque, energy = plus(force, push), plus(torque, turn), energy + stored_energy
+            force = plus(force, push)
+            torque = plus(torque, turn)
+            energy = energy + stored_energy
     apply_mesh_load(model, data, item, about, force, torque, energy)
     return OUTCOME.OK
 
@@ -119,7 +118,9 @@ def apply_mesh_load(
         energy: potential energy (J).
     """
     i = at(model, item)
-    first_link, second_link, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(data, i[ITEM.RECORD])
+    first_link = i[ITEM.OWN]
+    second_link = i[ITEM.OWN + 1]
+    result = at(data, i[ITEM.RECORD])
     contact = at(
         data,
         model[

@@ -65,15 +65,19 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
     """
     # Parents come before children, so that one pass is enough.
     for link in range(model[MODEL.LINKS]):
-        i, link_record = link_ints(model, link), link_work(model, data, link)
+        i = link_ints(model, link)
+        link_record = link_work(model, data, link)
         # Start from the frame of the parent, or of ground.
-        axes, origin = (X, Y, Z), ZERO
+        axes = (X, Y, Z)
+        origin = ZERO
         if i[LINK.PARENT] >= 0:
             parent = link_work(model, data, i[LINK.PARENT])
-            axes, origin = axes_from_rows(parent), vector(parent, LINK_WORK.POSITION)
+            axes = axes_from_rows(parent)
+            origin = vector(parent, LINK_WORK.POSITION)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             record = model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
-            j, a = at(model, record), operation_work(model, data, operation)
+            j = at(model, record)
+            a = operation_work(model, data, operation)
             b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
             # Apply the fixed transform before the motion.
             # Most joints are not offset by a rotation: skip what is the identity.
@@ -118,7 +122,8 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                 frame = at(data, WORK.SCRATCH)
                 set_frame(frame, axes, origin)
                 call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
-                axes, origin = axes_from_rows(frame), vector(frame, LINK_WORK.POSITION)
+                axes = axes_from_rows(frame)
+                origin = vector(frame, LINK_WORK.POSITION)
         # All links of a tree share the origin of its first link for their spatial vectors, so that
         # these add up without shifts.
         set_frame(link_record, axes, origin)
@@ -162,7 +167,9 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
     Returns:
         `OUTCOME.OK`, or the outcome of a law that failed.
     """
-    status, size, controls = OUTCOME.OK, model[MODEL.DOFS], model[MODEL.CONTROLS]
+    status = OUTCOME.OK
+    size = model[MODEL.DOFS]
+    controls = model[MODEL.CONTROLS]
     # Controls first: items may need them.
     if controls > 0:
         status = call(model[controls + ITEM.LAW], model, reals, data, y, f, controls)
@@ -175,25 +182,20 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
             at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO
         )
     for link in range(model[MODEL.LINKS]):
-        i, link_record = link_ints(model, link), link_work(model, data, link)
+        i = link_ints(model, link)
+        link_record = link_work(model, data, link)
         origin = vector(link_record, LINK_WORK.ORIGIN)
         # An upward acceleration of ground has the same effect as gravity.
-        spin, velocity, spin_rate, acceleration = (
-            ZERO,
-            ZERO,
-            ZERO,
-            times(-1.0, vector(reals, REALS.GRAVITY)),
-        )
+        spin = ZERO
+        velocity = ZERO
+        spin_rate = ZERO
+        acceleration = times(-1.0, vector(reals, REALS.GRAVITY))
         if i[LINK.PARENT] >= 0:
             parent = link_work(model, data, i[LINK.PARENT])
-            spin, velocity = (
-                vector(parent, LINK_WORK.VELOCITY),
-                vector(parent, LINK_WORK.VELOCITY + 3),
-            )
-            spin_rate, acceleration = (
-                vector(parent, LINK_WORK.ACCELERATION),
-                vector(parent, LINK_WORK.ACCELERATION + 3),
-            )
+            spin = vector(parent, LINK_WORK.VELOCITY)
+            velocity = vector(parent, LINK_WORK.VELOCITY + 3)
+            spin_rate = vector(parent, LINK_WORK.ACCELERATION)
+            acceleration = vector(parent, LINK_WORK.ACCELERATION + 3)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             j = operation_ints(model, operation)
             a = operation_work(model, data, operation)
@@ -242,10 +244,8 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
                     ),
                 )
                 turn, shift = vector(result, 0), vector(result, 3)
-                acceleration, spin_rate = (
-                    plus(acceleration, vector(result, 6)),
-                    plus(spin_rate, vector(result, 9)),
-                )
+                acceleration = plus(acceleration, vector(result, 6))
+                spin_rate = plus(spin_rate, vector(result, 9))
             # Coriolis terms: earlier motions carry the axes of this one.
             spin_rate = plus(spin_rate, cross(spin, turn))
             acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))

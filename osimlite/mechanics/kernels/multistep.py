@@ -177,20 +177,17 @@ def try_multistep(
     """
     size = model[MODEL.STATE_SIZE]
     h = at(data, offset)
-    rows, work = at(h, HEAD), at(h, HEAD + STATES * size)
-    d, psi, errors = (
-        at(rows, ROWS * size),
-        at(rows, (ROWS + 1) * size),
-        at(data, model[MODEL.WORK_STATE] + ERRORS * size),
-    )
+    rows = at(h, HEAD)
+    work = at(h, HEAD + STATES * size)
+    d = at(rows, ROWS * size)
+    psi = at(rows, (ROWS + 1) * size)
+    errors = at(data, model[MODEL.WORK_STATE] + ERRORS * size)
     h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 0.0, 1.0
     if h[MULTISTEP_WORK.ORDER] == 0.0:
         start_history(model, h, y0, rows)
-    t0, accuracy, order = (
-        h[METHOD_WORK.REACHED],
-        h[METHOD_WORK.ACCEPTED],
-        int(h[MULTISTEP_WORK.ORDER]),
-    )
+    t0 = h[METHOD_WORK.REACHED]
+    accuracy = h[METHOD_WORK.ACCEPTED]
+    order = int(h[MULTISTEP_WORK.ORDER])
     t1 = t0 + h[MULTISTEP_WORK.STEP]
     # A step that almost reaches the limit is stretched or cut to it.
     if h[METHOD_WORK.LAST_TIME] <= t0 + 1.001 * h[MULTISTEP_WORK.STEP]:
@@ -335,9 +332,14 @@ def iterate_newton(
     Returns:
         The number of iterations, 0 if they do not converge.
     """
-    size, previous_residual, previous_length = model[MODEL.STATE_SIZE], 0.0, 0.0
-    rows, work, f1 = at(h, HEAD), at(h, HEAD + STATES * size), at(y1, size)
-    d, psi = at(rows, ROWS * size), at(rows, (ROWS + 1) * size)
+    size = model[MODEL.STATE_SIZE]
+    previous_residual = 0.0
+    previous_length = 0.0
+    rows = at(h, HEAD)
+    work = at(h, HEAD + STATES * size)
+    f1 = at(y1, size)
+    d = at(rows, ROWS * size)
+    psi = at(rows, (ROWS + 1) * size)
     change = at(data, model[MODEL.WORK_STATE] + ERRORS * size)
     for k in range(size):
         d[k] = 0.0
@@ -414,12 +416,11 @@ def choose_order(
         error: norm of the error of the last step.
         safety: ratio of the step to the one that would just meet the accuracy.
     """
-    size, order, accuracy = (
-        model[MODEL.STATE_SIZE],
-        int(h[MULTISTEP_WORK.ORDER]),
-        h[METHOD_WORK.ACCEPTED],
-    )
-    best, factor = order, step_factor(error / accuracy, order)
+    size = model[MODEL.STATE_SIZE]
+    order = int(h[MULTISTEP_WORK.ORDER])
+    accuracy = h[METHOD_WORK.ACCEPTED]
+    best = order
+    factor = step_factor(error / accuracy, order)
     # Compare the steps that each neighbouring order allows.
     for candidate in (order - 1, order + 1):
         if not 1 <= candidate <= MOST_ORDER[method]:
@@ -460,13 +461,12 @@ def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor:
         factor: ratio of the new step to the old one.
     """
     # Adams' differences are those of h f, and follow the state.
-    order, differing = int(h[MULTISTEP_WORK.ORDER]) - method, at(rows, size * method)
+    order = int(h[MULTISTEP_WORK.ORDER]) - method
+    differing = at(rows, size * method)
     scale = factor if method == FORMULAS.ADAMS else 1.0
-    new, unit, product = (
-        at(h, MULTISTEP_WORK.MATRICES),
-        at(h, MULTISTEP_WORK.MATRICES + WIDTH * WIDTH),
-        at(h, MULTISTEP_WORK.MATRICES + 2 * WIDTH * WIDTH),
-    )
+    new = at(h, MULTISTEP_WORK.MATRICES)
+    unit = at(h, MULTISTEP_WORK.MATRICES + WIDTH * WIDTH)
+    product = at(h, MULTISTEP_WORK.MATRICES + 2 * WIDTH * WIDTH)
     column = at(product, WIDTH * WIDTH)
     fill_difference_matrix(order, factor, new)
     fill_difference_matrix(order, 1.0, unit)

@@ -87,7 +87,9 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     """
     place_points(model, reals, data, y, item)
     place_surfaces(model, reals, data, item)
-    wraps, length, exchanged = model[item + PATH.WRAPS], inf, False
+    wraps = model[item + PATH.WRAPS]
+    length = inf
+    exchanged = False
     # A single surface does not depend on others, so that one round is enough.
     for turn in range(ROUNDS if wraps > 1 else 1):
         first = second = WRAPPING.NONE
@@ -106,7 +108,8 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
                 first = result
             elif k == 1:
                 second = result
-        previous_length, length = length, measure_points(model, data, y, item)
+        previous_length = length
+        length = measure_points(model, data, y, item)
         if abs(length - previous_length) < STILL:
             break
         # OpenSim exchanges the first two wraps if the first does not wrap and the second fails in
@@ -126,11 +129,10 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
         data: results with the poses of the links; those of the surfaces are filled.
         item: offset of the item in the model.
     """
-    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
-    nodes, work = (
-        i[PATH.POINTS] + 2 * i[PATH.WRAPS],
-        at(data, i[ITEM.RECORD] + PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
-    )
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
+    nodes = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
+    work = at(data, i[ITEM.RECORD] + PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS])
     for k in range(i[PATH.WRAPS]):
         number = i[PATH.POINTS] + 2 * k
         at(work, NODE_WORK.SIZE * number)[NODE_WORK.IS_KEPT] = at(
@@ -138,10 +140,8 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
         )[NODE_WORK.IS_KEPT] = 0.0
         back = i[PATH.NODES_AT + NODE.SIZE * nodes + PATH_WRAP.SIZE * k + PATH_WRAP.BACK]
         if back > 0:
-            node, pose = (
-                at(i, PATH.NODES_AT + NODE.SIZE * number),
-                at(data, model[item - back + ITEM.RECORD] + SURFACE_WORK.POSE),
-            )
+            node = at(i, PATH.NODES_AT + NODE.SIZE * number)
+            pose = at(data, model[item - back + ITEM.RECORD] + SURFACE_WORK.POSE)
             n = at(p, node[NODE.AT])
             place_frame(
                 model,
@@ -162,12 +162,11 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
         item: offset of the item in the model.
         number: number of the wrap.
     """
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    order, count, first = (
-        at(result, PATH_WORK.ORDER),
-        int(result[PATH_WORK.COUNT]),
-        i[PATH.POINTS] + 2 * number,
-    )
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
+    order = at(result, PATH_WORK.ORDER)
+    count = int(result[PATH_WORK.COUNT])
+    first = i[PATH.POINTS] + 2 * number
     # Tangent points have the numbers behind those of the points.
     kept_count = 0
     for k in range(count):
@@ -200,15 +199,16 @@ def wrap_surface(
     """
     # The tangent points of an earlier iteration would split the segments.
     remove_tangents(model, data, item, number)
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    points, count = i[PATH.POINTS], int(result[PATH_WORK.COUNT])
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
+    points = i[PATH.POINTS]
+    count = int(result[PATH_WORK.COUNT])
     size = points + 2 * i[PATH.WRAPS]
-    nodes, order, work = (
-        at(i, PATH.NODES_AT),
-        at(result, PATH_WORK.ORDER),
-        at(result, PATH_WORK.ORDER + size),
-    )
-    wrap_ints, tangent = at(nodes, NODE.SIZE * size + PATH_WRAP.SIZE * number), points + 2 * number
+    nodes = at(i, PATH.NODES_AT)
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + size)
+    wrap_ints = at(nodes, NODE.SIZE * size + PATH_WRAP.SIZE * number)
+    tangent = points + 2 * number
     if wrap_ints[PATH_WRAP.BACK] == 0:
         return WRAPPING.NONE
     # The range of the PathWrap names a point that the path does not have.
@@ -225,20 +225,18 @@ def wrap_surface(
             wrap_ints[PATH_WRAP.FIRST] <= order[k] <= wrap_ints[PATH_WRAP.LAST]
             and order[k] < points
         ):
-            begin, end = k if begin < 0 else begin, k
+            begin = k if begin < 0 else begin
+            end = k
     if begin < 0:
         return WRAPPING.NOWHERE
     code, best_segment, least_increase = WRAPPING.NONE, -1, inf
-    first_tangent, second_tangent = (
-        at(work, NODE_WORK.SIZE * tangent),
-        at(work, NODE_WORK.SIZE * (tangent + 1)),
-    )
+    first_tangent = at(work, NODE_WORK.SIZE * tangent)
+    second_tangent = at(work, NODE_WORK.SIZE * (tangent + 1))
     for k in range(begin, end):
-        m, n = at(nodes, NODE.SIZE * int(order[k])), at(nodes, NODE.SIZE * int(order[k + 1]))
-        a, b = (
-            at(work, NODE_WORK.SIZE * int(order[k])),
-            at(work, NODE_WORK.SIZE * int(order[k + 1])),
-        )
+        m = at(nodes, NODE.SIZE * int(order[k]))
+        n = at(nodes, NODE.SIZE * int(order[k + 1]))
+        a = at(work, NODE_WORK.SIZE * int(order[k]))
+        b = at(work, NODE_WORK.SIZE * int(order[k + 1]))
         # The segment between both tangent points of another surface lies on that surface.
         if (
             m[NODE.KIND] == NODE_TYPE.TANGENT

@@ -215,18 +215,15 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
         y: state.
         item: offset of the item in the model.
     """
-    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    i = at(model, item)
+    p = at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
-    order, work = (
-        at(result, PATH_WORK.ORDER),
-        at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
-    )
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS])
     count = 0
     for number in range(i[PATH.POINTS]):
-        node, node_record = (
-            at(i, PATH.NODES_AT + NODE.SIZE * number),
-            at(work, NODE_WORK.SIZE * number),
-        )
+        node = at(i, PATH.NODES_AT + NODE.SIZE * number)
+        node_record = at(work, NODE_WORK.SIZE * number)
         n = at(p, node[NODE.AT])
         point = vector(n, NODE_NUMBERS.STATION)
         if node[NODE.KIND] != NODE_TYPE.FIXED:
@@ -238,10 +235,8 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
             else:
                 # As in OpenSim, the position uses the clamped coordinate, and its derivative the
                 # unclamped one; for a clamped node the derivative is zero outside the range.
-                clamped, t = (
-                    min(max(value, n[NODE_NUMBERS.LOW]), n[NODE_NUMBERS.HIGH]),
-                    at(n, NODE_NUMBERS.TURN),
-                )
+                clamped = min(max(value, n[NODE_NUMBERS.LOW]), n[NODE_NUMBERS.HIGH])
+                t = at(n, NODE_NUMBERS.TURN)
                 qx, dx, _ = evaluate_function(at(p, node[NODE.TABLES]), clamped)
                 qy, dy, _ = evaluate_function(at(p, node[NODE.TABLES + 1]), clamped)
                 qz, dz, _ = evaluate_function(at(p, node[NODE.TABLES + 2]), clamped)
@@ -275,15 +270,15 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
     Returns:
         The length.
     """
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    nodes, order, work = (
-        at(i, PATH.NODES_AT),
-        at(result, PATH_WORK.ORDER),
-        at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
-    )
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
+    nodes = at(i, PATH.NODES_AT)
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS])
     length = speed = 0.0
     for k in range(1, int(result[PATH_WORK.COUNT])):
-        first_node, second_node = int(order[k - 1]), int(order[k])
+        first_node = int(order[k - 1])
+        second_node = int(order[k])
         m, n = at(nodes, NODE.SIZE * first_node), at(nodes, NODE.SIZE * second_node)
         a, b = at(work, NODE_WORK.SIZE * first_node), at(work, NODE_WORK.SIZE * second_node)
         line = minus(line_end(n, b), line_end(m, a))
@@ -366,19 +361,20 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     Returns:
         `OUTCOME.OK`.
     """
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    nodes, order, work = (
-        at(i, PATH.NODES_AT),
-        at(result, PATH_WORK.ORDER),
-        at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS]),
-    )
-    tension, last_node = result[PATH_WORK.TENSION], int(result[PATH_WORK.COUNT]) - 1
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
+    nodes = at(i, PATH.NODES_AT)
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS])
+    tension = result[PATH_WORK.TENSION]
+    last_node = int(result[PATH_WORK.COUNT]) - 1
     pull = 0.0, 0.0, 0.0
     for k in range(last_node + 1):
         number = int(order[k])
         node, node_record = at(nodes, NODE.SIZE * number), at(work, NODE_WORK.SIZE * number)
         # The force at a node is the pull towards the next one less the pull of the one before.
-        back, pull = pull, (0.0, 0.0, 0.0)
+        back = pull
+        pull = (0.0, 0.0, 0.0)
         if k < last_node and nodes[NODE.SIZE * int(order[k + 1]) + NODE.BODY] != node[NODE.BODY]:
             pull = times(tension, vector(node_record, NODE_WORK.ALONG))
         force = minus(pull, back)

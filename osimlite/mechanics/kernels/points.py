@@ -186,11 +186,9 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
     if link < 0:
         return ZERO
     link_record = link_work(model, data, link)
-    v, a, g = (
-        at(link_record, LINK_WORK.VELOCITY),
-        at(link_record, LINK_WORK.ACCELERATION),
-        at(reals, REALS.GRAVITY),
-    )
+    v = at(link_record, LINK_WORK.VELOCITY)
+    a = at(link_record, LINK_WORK.ACCELERATION)
+    g = at(reals, REALS.GRAVITY)
     px, py, pz = minus(point, vector(link_record, LINK_WORK.ORIGIN))
     wx, wy, wz = v[0], v[1], v[2]
     # v holds the angular velocity, then that of the material point of the link at its origin.

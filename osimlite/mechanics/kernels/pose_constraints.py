@@ -38,7 +38,10 @@ def fulfil_constraints(m: Fit, y: Floats) -> bool:
     Returns:
         Success.
     """
-    p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
+    p = m.p
+    c = m.c
+    v = m.v
+    size = m.model[MODEL.DOFS]
     ranges, resolved = at(c, p[FIT.RANGES_AT]), at(p, p[FIT.RESOLVED_AT])
     for k in range(size):
         # Ranges first, then values that are prescribed, and those that depend on others last.
@@ -58,7 +61,8 @@ def set_dependents(m: Fit, y: Floats) -> None:
         m: the fit.
         y: state; its coordinates are changed.
     """
-    p, size = m.p, m.model[MODEL.DOFS]
+    p = m.p
+    size = m.model[MODEL.DOFS]
     for number in range(p[FIT.COUPLERS]):
         i = at(p, p[p[FIT.COUPLER_AT] + number])
         y[i[COUPLER.DEPENDENT]], _ = evaluate_coupler(
@@ -76,9 +80,14 @@ def restore_equations(m: Fit, y: Floats) -> bool:
     Returns:
         Success.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count, errors, step = count_equations(m), at(v, p[FIT.ERRORS]), at(v, p[FIT.STEP])
-    ranges, previous_error = at(m.c, p[FIT.RANGES_AT]), inf
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
+    count = count_equations(m)
+    errors = at(v, p[FIT.ERRORS])
+    step = at(v, p[FIT.STEP])
+    ranges = at(m.c, p[FIT.RANGES_AT])
+    previous_error = inf
     for _ in range(50):
         evaluate_pose(m, y)
         apply_couplers(m, y)
@@ -127,10 +136,15 @@ def compute_curvature(m: Fit, y: Floats) -> None:
         m: the fit.
         y: state of the pose.
     """
-    p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], count_equations(m)
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
+    count = count_equations(m)
     rows, slope, curves = at(v, p[FIT.ROWS]), at(v, p[FIT.SLOPE]), at(v, p[FIT.CURVES])
-    pulls, trial = at(curves, size * size), at(v, p[FIT.TRIAL])
-    free, normal = list_free_coordinates(m), at(v, p[FIT.WORKSPACE] + 2 * size)
+    pulls = at(curves, size * size)
+    trial = at(v, p[FIT.TRIAL])
+    free = list_free_coordinates(m)
+    normal = at(v, p[FIT.WORKSPACE] + 2 * size)
     for i in range(count):
         pulls[i] = 0.0
         for k in range(free):

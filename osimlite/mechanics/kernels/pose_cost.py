@@ -51,7 +51,11 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     Returns:
         Half the weighted sum of squared deviations.
     """
-    model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
+    model = m.model
+    data = m.data
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
     evaluate_pose(m, y)
     # Columns of balls belong to their speeds; derivatives are by coordinates.
     for k in range(p[FIT.BALLS]):
@@ -62,10 +66,8 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     for k in range(size * size):
         stiffness[k] = bend[k] = 0.0
     for link in range(model[MODEL.LINKS]):
-        link_sums, turned = (
-            at(link_work(model, data, link), LINK_WORK.INERTIA),
-            at(v, p[FIT.TURNED] + 9 * link),
-        )
+        link_sums = at(link_work(model, data, link), LINK_WORK.INERTIA)
+        turned = at(v, p[FIT.TURNED] + 9 * link)
         # Inertia and wrench of each link collect masses and forces of springs.
         for k in range(16):
             link_sums[k] = 0.0
@@ -75,10 +77,8 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     gather_derivatives(m, y)
     goals = 3 * p[FIT.MARKERS] + 9 * p[FIT.SENSORS]
     for k in range(p[FIT.GOALS]):
-        freedom, weight = (
-            p[p[FIT.GOAL_AT] + k],
-            v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + p[FIT.SENSORS] + k],
-        )
+        freedom = p[p[FIT.GOAL_AT] + k]
+        weight = v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + p[FIT.SENSORS] + k]
         if weight > 0.0:
             # A goal is a spring on its coordinate.
             deviation = y[freedom] - v[p[FIT.MEASURED] + goals + k]
@@ -96,7 +96,10 @@ def evaluate_pose(m: Fit, y: Floats) -> None:
         m: the fit.
         y: state; its speeds are set to 1.
     """
-    model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
+    model = m.model
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
     for k in range(size):
         # With unit speeds, curvatures of functions are second derivatives by their coordinate.
         y[size + k] = 1.0
@@ -118,11 +121,9 @@ def convert_ball_columns(m: Fit, y: Floats, angles: Ints) -> None:
     columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
-    first_column, second_column, third_column = (
-        at(columns, 6 * angles[0]),
-        at(columns, 6 * angles[1]),
-        at(columns, 6 * angles[2]),
-    )
+    first_column = at(columns, 6 * angles[0])
+    second_column = at(columns, 6 * angles[1])
+    third_column = at(columns, 6 * angles[2])
     for k in range(6):
         a, b, c = first_column[k], second_column[k], third_column[k]
         second_column[k] = c1 * b + s1 * c
@@ -150,12 +151,11 @@ def add_markers(m: Fit) -> float:
         if link < 0:
             continue
         link_record = link_work(model, data, link)
-        i, load, turned = (
-            at(link_record, LINK_WORK.INERTIA),
-            at(link_record, LINK_WORK.WRENCH),
-            at(v, p[FIT.TURNED] + 9 * link),
-        )
-        pull, arm = times(weight, deviation), minus(point, vector(link_record, LINK_WORK.ORIGIN))
+        i = at(link_record, LINK_WORK.INERTIA)
+        load = at(link_record, LINK_WORK.WRENCH)
+        turned = at(v, p[FIT.TURNED] + 9 * link)
+        pull = times(weight, deviation)
+        arm = minus(point, vector(link_record, LINK_WORK.ORIGIN))
         a, b, c = arm
         mx, my, mz = times(weight, arm)
         # Inertia of a point mass about the common origin.
@@ -186,16 +186,19 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
         m: the fit.
         y: state of the pose.
     """
-    model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
+    model = m.model
+    data = m.data
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     slope, stiffness, bend = at(v, p[FIT.SLOPE]), at(v, p[FIT.STIFFNESS]), at(v, p[FIT.BEND])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
-        j, link_record = link_ints(model, link), link_work(model, data, link)
-        i, load, turned = (
-            at(link_record, LINK_WORK.INERTIA),
-            at(link_record, LINK_WORK.WRENCH),
-            at(v, p[FIT.TURNED] + 9 * link),
-        )
+        j = link_ints(model, link)
+        link_record = link_work(model, data, link)
+        i = at(link_record, LINK_WORK.INERTIA)
+        load = at(link_record, LINK_WORK.WRENCH)
+        turned = at(v, p[FIT.TURNED] + 9 * link)
         # A subtree without measurements contributes nothing.
         if i[0] > 0.0 or i[4] > 0.0:
             for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
@@ -236,14 +239,15 @@ def apply_couplers(m: Fit, y: Floats) -> None:
         m: the fit.
         y: state of the pose.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    slope, stiffness, bend, rows = (
-        at(v, p[FIT.SLOPE]),
-        at(v, p[FIT.STIFFNESS]),
-        at(v, p[FIT.BEND]),
-        at(v, p[FIT.ROWS]),
-    )
-    gradient, rates = at(v, p[FIT.WORKSPACE]), at(v, p[FIT.WORKSPACE] + size)
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
+    slope = at(v, p[FIT.SLOPE])
+    stiffness = at(v, p[FIT.STIFFNESS])
+    bend = at(v, p[FIT.BEND])
+    rows = at(v, p[FIT.ROWS])
+    gradient = at(v, p[FIT.WORKSPACE])
+    rates = at(v, p[FIT.WORKSPACE] + size)
     for k in range(size):
         rates[k] = 1.0
     # Backwards, so that a dependent coordinate may itself be an argument of another coupler.
@@ -294,7 +298,8 @@ def evaluate_coupler(
     Returns:
         The value, and the second derivative if it depends on one coordinate.
     """
-    size, constants = i[COUPLER.COUNT], at(m.c, i[COUPLER.NUMBERS])
+    size = i[COUPLER.COUNT]
+    constants = at(m.c, i[COUPLER.NUMBERS])
     if int(constants[size]) >= FUNCTION_TYPE.MONOMIALS:
         value, _, bent = evaluate_monomials(
             size, at(i, COUPLER.ARGUMENTS), constants, y, rates, gradient

@@ -85,13 +85,16 @@ def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
         number: number of the axis.
         pull: generalized force of the springs along the axis.
     """
-    model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[FIT.BEND])
+    model = m.model
+    size = m.model[MODEL.DOFS]
+    bend = at(m.v, m.p[FIT.BEND])
     axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
     # Translations to the ellipsoid are functions of the first two angles.
     if axis[1] >= SLIDES:
-        second, axis_index = model[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
+        second = model[j[OPERATION.ARGUMENTS] + 1]
+        axis_index = axis[1] - SLIDES
         s1, c1 = sine_cosine(y[first])
         s2, c2 = sine_cosine(y[second])
         scaled_pull = pull * m.reals[j[OPERATION.EXTRA] + axis_index]
@@ -131,11 +134,11 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     Returns:
         Angular and linear part.
     """
-    model, data, axis = m.model, m.data, axis_ints(m, number)
-    j, a = (
-        operation_ints(model, axis[0]),
-        operation_work(model, data, axis[0]),
-    )
+    model = m.model
+    data = m.data
+    axis = axis_ints(m, number)
+    j = operation_ints(model, axis[0])
+    a = operation_work(model, data, axis[0])
     around, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
     if axis[1] >= SLIDES:
         axis_index = axis[1] - SLIDES
@@ -167,7 +170,8 @@ def add_axis_product(m: Fit, y: Floats, first_axis: int, second_axis: int, amoun
         second_axis: number of the second axis.
         amount: the multiple.
     """
-    size, bend = m.model[MODEL.DOFS], at(m.v, m.p[FIT.BEND])
+    size = m.model[MODEL.DOFS]
+    bend = at(m.v, m.p[FIT.BEND])
     for k in range(count_arguments(m, first_axis)):
         first, gain = axis_argument(m, y, first_axis, k)
         if first < 0:
@@ -185,7 +189,8 @@ def count_arguments(m: Fit, number: int) -> int:
         m: the fit.
         number: number of the axis.
     """
-    model, axis = m.model, axis_ints(m, number)
+    model = m.model
+    axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
         return 2
@@ -204,7 +209,8 @@ def axis_argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     Returns:
         Degree of freedom and derivative.
     """
-    model, axis = m.model, axis_ints(m, number)
+    model = m.model
+    axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
         axis_index = axis[1] - SLIDES

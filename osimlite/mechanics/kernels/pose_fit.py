@@ -103,10 +103,8 @@ def fit_frames(
     """
     m = Fit(model, reals, data, f, p, c, v)
     size, markers, sensors = model[MODEL.DOFS], p[FIT.MARKERS], p[FIT.SENSORS]
-    width, input_size = (
-        size + 3 * (markers + sensors) + 3,
-        3 * markers + 9 * sensors + p[FIT.GOALS] + p[FIT.HELD],
-    )
+    width = size + 3 * (markers + sensors) + 3
+    input_size = 3 * markers + 9 * sensors + p[FIT.GOALS] + p[FIT.HELD]
     for number in range(count):
         result = at(results, width * number)
         copy_numbers(input_size, at(frames, input_size * number), at(v, p[FIT.MEASURED]))
@@ -137,9 +135,13 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     Returns:
         Cost, number of steps, and status.
     """
-    v, p, size = m.v, m.p, m.model[MODEL.DOFS]
+    v = m.v
+    p = m.p
+    size = m.model[MODEL.DOFS]
     history = at(v, p[FIT.HISTORY])
-    previous_count, last_pose, trial = int(history[0]), at(history, 1), at(v, p[FIT.TRIAL])
+    previous_count = int(history[0])
+    last_pose = at(history, 1)
+    trial = at(v, p[FIT.TRIAL])
     has_measurements = compute_weights(m)
     if previous_count > 0:
         copy_numbers(size, last_pose, y)
@@ -150,7 +152,8 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         evaluate_pose(m, y)
         return 0.0, 0, UNSEEN
     update_measured_pattern(m, y)
-    value, is_vague = inf, v[p[FIT.PATTERN] + p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]] > 0.0
+    value = inf
+    is_vague = v[p[FIT.PATTERN] + p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]] > 0.0
     # Two previous poses allow linear extrapolation of the motion, unless poses fit alike.
     if previous_count > 1 and not is_vague:
         earlier_pose = at(last_pose, size)
@@ -168,7 +171,8 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         if not value < last_cost:
             copy_numbers(size, y, trial)
         value = last_cost if not value < last_cost else evaluate_cost(m, trial)
-    lightest, start = VAGUE if is_vague else LIGHTEST, at(history, 2 + POSES * size)
+    lightest = VAGUE if is_vague else LIGHTEST
+    start = at(history, 2 + POSES * size)
     if previous_count == 0:
         copy_numbers(size, trial, last_pose)
     copy_numbers(size, trial, start)
@@ -242,9 +246,13 @@ def update_measured_pattern(m: Fit, y: Floats) -> None:
         m: the fit.
         y: state of a pose.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
     count = p[FIT.MARKERS] + p[FIT.SENSORS] + p[FIT.GOALS]
-    weights, pattern, is_new = at(v, p[FIT.WEIGHTS]), at(v, p[FIT.PATTERN]), False
+    weights = at(v, p[FIT.WEIGHTS])
+    pattern = at(v, p[FIT.PATTERN])
+    is_new = False
     for k in range(count):
         is_new = is_new or weights[k] != pattern[k]
         pattern[k] = weights[k]
@@ -288,7 +296,8 @@ def descend_from_start(
         Cost, number of steps, and status of the better pose.
     """
     size = m.model[MODEL.DOFS]
-    best, trial = at(start, size), at(m.v, m.p[FIT.TRIAL])
+    best = at(start, size)
+    trial = at(m.v, m.p[FIT.TRIAL])
     copy_numbers(size, y, best)
     copy_numbers(size, start, trial)
     release_range_ends(m)
@@ -351,7 +360,8 @@ def compute_weights(m: Fit) -> bool:
     # OpenSim normalizes the weights of markers and sensors, each over those that are measured.
     has_measurements = normalize_weights(markers, weights)
     has_measurements = normalize_weights(sensors, at(weights, markers)) or has_measurements
-    numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
+    numbers = at(numbers, SENSOR_NUMBERS * sensors)
+    goals = at(measured, 3 * markers + 9 * sensors)
     for k in range(p[FIT.GOALS]):
         weights[markers + sensors + k] = numbers[k] if is_finite(1, at(goals, k)) else 0.0
         has_measurements = has_measurements or weights[markers + sensors + k] > 0.0
@@ -392,9 +402,13 @@ def descend_to_minimum(
     Returns:
         Cost, number of steps, and status.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
     step = at(v, p[FIT.STEP])
-    previous_length, bends, status = inf, damping == LIGHTEST, STUCK
+    previous_length = inf
+    bends = damping == LIGHTEST
+    status = STUCK
     copy_numbers(size, start, y)
     steps = 0
     clear_curvature(m)
@@ -438,11 +452,9 @@ def descend_to_minimum(
                 # No better pose can be distinguished from this one.
                 status = FITTED
                 break
-            damping, bends, previous_length = (
-                max(10.0 * damping, FIRST_DAMPING),
-                steps >= PATIENCE,
-                inf,
-            )
+            damping = max(10.0 * damping, FIRST_DAMPING)
+            bends = steps >= PATIENCE
+            previous_length = inf
             if damping > HEAVIEST:
                 break
             evaluate_cost(m, y)

@@ -50,7 +50,8 @@ def add_sensors(m: Fit) -> float:
     """
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[FIT.SENSORS]):
-        weight, link = v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + k], p[p[FIT.SENSOR_AT] + k]
+        weight = v[p[FIT.WEIGHTS] + p[FIT.MARKERS] + k]
+        link = p[p[FIT.SENSOR_AT] + k]
         if not weight > 0.0:
             continue
         deviation = sensor_rotation(m, k)
@@ -59,11 +60,9 @@ def add_sensors(m: Fit) -> float:
         if link < 0:
             continue
         link_record = link_work(model, data, link)
-        i, load, turned = (
-            at(link_record, LINK_WORK.INERTIA),
-            at(link_record, LINK_WORK.WRENCH),
-            at(v, p[FIT.TURNED] + 9 * link),
-        )
+        i = at(link_record, LINK_WORK.INERTIA)
+        load = at(link_record, LINK_WORK.WRENCH)
+        turned = at(v, p[FIT.TURNED] + 9 * link)
         # Symmetric part of the derivative of the spring's torque: weight (1 + c [phi]^2).
         x, y, z = times(weight * squared_factor(sqrt(square)), deviation)
         a, b, c = deviation
@@ -131,7 +130,8 @@ def rotation_between(model: Ints, data: Floats, link: int, rows: Floats, target:
         axis = target[k], target[3 + k], target[6 + k]
         twist = plus(twist, cross(axis, is_axis))
         diagonal = plus(diagonal, multiply_elementwise(axis, is_axis))
-    cosine, sine = 0.5 * (dot(diagonal, (1.0, 1.0, 1.0)) - 1.0), 0.5 * sqrt(dot(twist, twist))
+    cosine = 0.5 * (dot(diagonal, (1.0, 1.0, 1.0)) - 1.0)
+    sine = 0.5 * sqrt(dot(twist, twist))
     if cosine < NEARLY_BACK:
         return rotation_near_half_turn(model, data, link, rows, target, twist, diagonal)
     if not sine > 1e-12:
@@ -171,7 +171,8 @@ def rotation_near_half_turn(
         row = add_scaled(
             add_scaled(row, component(is_axis, axis), measured), component(measured, axis), is_axis
         )
-    cosine, sine = 0.5 * (x + y + z - 1.0), 0.5 * sqrt(dot(twist, twist))
+    cosine = 0.5 * (x + y + z - 1.0)
+    sine = 0.5 * sqrt(dot(twist, twist))
     row = minus(times(0.5, row), replace_component(ZERO, axis, cosine))
     length = sqrt(dot(row, row))
     angle = pi - sine_angle(sine)

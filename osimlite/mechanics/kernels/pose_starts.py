@@ -58,7 +58,9 @@ def start_turned_subtree(
     Returns:
         Whether the degree of freedom is such a coordinate.
     """
-    model, p, ranges = m.model, m.p, at(m.c, m.p[FIT.RANGES_AT])
+    model = m.model
+    p = m.p
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
     start_away_from_ends(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
@@ -70,10 +72,8 @@ def start_turned_subtree(
         return False
     # The axis of the turn depends on the pose, unless it is the first of its joint.
     evaluate_pose(m, from_pose)
-    down, turn = (
-        vector(m.reals, REALS.GRAVITY),
-        vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom),
-    )
+    down = vector(m.reals, REALS.GRAVITY)
+    turn = vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom)
     # The axis is within 45 degrees of the vertical.
     return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
 
@@ -102,10 +102,8 @@ def is_angle(m: Fit, freedom: int) -> bool:
     """
     # The first half of the column is the angular velocity of the bodies per unit speed; it is 0 for
     # a translation.
-    turn, mark = (
-        vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom),
-        m.p[m.p[FIT.RESOLVED_AT] + freedom],
-    )
+    turn = vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom)
+    mark = m.p[m.p[FIT.RESOLVED_AT] + freedom]
     return dot(turn, turn) > 0.0 and mark in (FREEDOM.VARIABLE, FREEDOM.AT_END)
 
 
@@ -118,7 +116,8 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
         freedom: degree of freedom.
     """
     ranges = at(m.c, m.p[FIT.RANGES_AT])
-    low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
+    low = ranges[2 * freedom]
+    high = ranges[2 * freedom + 1]
     # A coordinate whose range is a single value is at both ends, and has no other start.
     return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
 
@@ -141,7 +140,8 @@ def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
         Whether the degree of freedom is such an angle.
     """
     ranges = at(m.c, m.p[FIT.RANGES_AT])
-    low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
+    low = ranges[2 * freedom]
+    high = ranges[2 * freedom + 1]
     if not is_at_end(m, y, freedom) or not (
         high - low > pi + SAME or joint_to_ground(m, freedom) >= 0
     ):
@@ -169,12 +169,14 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     Returns:
         Whether the degree of freedom is at an end of its range and such angles exist.
     """
-    link, other_angles = joint_to_ground(m, freedom), 0
+    link = joint_to_ground(m, freedom)
+    other_angles = 0
     if link < 0 or not is_at_end(m, y, freedom):
         return False
     copy_numbers(m.model[MODEL.DOFS], y, start)
     evaluate_pose(m, y)
-    j, ranges = link_ints(m.model, link), at(m.c, m.p[FIT.RANGES_AT])
+    j = link_ints(m.model, link)
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
     for k in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
         if k != freedom and is_angle(m, k):
             other_angles += 1
@@ -196,7 +198,8 @@ def start_inside_ranges(m: Fit, y: Floats, start: Floats) -> bool:
     Returns:
         Whether there are any.
     """
-    ranges, result = at(m.c, m.p[FIT.RANGES_AT]), False
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
+    result = False
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
         # The descent marks coordinates that it stopped at an end of their range.
@@ -219,12 +222,10 @@ def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: fl
     Returns:
         Whether a full turn was removed.
     """
-    size, ranges, trial, result = (
-        m.model[MODEL.DOFS],
-        at(m.c, m.p[FIT.RANGES_AT]),
-        at(m.v, m.p[FIT.TRIAL]),
-        False,
-    )
+    size = m.model[MODEL.DOFS]
+    ranges = at(m.c, m.p[FIT.RANGES_AT])
+    trial = at(m.v, m.p[FIT.TRIAL])
+    result = False
     copy_numbers(size, y, start)
     for k in range(size):
         # Rounding to the nearest integer by floor is the same in all languages of the kernels.

@@ -53,13 +53,13 @@ def gather_free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Flo
     Returns:
         Workspace of their factor, which begins with the left sides; right sides; workspace after them.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count, rows, errors, step = (
-        count_equations(m),
-        at(v, p[FIT.ROWS]),
-        at(v, p[FIT.ERRORS]),
-        at(v, p[FIT.STEP]),
-    )
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
+    count = count_equations(m)
+    rows = at(v, p[FIT.ROWS])
+    errors = at(v, p[FIT.ERRORS])
+    step = at(v, p[FIT.STEP])
     factor = at(v, p[FIT.WORKSPACE] + 2 * size)
     right = at(factor, count * size + count * count + 3 * count + 1)
     for k in range(count):
@@ -89,7 +89,8 @@ def find_active_range_ends(m: Fit, y: Floats) -> None:
             p[p[FIT.RESOLVED_AT] + k] == FREEDOM.VARIABLE
             or p[p[FIT.RESOLVED_AT] + k] == FREEDOM.AT_END
         ):
-            low, high = ranges[2 * k], ranges[2 * k + 1]
+            low = ranges[2 * k]
+            high = ranges[2 * k + 1]
             is_at_end_of_range = (
                 (y[k] <= low and slope[k] > 0.0) or (y[k] >= high and slope[k] < 0.0) or low == high
             )
@@ -116,7 +117,9 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     Returns:
         Whether the model is convex.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
     step, ranges = at(v, p[FIT.STEP]), at(m.c, p[FIT.RANGES_AT])
     for k in range(size):
         step[k] = 0.0
@@ -162,26 +165,25 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
     Returns:
         The offset of the step in the workspace, or -1 if the model is not convex.
     """
-    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    stiffness, bend, slope, step = (
-        at(v, p[FIT.STIFFNESS]),
-        at(v, p[FIT.BEND]),
-        at(v, p[FIT.SLOPE]),
-        at(v, p[FIT.STEP]),
-    )
+    p = m.p
+    v = m.v
+    size = m.model[MODEL.DOFS]
+    stiffness = at(v, p[FIT.STIFFNESS])
+    bend = at(v, p[FIT.BEND])
+    slope = at(v, p[FIT.SLOPE])
+    step = at(v, p[FIT.STEP])
     count = count_equations(m)
     offset = (
         p[FIT.WORKSPACE] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
     )
-    solution, matrix = at(v, offset), at(v, offset + size)
+    solution = at(v, offset)
+    matrix = at(v, offset + size)
     for k in range(free):
         freedom = p[p[FIT.FREE_AT] + k]
         # Steps that are known already move to the right side.
-        row, bend_row, total = (
-            at(stiffness, size * freedom),
-            at(bend, size * freedom),
-            -slope[freedom],
-        )
+        row = at(stiffness, size * freedom)
+        bend_row = at(bend, size * freedom)
+        total = -slope[freedom]
         constraint_row = at(v, p[FIT.CURVES] + (size * freedom if count > 0 else 0))
         for j in range(size):
             if p[p[FIT.RESOLVED_AT] + j] == FREEDOM.AT_END:
@@ -215,8 +217,11 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     Returns:
         The offset of the step in the workspace, or -1 if the model is not convex.
     """
-    v, size, count = m.v, m.model[MODEL.DOFS], count_equations(m)
-    solution, matrix = at(v, offset), at(v, offset + size)
+    v = m.v
+    size = m.model[MODEL.DOFS]
+    count = count_equations(m)
+    solution = at(v, offset)
+    matrix = at(v, offset + size)
     across = at(matrix, size * size)
     directions = at(across, size)
     reduced = at(directions, size * size)
@@ -245,7 +250,8 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
             for j in range(free):
                 product[i] += matrix[free * i + j] * row[j]
         for column in range(k + 1):
-            total, second = 0.0, at(directions, free * column)
+            total = 0.0
+            second = at(directions, free * column)
             for i in range(free):
                 total += second[i] * product[i]
             reduced[dimension * k + column] = reduced[dimension * column + k] = total

@@ -40,14 +40,12 @@ def evaluate_states(
     Returns:
         `OUTCOME.OK`, or the outcome of the evaluation that failed.
     """
-    size, work_size, count, moving, law, selected = (
-        model[MODEL.STATE_SIZE],
-        model[MODEL.WORK_SIZE],
-        order[0],
-        order[1],
-        order[2],
-        order[3],
-    )
+    size = model[MODEL.STATE_SIZE]
+    work_size = model[MODEL.WORK_SIZE]
+    count = order[0]
+    moving = order[1]
+    law = order[2]
+    selected = order[3]
     for number in range(count):
         input = at(states, (1 + size + moving) * number)
         data[WORK.TIME] = input[0]
@@ -96,12 +94,10 @@ def push_each_actuator(
     Returns:
         `OUTCOME.OK`, or the outcome of the evaluation that failed.
     """
-    size, freedoms, count, actuators = (
-        model[MODEL.STATE_SIZE],
-        model[MODEL.DOFS],
-        order[0],
-        order[1],
-    )
+    size = model[MODEL.STATE_SIZE]
+    freedoms = model[MODEL.DOFS]
+    count = order[0]
+    actuators = order[1]
     applied = at(f, freedoms)
     for number in range(count):
         input = at(states, (1 + size + freedoms) * number)
@@ -179,7 +175,8 @@ def evaluate_items(
     """
     # The list has three parts: indices of results, indices to clear, and items.
     size, selected, cleared = model[MODEL.STATE_SIZE], order[0], order[1]
-    offsets, clears = at(order, 2), at(order, 2 + selected)
+    offsets = at(order, 2)
+    clears = at(order, 2 + selected)
     path_indices = at(order, 2 + selected + cleared)
     outcome = OUTCOME.OK
     for number in range(count):
@@ -189,9 +186,11 @@ def evaluate_items(
         for k in range(cleared):
             data[clears[k]] = 0.0
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
-        first, end = path_indices[number], path_indices[number] + 1
+        first = path_indices[number]
+        end = path_indices[number] + 1
         if first < 0:
-            first, end = 0, model[MODEL.ITEMS]
+            first = 0
+            end = model[MODEL.ITEMS]
         for k in range(first, end):
             if status == OUTCOME.OK:
                 item = model[model[MODEL.ITEM_AT] + k]

@@ -43,11 +43,9 @@ def run_program(
     # The operations are tested in the order of STEPS.
     value = 0.0
     for k in range(count):
-        operation, first_register, second_register = (
-            steps[3 * k],
-            steps[3 * k + 1],
-            steps[3 * k + 2],
-        )
+        operation = steps[3 * k]
+        first_register = steps[3 * k + 1]
+        second_register = steps[3 * k + 2]
         if operation == 0:
             value = constants[first_register]
         else:

@@ -43,8 +43,10 @@ def project(
     Returns:
         `OUTCOME.OK` if the constraints hold afterwards, else FAR or the outcome of an evaluation.
     """
-    size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
-    tolerance, limit = data[WORK.SCRATCH], data[WORK.SCRATCH + 1]
+    size = model[MODEL.DOFS]
+    h = at(model, model[MODEL.CONSTRAINED])
+    tolerance = data[WORK.SCRATCH]
+    limit = data[WORK.SCRATCH + 1]
     # Work on a copy: a state that cannot be projected stays as it was.
     trial = at(data, h[CONSTRAINED.WORK_TRIAL])
     for k in range(2 * size):
@@ -114,18 +116,15 @@ def project_values(
     Returns:
         `OUTCOME.OK` or FAR.
     """
-    size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
-    count, jacobian, factor = (
-        h[CONSTRAINED.POSITIONS],
-        at(data, h[CONSTRAINED.WORK_KEPT]),
-        at(data, h[CONSTRAINED.WORK_FACTOR]),
-    )
+    size = model[MODEL.DOFS]
+    h = at(model, model[MODEL.CONSTRAINED])
+    count = h[CONSTRAINED.POSITIONS]
+    jacobian = at(data, h[CONSTRAINED.WORK_KEPT])
+    factor = at(data, h[CONSTRAINED.WORK_FACTOR])
     errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
-    work, step, trial_state = (
-        at(errors, count),
-        at(errors, 2 * count),
-        at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
-    )
+    work = at(errors, count)
+    step = at(errors, 2 * count)
+    trial_state = at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size)
     # Simbody leaves states alone that fulfil the constraints within the tolerance.
     norm = collect_position_errors(model, data, errors)
     if norm <= tolerance:
@@ -188,18 +187,16 @@ def project_speeds(
     Returns:
         `OUTCOME.OK` or FAR.
     """
-    size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
-    count, rows, factor = (
-        h[CONSTRAINED.EQUATIONS],
-        at(data, h[CONSTRAINED.WORK_ROWS]),
-        at(data, h[CONSTRAINED.WORK_FACTOR]),
-    )
-    errors, scales, u = (
-        at(data, h[CONSTRAINED.WORK_SYSTEM]),
-        at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
-        at(y, size),
-    )
-    work, step = at(errors, count), at(errors, 2 * count)
+    size = model[MODEL.DOFS]
+    h = at(model, model[MODEL.CONSTRAINED])
+    count = h[CONSTRAINED.EQUATIONS]
+    rows = at(data, h[CONSTRAINED.WORK_ROWS])
+    factor = at(data, h[CONSTRAINED.WORK_FACTOR])
+    errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
+    scales = at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size)
+    u = at(y, size)
+    work = at(errors, count)
+    step = at(errors, 2 * count)
     norm = compute_speed_errors(model, data, u, errors)
     if norm <= tolerance:
         return OUTCOME.OK
@@ -270,7 +267,9 @@ def collect_position_errors(model: Ints, data: Floats, errors: Floats) -> float:
     Returns:
         Their root mean square; locks count as equations without error, as in Simbody.
     """
-    h, count, total = at(model, model[MODEL.CONSTRAINED]), 0, 0.0
+    h = at(model, model[MODEL.CONSTRAINED])
+    count = 0
+    total = 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
         for row in range(
@@ -294,7 +293,9 @@ def compute_speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -
     Returns:
         Their root mean square; locks count as equations without error, as in Simbody.
     """
-    h, size, total = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0.0
+    h = at(model, model[MODEL.CONSTRAINED])
+    size = model[MODEL.DOFS]
+    total = 0.0
     rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for i in range(h[CONSTRAINED.EQUATIONS]):
         error = -rates[i]
@@ -314,11 +315,14 @@ def write_position_jacobian(model: Ints, data: Floats, y: Floats, rows: Floats) 
         y: state.
         rows: filled (p, n).
     """
-    h, size, count = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0
+    h = at(model, model[MODEL.CONSTRAINED])
+    size = model[MODEL.DOFS]
+    count = 0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
         for i in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
-            row, speed_row = at(rows, size * count), at(data, h[CONSTRAINED.WORK_ROWS] + size * i)
+            row = at(rows, size * count)
+            speed_row = at(data, h[CONSTRAINED.WORK_ROWS] + size * i)
             for k in range(size):
                 row[k] = speed_row[k]
             count += 1

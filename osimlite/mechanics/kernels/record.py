@@ -192,10 +192,8 @@ def note_peaks(m: Motion, t: float) -> None:
         t: time (s).
     """
     for pair in range(m.model[MODEL.CONTACTS]):
-        c, peak = (
-            at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
-            at(m.peaks, 2 * pair),
-        )
+        c = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
+        peak = at(m.peaks, 2 * pair)
         size = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
         if size > peak[0]:
             peak[0], peak[1] = size, t
@@ -279,12 +277,10 @@ def note_events(
     """
     counts, events = m.counts, m.events
     size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
-    stop, first, total, event = (
-        inf,
-        counts[COUNTS.EVENTS],
-        pairs + m.sizes[RUN_SIZES.WATCHES],
-        m.sizes[RUN_SIZES.EVENT],
-    )
+    stop = inf
+    first = counts[COUNTS.EVENTS]
+    total = pairs + m.sizes[RUN_SIZES.WATCHES]
+    event = m.sizes[RUN_SIZES.EVENT]
     # WORK_STATE has room for STATES states, and `integrate_run` uses the first four.
     ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(next_levels, total)
@@ -341,7 +337,9 @@ def insert_event(m: Motion, first: int, t: float, number: int, rises: bool) -> i
     Returns:
         Index of the row, which does not exist if the records are full; the event is counted then.
     """
-    row, events, length = int(m.counts[COUNTS.EVENTS]), m.events, m.sizes[RUN_SIZES.EVENT]
+    row = int(m.counts[COUNTS.EVENTS])
+    events = m.events
+    length = m.sizes[RUN_SIZES.EVENT]
     m.counts[COUNTS.EVENTS] += 1
     if row >= m.sizes[RUN_SIZES.MOST_EVENTS]:
         return row

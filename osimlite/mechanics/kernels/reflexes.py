@@ -183,7 +183,8 @@ def interpolate_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay
         delay: delay (control steps).
     """
     # Before the start a delayed sensor has its first value.
-    delay_frames, latest = min(delay, frames - 1.0), frames - 1
+    delay_frames = min(delay, frames - 1.0)
+    latest = frames - 1
     full_frames = floor(delay_frames + NEAR)
     fraction = min(max(delay_frames - full_frames, 0.0), 1.0)
     frame = int(latest - full_frames)
@@ -209,16 +210,12 @@ def update_leg_states(
         legs: states of the legs (2,); changed.
     """
     # Loads are the first two sensors, and are delayed like all others.
-    first_load, second_load = (
-        interpolate_sensor(i, frames, history, 0, p[0]),
-        interpolate_sensor(i, frames, history, 1, p[0]),
-    )
+    first_load = interpolate_sensor(i, frames, history, 0, p[0])
+    second_load = interpolate_sensor(i, frames, history, 1, p[0])
     first_lead, second_lead = foot_lead(senses, row, 0), foot_lead(senses, row, 1)
-    first_limits, second_limits, is_direct = (
-        at(p, 1),
-        at(p, 1 + LIMITS.OF_LEG),
-        i[REFLEXES.SWINGS_FROM_STANCE] > 0,
-    )
+    first_limits = at(p, 1)
+    second_limits = at(p, 1 + LIMITS.OF_LEG)
+    is_direct = i[REFLEXES.SWINGS_FROM_STANCE] > 0
     states = int(legs[0]), int(legs[1])
     legs[0] = next_leg_state(
         states[0],
@@ -260,8 +257,10 @@ def next_leg_state(
         other_foot_offset: how far the foot of the other leg is ahead (m).
         is_direct: whether it may go from stance to swing directly.
     """
-    stands, swings = load > limits[LIMITS.STANDS], load <= limits[LIMITS.SWINGS]
-    late, lands = foot_offset < limits[LIMITS.LATE], foot_offset > limits[LIMITS.LANDS]
+    stands = load > limits[LIMITS.STANDS]
+    swings = load <= limits[LIMITS.SWINGS]
+    late = foot_offset < limits[LIMITS.LATE]
+    lands = foot_offset > limits[LIMITS.LANDS]
     # Liftoff begins as soon as the other leg stands with its foot ahead.
     follows = other_stands and foot_offset < other_foot_offset
     # The first control step decides by the load alone.
@@ -306,8 +305,10 @@ def add_reflexes(
         legs: states of the legs (2,).
         result: controls; changed.
     """
-    terms, count = at(i, REFLEXES.HEAD), i[REFLEXES.TERMS]
-    gates, numbers = at(terms, TERM.SIZE * count), at(p, LIMITS.HEAD)
+    terms = at(i, REFLEXES.HEAD)
+    count = i[REFLEXES.TERMS]
+    gates = at(terms, TERM.SIZE * count)
+    numbers = at(p, LIMITS.HEAD)
     for k in range(count):
         term, term_numbers = at(terms, TERM.SIZE * k), at(numbers, OF_EACH * k)
         # The states in which a term is active are bits of an integer.
@@ -394,7 +395,9 @@ def philox(a: int, b: int, c: int, d: int, first_key: int, second_key: int) -> t
     """
     for _ in range(10):
         first_product, second_product = 0xD2511F53 * a, 0xCD9E8D57 * c
-        a, b = ((second_product >> 32) & WORD) ^ b ^ first_key, second_product & WORD
-        c, d = ((first_product >> 32) & WORD) ^ d ^ second_key, first_product & WORD
+        a = ((second_product >> 32) & WORD) ^ b ^ first_key
+        b = second_product & WORD
+        c = ((first_product >> 32) & WORD) ^ d ^ second_key
+        d = first_product & WORD
         first_key, second_key = (first_key + 0x9E3779B9) & WORD, (second_key + 0xBB67AE85) & WORD
     return a, b

@@ -119,8 +119,10 @@ def rosenbrock(
     """
     size = model[MODEL.STATE_SIZE]
     h = at(data, offset)
-    stages, work = at(h, HEAD), at(h, HEAD + STATES * size)
-    errors, f1 = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
+    stages = at(h, HEAD)
+    work = at(h, HEAD + STATES * size)
+    errors = at(data, model[MODEL.WORK_STATE] + ERRORS * size)
+    f1 = at(y1, size)
     t0, accuracy, step = h[METHOD_WORK.REACHED], h[METHOD_WORK.ACCEPTED], h[METHOD_WORK.NEXT_STEP]
     h[METHOD_WORK.EVALUATED], h[METHOD_WORK.HAS_DERIVATIVE] = 2.0, 0.0
     # A step that almost reaches the limit is stretched or cut to it.
@@ -128,7 +130,8 @@ def rosenbrock(
     # A step that was cut much shorter is no basis for the size of the next one.
     cut = t1 - t0 < 0.95 * step
     step = t1 - t0
-    c, error = DIAGONAL * step, inf
+    c = DIAGONAL * step
+    error = inf
     # After a rejection the derivatives at the start are still valid.
     if h[ROSENBROCK_WORK.IS_NEW] == 0.0:
         data[WORK.TIME] = t0
@@ -194,9 +197,11 @@ def compute_stages(
     Returns:
         Whether all evaluations succeeded.
     """
-    size, f = model[MODEL.STATE_SIZE], at(y, model[MODEL.STATE_SIZE])
+    size = model[MODEL.STATE_SIZE]
+    f = at(y, model[MODEL.STATE_SIZE])
     for i in range(STAGES):
-        stage, rates = at(stages, size * i), f if TIMES[i] > 0.0 else at(y0, size)
+        stage = at(stages, size * i)
+        rates = f if TIMES[i] > 0.0 else at(y0, size)
         # Stages at the start use the derivative that is known there.
         if TIMES[i] > 0.0:
             for k in range(size):

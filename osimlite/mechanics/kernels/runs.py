@@ -103,7 +103,9 @@ def select_run(runs: Motion, number_count: int, k: int) -> Motion:
         number_count: length of a row of `reals`, 0 if all runs share one.
         k: number of the run.
     """
-    size, pairs, sizes = runs.model[MODEL.STATE_SIZE], runs.model[MODEL.CONTACTS], runs.sizes
+    size = runs.model[MODEL.STATE_SIZE]
+    pairs = runs.model[MODEL.CONTACTS]
+    sizes = runs.sizes
     return Motion(
         runs.model,
         at(runs.reals, number_count * k),
@@ -136,7 +138,10 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     model, counts, clock, sizes = m.model, m.counts, m.clock, m.sizes
     size = model[MODEL.STATE_SIZE]
     work, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[RUN_SIZES.METHOD_AT])
-    y0, f0, y1, f1 = work, at(work, size), at(work, 2 * size), at(work, 3 * size)
+    y0 = work
+    f0 = at(work, size)
+    y1 = at(work, 2 * size)
+    f1 = at(work, 3 * size)
     previous_levels = at(work, STATES * size)
     next_levels = at(previous_levels, model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES])
     # The caller says whether the initial state fulfils the constraints; else project it.
@@ -206,10 +211,8 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
             counts[COUNTS.REPORTED] < sizes[RUN_SIZES.TIMES]
             and m.times[counts[COUNTS.REPORTED]] <= end
         ):
-            t, report = (
-                m.times[counts[COUNTS.REPORTED]],
-                at(m.reports, size * counts[COUNTS.REPORTED]),
-            )
+            t = m.times[counts[COUNTS.REPORTED]]
+            report = at(m.reports, size * counts[COUNTS.REPORTED])
             # A report at the end of a step is the state itself, not an interpolated one.
             if t == t1:
                 copy_numbers(size, y1, report)

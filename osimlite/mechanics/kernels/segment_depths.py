@@ -120,10 +120,8 @@ def way_out(radii: Vector, middle: Vector, chord: Vector, deeper: float) -> Vect
     ma, mb = dot(middle, a), dot(middle, b)
     # Sample the depth all around, and refine each minimum by the parabola through three samples.
     best = second = (inf, 0.0)
-    previous_depth, this_depth = (
-        line_depth(aa, ab, bb, ma, mb, -2),
-        line_depth(aa, ab, bb, ma, mb, -1),
-    )
+    previous_depth = line_depth(aa, ab, bb, ma, mb, -2)
+    this_depth = line_depth(aa, ab, bb, ma, mb, -1)
     for k in range(WAYS):
         next_depth = line_depth(aa, ab, bb, ma, mb, k)
         if this_depth < previous_depth and this_depth <= next_depth:
@@ -183,11 +181,13 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
     for k in range(SAMPLES + 1):
         distance = distance_from_ring(add_scaled(first, k / SAMPLES, chord), ring)
         if distance < least:
-            best, least = k / SAMPLES, distance
+            best = k / SAMPLES
+            least = distance
     for _ in range(STEPS):
         x, y, z = add_scaled(first, best, chord)
         square = max(x * x + y * y, LEAST)
-        outer, flat = sqrt(square), x * wx + y * wy
+        outer = sqrt(square)
+        flat = x * wx + y * wy
         slope = flat * (1.0 - ring / outer) + z * wz
         bends = (
             (wx * wx + wy * wy) * (1.0 - ring / outer)

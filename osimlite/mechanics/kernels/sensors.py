@@ -165,12 +165,15 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         row[i[SENSES.ACTIVE] + k] = data[offsets[4]]
     copy_numbers(2 * freedoms, y, at(row, i[SENSES.VALUES]))
     # A coordinate without a limit force has none.
-    limits, moments = at(muscle_ints, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
+    limits = at(muscle_ints, OF_MUSCLE * muscles)
+    moments = at(row, i[SENSES.MOMENTS])
     for k in range(freedoms):
         moments[k] = 0.0
     for k in range(i[SENSES.LIMITS]):
         moments[limits[2 * k]] = data[limits[2 * k + 1]]
-    links, total, rise = at(limits, 2 * i[SENSES.LIMITS]), ZERO, 0.0
+    links = at(limits, 2 * i[SENSES.LIMITS])
+    total = ZERO
+    rise = 0.0
     centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
     for k in range(bodies):
         position = station(model, data, links[k], vector(centres, 3 * k))
@@ -181,7 +184,8 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
     store_vector(row, i[SENSES.CENTRE], divide(total, p[SENSOR_NUMBERS.MASS]))
     row[i[SENSES.RISE]] = rise / p[SENSOR_NUMBERS.MASS]
     for k in range(i[SENSES.LEGS]):
-        leg, push = at(links, bodies + OF_LEG * k), ZERO
+        leg = at(links, bodies + OF_LEG * k)
+        push = ZERO
         # All contacts of a foot together carry its leg.
         for pair in range(leg[2], leg[3]):
             push = plus(push, contact_force(model, data, pair))

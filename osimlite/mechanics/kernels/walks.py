@@ -238,7 +238,8 @@ def walk_several(
     Returns:
         The worst outcome of the evaluations of FEEL, BEGIN and START of `ORDER`.
     """
-    size, status = model[MODEL.STATE_SIZE], OUTCOME.OK
+    size = model[MODEL.STATE_SIZE]
+    status = OUTCOME.OK
     for k in range(first, stop):
         m = select_motion(model, reals, data, sizes, clocks, counts, peaks, senses, k)
         walk = Walk(
@@ -313,7 +314,9 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
         steps: largest number of control steps.
         is_recorded: whether each step is recorded.
     """
-    m, progress, lags = a.m, a.progress, a.known[SENSOR_NUMBERS.LAGS] > 0.0
+    m = a.m
+    progress = a.progress
+    lags = a.known[SENSOR_NUMBERS.LAGS] > 0.0
     size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
     # Evaluate the end of the step before with its excitations, which a lagging step begins with.
     if lags:
@@ -376,11 +379,9 @@ def criteria_work(a: Walk) -> Floats:
 
 def update_excitations(a: Walk) -> None:
     """Advance the states of the legs, and compute the excitations by reflexes, within their bounds."""
-    history, frames, count = (
-        at(a.memory, LEGS),
-        a.progress[PROGRESS.FRAMES],
-        a.senses[SENSES.CONTROLS],
-    )
+    history = at(a.memory, LEGS)
+    frames = a.progress[PROGRESS.FRAMES]
+    count = a.senses[SENSES.CONTROLS]
     if a.plan[REFLEXES.HAS_STATES] > 0:
         update_leg_states(a.senses, a.plan, a.numbers, frames, a.row, history, a.memory)
     for k in range(count):
@@ -524,7 +525,8 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
     """
     m, progress = a.m, a.progress
     h = at(m.data, m.sizes[RUN_SIZES.METHOD_AT])
-    end, ending = h[METHOD_WORK.LAST_TIME], ENDING.DONE
+    end = h[METHOD_WORK.LAST_TIME]
+    ending = ENDING.DONE
     while ending == ENDING.DONE:
         if m.clock[0] >= progress[PROGRESS.STEPS] * a.known[
             SENSOR_NUMBERS.STEP
@@ -556,7 +558,9 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     Returns:
         Whether the evaluation succeeded.
     """
-    m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
+    m = a.m
+    progress = a.progress
+    sensors = a.plan[REFLEXES.SENSORS]
     # The motion has a kink here: the method must forget its history.
     at(m.data, m.sizes[RUN_SIZES.METHOD_AT])[METHOD_WORK.MEMORY] = 0.0
     apply_excitations(a)

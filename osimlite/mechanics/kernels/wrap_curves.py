@@ -61,10 +61,12 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     Returns:
         Number of corners.
     """
-    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
+    i = at(model, item)
+    result = at(data, model[item + ITEM.RECORD])
     points, wraps = i[PATH.POINTS], i[PATH.WRAPS]
     size = points + 2 * wraps
-    order, work = at(result, PATH_WORK.ORDER), at(result, PATH_WORK.ORDER + size)
+    order = at(result, PATH_WORK.ORDER)
+    work = at(result, PATH_WORK.ORDER + size)
     wrap_ints = at(i, PATH.NODES_AT + NODE.SIZE * size)
     count = 0
     for k in range(int(result[PATH_WORK.COUNT])):
@@ -114,11 +116,9 @@ def trace_cylinder(
         Number of points.
     """
     e = at(data, model[item + ITEM.RECORD])
-    start_point, end_point, turn = (
-        vector(e, TANGENTS.FIRST),
-        vector(e, TANGENTS.SECOND),
-        e[TANGENTS.SHAPE],
-    )
+    start_point = vector(e, TANGENTS.FIRST)
+    end_point = vector(e, TANGENTS.SECOND)
+    turn = e[TANGENTS.SHAPE]
     count = count_segments(turn)
     for k in range(1, count):
         store_vector(
@@ -146,11 +146,10 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         Number of points.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    ring, outwards = p[WRAP_SURFACE.SIZES + 1], (e[TANGENTS.SHAPE + 1], e[TANGENTS.SHAPE + 2], 0.0)
-    start_point, end_point = (
-        point_in_cylinder(vector(e, TANGENTS.FIRST), outwards, ring),
-        point_in_cylinder(vector(e, TANGENTS.SECOND), outwards, ring),
-    )
+    ring = p[WRAP_SURFACE.SIZES + 1]
+    outwards = (e[TANGENTS.SHAPE + 1], e[TANGENTS.SHAPE + 2], 0.0)
+    start_point = point_in_cylinder(vector(e, TANGENTS.FIRST), outwards, ring)
+    end_point = point_in_cylinder(vector(e, TANGENTS.SECOND), outwards, ring)
     count = count_segments(e[TANGENTS.SHAPE])
     for k in range(1, count):
         point = point_from_cylinder(
@@ -190,7 +189,8 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         Number of points.
     """
     e = at(data, model[item + ITEM.RECORD])
-    start_point, turn = vector(e, TANGENTS.FIRST), e[TANGENTS.SHAPE]
+    start_point = vector(e, TANGENTS.FIRST)
+    turn = e[TANGENTS.SHAPE]
     across = cross(unit(cross(start_point, vector(e, TANGENTS.SECOND))), start_point)
     count = count_segments(turn)
     for k in range(1, count):
@@ -225,10 +225,8 @@ def trace_ellipsoid(
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, WRAP_SURFACE.SIZES)
     factor = 3.0 / (a + b + c)
-    start_point, end_point = (
-        times(factor, vector(e, TANGENTS.FIRST)),
-        times(factor, vector(e, TANGENTS.SECOND)),
-    )
+    start_point = times(factor, vector(e, TANGENTS.FIRST))
+    end_point = times(factor, vector(e, TANGENTS.SECOND))
     centre, start_direction, across, turn = polar_coordinates(
         start_point, end_point, vector(e, TANGENTS.SHAPE), e[TANGENTS.SHAPE + 3]
     )

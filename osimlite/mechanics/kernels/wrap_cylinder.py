@@ -150,21 +150,18 @@ def bend_around_cylinder(
     # points.
     apex = apex_between(first, second, radius, on_far_side)
     normal = unit(cross(minus(first, apex), minus(second, apex)))
-    z1, z2 = (
-        edge_height(first_tangent, pz, first, normal),
-        edge_height(second_tangent, qz, first, normal),
-    )
+    z1 = edge_height(first_tangent, pz, first, normal)
+    z2 = edge_height(second_tangent, qz, first, normal)
     if abs(qz) < EPSILON:
         # OpenSim uses the foot of the second end as a direction, which is undefined at the origin:
         # all heights then count as that of the first end.
-        z1, z2 = pz, z2 if pz != qz else qz
+        z1 = pz
+        z2 = z2 if pz != qz else qz
     else:
         # A height that is further from the other end than the own end is replaced by that of the
         # own end.
-        z1, z2 = (
-            z1 if abs(z1 - qz) < abs(pz - qz) else pz,
-            z2 if abs(z2 - pz) < abs(qz - pz) else qz,
-        )
+        z1 = z1 if abs(z1 - qz) < abs(pz - qz) else pz
+        z2 = z2 if abs(z2 - pz) < abs(qz - pz) else qz
     # Both tangent points beyond the ends of the cylinder: the path misses it.
     if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
         return WRAPPING.NONE
@@ -337,7 +334,8 @@ def smooth_heights(
         count = int(length)
         # Seen along the axis nothing changes while the number of segments stays the same.
         if count != pieces:
-            pieces, fraction = count, 1.0 / count
+            pieces = count
+            fraction = 1.0 / count
             c, s = cos(fraction * turn), sin(fraction * turn)
             leg1 = edge_constants(first, first_tangent, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
             leg2 = edge_constants(second, second_tangent, (c * x2 + s * y2, c * y2 - s * x2, 0.0))

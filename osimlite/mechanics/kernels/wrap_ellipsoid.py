@@ -86,21 +86,19 @@ def wrap_ellipsoid(
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, WRAP_SURFACE.SIZES)
     # OpenSim scales the surface to a mean radius of 1, so that its tolerances are relative.
-    factor, axis, side = 3.0 / (a + b + c), int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]
+    factor = 3.0 / (a + b + c)
+    axis = int(p[WRAP_SURFACE.AXIS])
+    side = p[WRAP_SURFACE.SIDE]
     radii = times(factor, (a, b, c))
-    first, second = (
-        times(factor, vector(e, WRAP_WORK.FIRST_END)),
-        times(factor, vector(e, WRAP_WORK.SECOND_END)),
-    )
+    first = times(factor, vector(e, WRAP_WORK.FIRST_END))
+    second = times(factor, vector(e, WRAP_WORK.SECOND_END))
     first_height, second_height = ellipsoid_height(radii, first), ellipsoid_height(radii, second)
     if first_height < -CLOSE or second_height < -CLOSE:
         return WRAPPING.INSIDE
     chord = minus(first, second)
     enters, leaves = find_crossings(radii, second, chord)
-    first_tangent, second_tangent = (
-        add_scaled(second, enters, chord),
-        add_scaled(second, leaves, chord),
-    )
+    first_tangent = add_scaled(second, enters, chord)
+    second_tangent = add_scaled(second, leaves, chord)
     # Ends in the same direction have no plane; a chord outside of the segment does not cross.
     if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
         return WRAPPING.NONE
@@ -197,12 +195,12 @@ def find_crossings(radii: Vector, point: Vector, ray: Vector) -> tuple[float, fl
     Returns:
         Two multiples; NaN if the line misses the surface.
     """
-    ray, point = (
-        multiply_elementwise(invert_components(radii), ray),
-        multiply_elementwise(invert_components(radii), point),
-    )
+    ray = multiply_elementwise(invert_components(radii), ray)
+    point = multiply_elementwise(invert_components(radii), point)
     # Scaled by the half axes, the surface is a unit sphere and the equation is quadratic.
-    a, b, c = dot(ray, ray), 2.0 * dot(ray, point), dot(point, point) - 1.0
+    a = dot(ray, ray)
+    b = 2.0 * dot(ray, point)
+    c = dot(point, point) - 1.0
     square = b * b - 4.0 * a * c
     if not (square >= 0.0 and a > 0.0):
         return nan, nan
@@ -280,7 +278,9 @@ def tangent_point(
     """
     weights = invert_components(multiply_elementwise(radii, radii))
     by_end = times(2.0, multiply_elementwise(weights, end))
-    r, step, d_step = start, (0.0, 0.0, 0.0), 0.0
+    r = start
+    step = (0.0, 0.0, 0.0)
+    d_step = 0.0
     # Start with the tangent plane through r itself, where the third residual vanishes.
     d = -2.0 * dot(multiply_elementwise(weights, r), r)
     e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
@@ -299,10 +299,13 @@ def tangent_point(
             if not error >= previous_error:
                 break
             step, d_step = solve_damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
-            step, d_step = times(size, step), size * d_step
-            r, d = plus(r, step), d + d_step
+            step = times(size, step)
+            d_step = size * d_step
+            r = plus(r, step)
+            d = d + d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
-            previous_error, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+            previous_error = error
+            error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
             damping *= 4.0
         damping /= 8.0
         # Then repeat the step at double length as long as that helps, and take the last one back.
@@ -311,10 +314,13 @@ def tangent_point(
             if not error <= previous_error:
                 break
             longer *= 2.0
-            r, d = add_scaled(r, longer, step), d + longer * d_step
+            r = add_scaled(r, longer, step)
+            d = d + longer * d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
-            previous_error, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
-        r, d = add_scaled(r, -longer, step), d - longer * d_step
+            previous_error = error
+            error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+        r = add_scaled(r, -longer, step)
+        d = d - longer * d_step
         e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
         previous_error = error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     return r
@@ -415,21 +421,30 @@ def measure_polyline(
     # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the
     # plane at m (c, s).
     scale = invert_components(radii)
-    u, v, w = (
-        multiply_elementwise(scale, a),
-        multiply_elementwise(scale, b),
-        multiply_elementwise(scale, centre),
-    )
-    uu, uv, vv, uw, vw, ww = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), dot(w, w) - 1.0
+    u = multiply_elementwise(scale, a)
+    v = multiply_elementwise(scale, b)
+    w = multiply_elementwise(scale, centre)
+    uu = dot(u, u)
+    uv = dot(u, v)
+    vv = dot(v, v)
+    uw = dot(u, w)
+    vw = dot(v, w)
+    ww = dot(w, w) - 1.0
     piece = (angle - 2.0 * pi if is_long else angle) / pieces
     c_piece, s_piece = cos(piece), sin(piece)
-    c, s, m, x, y, length = 1.0, 0.0, 0.0, norm(to_first), 0.0, 0.0
+    c = 1.0
+    s = 0.0
+    m = 0.0
+    x = norm(to_first)
+    y = 0.0
+    length = 0.0
     after_first = first_tangent
     for k in range(1, pieces):
         c, s = c * c_piece - s * s_piece, s * c_piece + c * s_piece
         # Intersection of the ray with the surface: a quadratic equation for m, where `inner` is its
         # discriminant.
-        square, half = (uu * c + 2.0 * uv * s) * c + vv * s * s, uw * c + vw * s
+        square = (uu * c + 2.0 * uv * s) * c + vv * s * s
+        half = uw * c + vw * s
         inner = half * half - square * ww
         # A ray from outside may miss the surface; OpenSim's points are then undefined.
         m = (sqrt(inner) - half) / square if inner >= 0.0 else nan

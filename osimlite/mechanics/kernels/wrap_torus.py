@@ -64,22 +64,18 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         NONE or WRAPPED of `WRAPPING`.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    first, second, ring = (
-        vector(e, WRAP_WORK.FIRST_END),
-        vector(e, WRAP_WORK.SECOND_END),
-        p[WRAP_SURFACE.SIZES + 1],
-    )
+    first = vector(e, WRAP_WORK.FIRST_END)
+    second = vector(e, WRAP_WORK.SECOND_END)
+    ring = p[WRAP_SURFACE.SIZES + 1]
     # The search stops early, so that its result depends on the end from which it starts; OpenSim
     # tries both.
-    first_near_ring, second_near_ring = (
-        near_ring(first, second, ring),
-        near_ring(second, first, ring),
-    )
+    first_near_ring = near_ring(first, second, ring)
+    second_near_ring = near_ring(second, first, ring)
     closer = distance_from_ring(first_near_ring, ring) < distance_from_ring(second_near_ring, ring)
     if p[WRAP_SURFACE.SIDE] != 0.0:
-        first_active, second_active = (
-            is_on_side(first_near_ring, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
-            is_on_side(second_near_ring, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]),
+        first_active = is_on_side(first_near_ring, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE])
+        second_active = is_on_side(
+            second_near_ring, int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]
         )
         if not (first_active or second_active):
             return WRAPPING.NONE
@@ -117,7 +113,8 @@ def point_in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
         outwards: unit vector from the middle to the nearest part of the ring.
         ring: radius of the ring (m).
     """
-    away, inwards = add_scaled(point, -ring, outwards), times(-1.0, outwards)
+    away = add_scaled(point, -ring, outwards)
+    inwards = times(-1.0, outwards)
     return dot(inwards, away), dot(DOWN, away), dot(cross(inwards, DOWN), away)
 
 
@@ -161,12 +158,10 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
         return nan, nan, nan
     x, y, _ = first
     dx, dy, _ = line_direction = dx / distance, dy / distance, dz / distance
-    start, flat_start, flat, square = (
-        dot(first, line_direction),
-        x * dx + y * dy,
-        dx * dx + dy * dy,
-        x * x + y * y,
-    )
+    start = dot(first, line_direction)
+    flat_start = x * dx + y * dy
+    flat = dx * dx + dy * dy
+    square = x * x + y * y
     return add_scaled(
         first, minimize_residual(start, flat_start, flat, square, ring), line_direction
     )
@@ -206,12 +201,10 @@ def minimize_residual(
         ring: radius of the ring (m).
     """
     u = damping = scale = 0.0
-    value, radius, has_moved, evaluations = (
-        compute_residual(u, start, flat_start, flat, square, ring),
-        FIRST_RADIUS,
-        False,
-        1,
-    )
+    value = compute_residual(u, start, flat_start, flat, square, ring)
+    radius = FIRST_RADIUS
+    has_moved = False
+    evaluations = 1
     while True:
         slope = (compute_residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
         if not abs(slope * value) > 0.0:
@@ -229,7 +222,8 @@ def minimize_residual(
             # A residual that grows tenfold does not count as a decrease, as in lmdif.
             falls = 0.1 * abs(next_value) < abs(value)
             actual = 1.0 - (next_value / value) ** 2 if falls else -1.0
-            linear, damped = (slope * step / value) ** 2, damping * (size / value) ** 2
+            linear = (slope * step / value) ** 2
+            damped = damping * (size / value) ** 2
             predicted = linear + 2.0 * damped
             ratio = actual / predicted if predicted != 0.0 else 0.0
             # Shrink the trust region if the prediction was poor, and enlarge it if it was good.
@@ -240,12 +234,15 @@ def minimize_residual(
                     else 0.5 * (linear + damped) / (linear + damped - 0.5 * actual)
                 )
                 radius_factor = radius_factor if falls and radius_factor >= 0.1 else 0.1
-                radius, damping = radius_factor * min(radius, 10.0 * size), damping / radius_factor
+                radius = radius_factor * min(radius, 10.0 * size)
+                damping = damping / radius_factor
             elif damping == 0.0 or ratio >= 0.75:
                 radius, damping = 2.0 * size, 0.5 * damping
             accepted = ratio >= WORTHWHILE
             if accepted:
-                u, value, has_moved = u + step, next_value, True
+                u = u + step
+                value = next_value
+                has_moved = True
             small = abs(actual) <= TOLERANCE and predicted <= TOLERANCE and ratio <= 2.0
             if small or radius <= TOLERANCE * scale * abs(u) or evaluations >= EVALUATIONS:
                 return u

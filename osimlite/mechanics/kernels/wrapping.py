@@ -148,7 +148,8 @@ def find_tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, V
     distance = norm(point)
     # The tangent point is at the height r^2 / d above the centre, seen towards the point.
     sine = radius / distance
-    foot, across = times(sine * sine, point), cross(axis, point)
+    foot = times(sine * sine, point)
+    across = cross(axis, point)
     reach = radius * sqrt(1.0 - sine * sine) / distance
     return add_scaled(foot, reach, across), add_scaled(foot, -reach, across)
 
@@ -213,11 +214,9 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         INSIDE, NONE, WRAPPED or MANDATORY of `WRAPPING`.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
-    first, second, radius = (
-        vector(e, WRAP_WORK.FIRST_END),
-        vector(e, WRAP_WORK.SECOND_END),
-        p[WRAP_SURFACE.SIZES],
-    )
+    first = vector(e, WRAP_WORK.FIRST_END)
+    second = vector(e, WRAP_WORK.SECOND_END)
+    radius = p[WRAP_SURFACE.SIZES]
     if norm(first) < radius or norm(second) < radius:
         return WRAPPING.INSIDE
     if not crosses_sphere(first, second, radius):
@@ -233,7 +232,8 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     first_tangent, second_tangent = nearest_pair(a1, b1, a2, b2)
     code, is_long = WRAPPING.WRAPPED, False
     if p[WRAP_SURFACE.SIDE] != 0.0:
-        axis, side = int(p[WRAP_SURFACE.AXIS]), p[WRAP_SURFACE.SIDE]
+        axis = int(p[WRAP_SURFACE.AXIS])
+        side = p[WRAP_SURFACE.SIDE]
         active = is_on_side(first, axis, side), is_on_side(second, axis, side)
         distance_along_chord = dot(first, chord_direction)
         # OpenSim compares an absolute distance with 1 m here, see above.
@@ -267,7 +267,9 @@ def crosses_sphere(first: Vector, second: Vector, radius: float) -> bool:
         radius: radius of the sphere.
     """
     chord = minus(first, second)
-    a, b, c = dot(chord, chord), 2.0 * dot(second, chord), dot(second, second) - radius * radius
+    a = dot(chord, chord)
+    b = 2.0 * dot(second, chord)
+    c = dot(second, second) - radius * radius
     discriminant = b * b - 4.0 * a * c
     if not (discriminant >= 0.0 and a > 0.0):
         return False
@@ -302,10 +304,8 @@ def pair_on_side(
         The points of the first and second end, and whether the arc between them is the longer one.
     """
     to_centre = plus(first, second)
-    a1_nearer, a2_nearer = (
-        dot(a1, to_centre) < dot(b1, to_centre),
-        dot(a2, to_centre) < dot(b2, to_centre),
-    )
+    a1_nearer = dot(a1, to_centre) < dot(b1, to_centre)
+    a2_nearer = dot(a2, to_centre) < dot(b2, to_centre)
     first_tangent, second_tangent = a1 if a1_nearer else b1, a2 if a2_nearer else b2
     outwards = plus(minus(first_tangent, first), minus(second_tangent, second))
     # If the nearer tangent points lead away from the active side, take the other ones.

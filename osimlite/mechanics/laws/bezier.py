@@ -148,15 +148,16 @@ def _list_starts(x: Sequence[float], width: float) -> list[float]:
     for node in range(NODES + 1):
         # u rises with x, so the root lies between the last node's u and 1; the line through the
         # last node is a good first guess.
-        low, high, u = u, 1.0, min(u + step, 1.0)
+        low = u
+        high = 1.0
+        u = min(u + step, 1.0)
         for _ in range(ROUNDS):
             # Newton's method, or bisection where it would leave the interval.
-            residual, slope = (
-                _evaluate_without_constant(x, u) - width * node / NODES,
-                _evaluate_derivative(x, u),
-            )
+            residual = _evaluate_without_constant(x, u) - width * node / NODES
+            slope = _evaluate_derivative(x, u)
             low, high = (u, high) if residual < 0.0 else (low, u)
-            previous_u, u = u, u - residual / slope if slope > 0.0 else -1.0
+            previous_u = u
+            u = u - residual / slope if slope > 0.0 else -1.0
             if not low <= u <= high:
                 u = 0.5 * (low + high)
             # Newton's method converges quadratically; 1e-11 is far below what the search needs.
@@ -209,7 +210,8 @@ def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:
     Returns:
         Offset of the section, distance of x from its start, and the start value of u.
     """
-    count, number = int(c[SECTIONS]), 0
+    count = int(c[SECTIONS])
+    number = 0
     while number < count - 1 and x >= c[HEAD + number]:
         number += 1
     k = HEAD + count + SECTION * number
@@ -218,7 +220,10 @@ def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:
     node = min(int(fraction), NODES - 1)
     fraction -= node
     s = k + STARTS + 2 * node
-    u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
+    u0 = c[s]
+    d0 = c[s + 1]
+    u1 = c[s + 2]
+    d1 = c[s + 3]
     # Cubic Hermite interpolation of u between two nodes: most searches then need one step.
     u = u0 + fraction * (
         d0 + fraction * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + fraction * (2.0 * (u0 - u1) + d0 + d1))
@@ -266,7 +271,11 @@ def take_halley_step(
     Returns:
         u, and whether more steps are necessary.
     """
-    a, b, d, e, f = c[p], c[p + stride], c[p + 2 * stride], c[p + 3 * stride], c[p + 4 * stride]
+    a = c[p]
+    b = c[p + stride]
+    d = c[p + 2 * stride]
+    e = c[p + 3 * stride]
+    f = c[p + 4 * stride]
     # Two halves of the polynomial, which a processor evaluates in parallel.
     v = u * u
     residual = u * ((a + u * b) + v * ((d + u * e) + v * f)) - remainder
@@ -293,16 +302,19 @@ def evaluate_section(c: Sequence[float], p: int, stride: int, u: float) -> tuple
     Returns:
         y and slope.
     """
-    a, b, d, e, f = c[p], c[p + stride], c[p + 2 * stride], c[p + 3 * stride], c[p + 4 * stride]
-    v, q = u * u, p + 5 * stride
-    g, h, i, j, k, m = (
-        c[q],
-        c[q + stride],
-        c[q + 2 * stride],
-        c[q + 3 * stride],
-        c[q + 4 * stride],
-        c[q + 5 * stride],
-    )
+    a = c[p]
+    b = c[p + stride]
+    d = c[p + 2 * stride]
+    e = c[p + 3 * stride]
+    f = c[p + 4 * stride]
+    v = u * u
+    q = p + 5 * stride
+    g = c[q]
+    h = c[q + stride]
+    i = c[q + 2 * stride]
+    j = c[q + 3 * stride]
+    k = c[q + 4 * stride]
+    m = c[q + 5 * stride]
     # The slope dy/dx is (dy/du) / (dx/du); `run` and `rise` are these derivatives.
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
     rise = (h + u * (2.0 * i)) + v * ((3.0 * j + u * (4.0 * k)) + v * (5.0 * m))
@@ -319,7 +331,11 @@ def search_residual(c: Sequence[float], p: int, stride: int, u: float, remainder
         u: parameter of the section.
         remainder: requested distance of x from the start of the section.
     """
-    a, b, d, e, f = c[p], c[p + stride], c[p + 2 * stride], c[p + 3 * stride], c[p + 4 * stride]
+    a = c[p]
+    b = c[p + stride]
+    d = c[p + 2 * stride]
+    e = c[p + 3 * stride]
+    f = c[p + 4 * stride]
     v = u * u
     return u * ((a + u * b) + v * ((d + u * e) + v * f)) - remainder
 
@@ -389,7 +405,9 @@ def extrapolate_sum(c: Sequence[float], of_y: float, of_x: float, total: float, 
         total: value of the sum.
         end: FIRST or LAST, from `end_beyond_sum`.
     """
-    x, y, slope = c[end], c[end + 1], c[end + 2]
+    x = c[end]
+    y = c[end + 1]
+    slope = c[end + 2]
     return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
 
 
@@ -407,7 +425,8 @@ def find_section_of_sum(
     Returns:
         Offset of the section, difference of the sum from its value at the start, and u.
     """
-    count, number = int(c[SECTIONS]), 0
+    count = int(c[SECTIONS])
+    number = 0
     k = HEAD + count
     start = of_y * c[k + Y] + of_x * c[k + START]
     end = of_y * c[LAST + 1] + of_x * c[LAST]
@@ -419,7 +438,9 @@ def find_section_of_sum(
         if not total >= knot:
             end = knot
             break
-        k, start, number = following, knot, number + 1
+        k = following
+        start = knot
+        number = number + 1
     return k, total - start, (total - start) / (end - start)
 
 
@@ -432,7 +453,8 @@ def curve_integral(c: Sequence[float], x: float) -> float:
         c: numbers of the curve.
         x: upper limit.
     """
-    total, excess = 0.0, x - c[FIRST]
+    total = 0.0
+    excess = x - c[FIRST]
     # Before the first end the curve is a line through it, so the integral is that of a trapezoid.
     if excess <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * excess) * excess

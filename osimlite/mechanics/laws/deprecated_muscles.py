@@ -226,7 +226,8 @@ def thelen_velocity(
         eccentric_limit: Flen.
     """
     # Without activation the isometric force would be 0 and the curve degenerate.
-    isometric, small_force = max(activation, 1e-6) * active, 1e-6
+    isometric = max(activation, 1e-6) * active
+    small_force = 1e-6
     if velocity_force < isometric:
         if velocity_force >= 0.0:
             return thelen_shortening(velocity_force, isometric, damping, shape)
@@ -301,7 +302,8 @@ def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
     cos = cos_pennation_of_fibers(length, m.height)
     tendon = path_length - length * cos
     if not tendon >= m.slack:
-        length_along, tendon = path_length - m.slack, m.slack
+        length_along = path_length - m.slack
+        tendon = m.slack
         cos = max(length_along / sqrt(length_along * length_along + m.height * m.height), UPRIGHT)
         length = max(length_along / cos, m.height)
     return Guess(length, cos, tendon / m.slack - 1.0)

@@ -107,7 +107,9 @@ def spring_load(
     d = norm(stretch)
     if d == 0.0:
         return ZERO, ZERO, 0.0
-    energy, n, arm = 0.5 * k * d * d, divide(stretch, d), minus(end, about)
+    energy = 0.5 * k * d * d
+    n = divide(stretch, d)
+    arm = minus(end, about)
     # Velocity of the material of the other surface at the nearest point, relative to the mesh.
     point_velocity = plus(v, cross(turning, arm))
     vn = dot(point_velocity, n)

@@ -117,7 +117,9 @@ def ellipsoid_ellipsoid(
         if fu * fu + fv * fv <= 1e-26 * (s1 + s2) * (s1 + s2) or tries >= 100:
             break
         # Second derivatives on the unit sphere: n turns, so h itself is subtracted on the diagonal.
-        huu, huv, hvv = huu1 + huu2 - h, huv1 + huv2, hvv1 + hvv2 - h
+        huu = huu1 + huu2 - h
+        huv = huv1 + huv2
+        hvv = hvv1 + hvv2 - h
         if huu <= 0.0 or huu * hvv - huv * huv <= 0.0:
             # At deep overlap the Hessian is indefinite; without its negative part it is positive.
             huu += h

@@ -73,10 +73,8 @@ def umberger2010(
     activation *= m.muscle_effort_scaling_factor
     excitation *= m.muscle_effort_scaling_factor
     active_force *= m.muscle_effort_scaling_factor
-    length, velocity = (
-        fiber_length / m.optimal_fiber_length,
-        fiber_velocity / m.optimal_fiber_length,
-    )
+    length = fiber_length / m.optimal_fiber_length
+    velocity = fiber_velocity / m.optimal_fiber_length
     # Umberger et al. 2003: the effort follows the excitation while it exceeds the
     # activation, else their mean.
     effort = excitation if excitation > activation else (excitation + activation) / 2.0
@@ -98,10 +96,8 @@ def umberger2010(
     if forbids or m.shortening_rate_on:
         # Heat coefficients of shortening (Umberger et al. 2003); the largest velocity
         # of slow fibers is 1 / 2.5 of that of fast ones.
-        of_fast, of_slow = (
-            153.0 / m.max_contraction_velocity,
-            100.0 / (m.max_contraction_velocity / 2.5),
-        )
+        of_fast = 153.0 / m.max_contraction_velocity
+        of_slow = 100.0 / (m.max_contraction_velocity / 2.5)
         if velocity <= 0.0:
             # The heat of slow fibers is limited to 100 W/kg, as in OpenSim.
             heat = min(-of_slow * velocity, 100.0) * slow - of_fast * velocity * (1.0 - slow)

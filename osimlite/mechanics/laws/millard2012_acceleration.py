@@ -111,7 +111,8 @@ def evaluate_dynamics(
     tan = sin / cos
     # Rates of the pennation angle phi, as l sin(phi) is constant: phi' = -(v / l) tan(phi) and
     # dphi/dl = -tan(phi) / l.
-    turning, turn = -velocity / fiber * tan, -tan / fiber
+    turning = -velocity / fiber * tan
+    turn = -tan / fiber
     # Fiber velocity along the tendon, and derivatives by the fiber length at the same fiber
     # velocity.
     velocity_along = velocity * cos - fiber * sin * turning
@@ -128,10 +129,8 @@ def evaluate_dynamics(
     pull, pull_slope = curve_value(curves.tendon, tendon / m.slack)
     # The factor of damping is not negative, so that a tendon never pushes.
     damped = max(1.0 + m.tendon_damping * rate / m.slack, 0.0)
-    tension, tendon_stiffness = (
-        m.strength * pull * damped,
-        m.strength * pull_slope / m.slack * damped,
-    )
+    tension = m.strength * pull * damped
+    tendon_stiffness = m.strength * pull_slope / m.slack * damped
     stretch, stretch_slope = curve_value(curves.passive, fiber / m.optimal)
     short, short_slope = curve_value(curves.short, fiber / m.optimal)
     stretched = max(1.0 + m.passive_damping * velocity / m.optimal, 0.0)
@@ -203,7 +202,8 @@ def millard2012_acceleration(
     fiber_length, velocity = inputs.fiber_length, inputs.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
     # With constant height the rate of the length along the tendon is v / cos(phi).
-    tendon, rate = inputs.length - fiber_length * cos, inputs.rate - velocity / cos
+    tendon = inputs.length - fiber_length * cos
+    rate = inputs.rate - velocity / cos
     dynamics = evaluate_dynamics(m, inputs.activation, fiber_length, velocity, tendon, rate, curves)
     pull = inputs.activation * dynamics.by_length * dynamics.by_velocity * m.strength
     change = first_order_activation_rate(
@@ -268,7 +268,9 @@ def millard2012_acceleration_equilibrium(
     length, rate = inputs.length, inputs.rate
     # OpenSim starts with a tendon strained by 1 % and at rest. Its tolerance is that of a force,
     # but bounds the acceleration.
-    tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
+    tolerance = max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
+    tendon = 1.01 * m.slack
+    tendon_rate = 0.0
     fiber = fiber_length_along(length - tendon, m.height, m.shortest, m.least_cos)
     for _ in range(ROUNDS):
         if not fiber > m.height:
@@ -289,7 +291,8 @@ def millard2012_acceleration_equilibrium(
         )
         # A slack tendon takes the complete rate; a taut one its part by the stiffness of the
         # fibers.
-        total_stiffness, tendon_rate = dynamics.stiffness + dynamics.tendon_stiffness, rate
+        total_stiffness = dynamics.stiffness + dynamics.tendon_stiffness
+        tendon_rate = rate
         if tendon > m.slack and abs(total_stiffness) > SIGNIFICANT:
             if dynamics.tendon_stiffness == 0.0:
                 break

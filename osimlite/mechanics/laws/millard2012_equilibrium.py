@@ -189,7 +189,8 @@ def evaluate_length_curves(
     Returns:
         Fibers, with the values of the curves over length and what determines the velocity.
     """
-    fibers, tendon = fibers_at(inputs, m), 0.0
+    fibers = fibers_at(inputs, m)
+    tendon = 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
     elastic, _ = curve_value(curves.passive, fibers.by_length)
     if not m.is_rigid:
@@ -230,13 +231,16 @@ def fibers_at(inputs: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     fiber = max(fiber, m.smallest)
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     along_tendon = inputs.length - fiber * cos
-    velocity_source, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
+    velocity_source = DAMPED if m.damping > 0.0 else INVERSE
+    velocity = 0.0
+    tendon = 0.0
     if m.is_rigid:
         velocity_source = SLACK
         # A rigid tendon is slack where the path is too short for it; SIGNIFICANT allows for
         # rounding.
         if along_tendon >= m.slack - SIGNIFICANT:
-            velocity_source, velocity = RIGID, inputs.rate * cos / (m.optimal * m.fastest)
+            velocity_source = RIGID
+            velocity = inputs.rate * cos / (m.optimal * m.fastest)
     else:
         tendon = along_tendon / m.slack
     # Perpendicular fibers cannot balance a tendon.
@@ -465,7 +469,8 @@ def find_damped_velocity(
     Returns:
         Whether there is one, the velocity, and the factor of the active force there.
     """
-    isometric, velocity_force = active * by_length, tendon / cos - elastic
+    isometric = active * by_length
+    velocity_force = tendon / cos - elastic
     factor, residual = solve_sum(curves.velocity, isometric, m.damping, velocity_force)
     is_found, velocity = check_damped_velocity(m, isometric, velocity_force, factor, residual)
     return is_found, velocity, factor
@@ -530,10 +535,8 @@ def millard2012_equilibrium_length(
     Returns:
         Whether there is one, and the fiber length (m).
     """
-    length, active = (
-        inputs.length,
-        min(max(inputs.excitation if m.is_excited else inputs.activation, m.least), 1.0),
-    )
+    length = inputs.length
+    active = min(max(inputs.excitation if m.is_excited else inputs.activation, m.least), 1.0)
     # OpenSim's tolerance, and its start with a tendon strained by 1 %.
     tolerance = max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
     fiber = max(
@@ -543,14 +546,18 @@ def millard2012_equilibrium_length(
     for _ in range(LENGTH_ROUNDS):
         if not abs(error) > tolerance:
             break
-        previous_error, previous_fiber, fraction, direction = error, fiber, 1.0, error / slope
+        previous_error = error
+        previous_fiber = fiber
+        fraction = 1.0
+        direction = error / slope
         # Halve the step until the residual decreases.
         while abs(error) >= abs(previous_error):
             step = -fraction * direction
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
                 # Try the opposite direction.
-                step, fraction = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
+                step = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0
+                fraction = 0.0
             fiber = max(previous_fiber + step, m.smallest)
             error, slope = force_imbalance(m, length, fiber, active, curves)
             if fraction <= SMALLEST:

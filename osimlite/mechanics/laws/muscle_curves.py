@@ -225,7 +225,8 @@ def tendon_force_length(
     end = (toe - 1.0) / stiffness + 1.0 + one
     # OpenSim's control points of the toe: a foot at a tenth of the toe, and the line to half of its
     # force.
-    foot, middle = 1.0 + (end - 1.0) / 10.0, (0.5 * toe - 1.0) / stiffness + 1.0 + one
+    foot = 1.0 + (end - 1.0) / 10.0
+    middle = (0.5 * toe - 1.0) / stiffness + 1.0 + one
     slope = 0.5 * toe / (middle - foot)
     control = foot + 0.5 * (middle - foot)
     return make_curve(

@@ -111,13 +111,15 @@ def smooth_contact_derivatives(
         all 0 where there is no force.
     """
     R, E, cf, bd, c, us, ud, uv, vt, bv = constants
-    hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
+    hertz = smooth_hertz(d, R, E, cf, bd)
+    vn = dot(v, n)
     # Deep in a gap tanh underflows to -1 and the force is exactly 0.
     if hertz <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     # The derivative of (1 + tanh(b x)) / 2 is that expression times b (1 - tanh(b x)).
     growth = 1.5 * d / (d * d + cf) + bd * (1.0 - tanh(bd * d))
-    damping_factor, slope = 1.0 + 1.5 * c * vn, 1.5 * c
+    damping_factor = 1.0 + 1.5 * c * vn
+    slope = 1.5 * c
     if c != 0.0:
         t = tanh(bv * (vn + 2.0 / (3.0 * c)))
         slope = (0.5 + 0.5 * t) * (slope + damping_factor * bv * (1.0 - t))

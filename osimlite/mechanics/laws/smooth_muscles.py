@@ -77,7 +77,8 @@ def smooth_activation_rate(
     """
     # Unlike Thelen's rate this one is smooth at e = a, which collocation needs.
     lacking = excitation - activation
-    z, f = 0.5 + 1.5 * activation, 0.5 * tanh(sharpness * lacking)
+    z = 0.5 + 1.5 * activation
+    f = 0.5 * tanh(sharpness * lacking)
     return ((0.5 + f) / (rising * z) + (0.5 - f) * z / falling) * lacking
 
 
@@ -131,7 +132,8 @@ def degroote_passive(length: float, strain: float) -> tuple[float, float]:
     """
     # Without this offset the force of short fibers would stay positive.
     none = exp(PASSIVE_SHAPE * (SHORTEST - 1.0) / strain)
-    rise, full = exp(PASSIVE_SHAPE * (length - 1.0) / strain) - none, exp(PASSIVE_SHAPE) - none
+    rise = exp(PASSIVE_SHAPE * (length - 1.0) / strain) - none
+    full = exp(PASSIVE_SHAPE) - none
     return rise / full, (strain / PASSIVE_SHAPE * rise - none * (length - SHORTEST)) / full
 
 
@@ -207,7 +209,8 @@ def degroote(
         else (0.0, 0.0)
     )
     energy *= m.strength * m.optimal
-    fastest, force_rate = m.fastest * m.optimal, 0.0
+    fastest = m.fastest * m.optimal
+    force_rate = 0.0
     if tendon.elastic and tendon.explicit:
         # Equilibrium along the tendon gives the factor; the inverse force-velocity curve gives the
         # velocity.

@@ -229,10 +229,12 @@ def fiber_velocity(
     bounded_force = 0.0 if force <= 0.0 else min(force, m.bound * (isometric * m.most))
     speed = 0.25 + 0.75 * activation
     if bounded_force <= isometric:
-        divisor, change = isometric + bounded_force / m.shape, 1.0 / m.shape
+        divisor = isometric + bounded_force / m.shape
+        change = 1.0 / m.shape
     else:
         steepness = (2.0 + 2.0 / m.shape) / (m.most - 1.0)
-        divisor, change = steepness * (isometric * m.most - bounded_force), -steepness
+        divisor = steepness * (isometric * m.most - bounded_force)
+        change = -steepness
     velocity = speed * (bounded_force - isometric) / divisor
     slope = (speed - velocity * change) / divisor
     return velocity + slope * (force - bounded_force), slope
@@ -294,7 +296,8 @@ def thelen2003(
     active = min(max(inputs.activation, m.least), 1.0)
     fibers = fibers_at(m, inputs.length, max(inputs.fiber_length, m.shortest))
     # What the tendon bears and the passive force does not is the active force.
-    isometric, active_force = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
+    isometric = active * fibers.active
+    active_force = fibers.tendon / fibers.cos - fibers.passive
     velocity, _ = fiber_velocity(m, active_force, active, isometric)
     by_velocity = active_force / isometric
     # OpenSim holds fibers at their smallest length and sets their active force to 0 there.
@@ -369,7 +372,8 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
     Returns:
         Whether there is one, and the fiber length (m).
     """
-    length, active = inputs.length, min(max(inputs.activation, m.least), 1.0)
+    length = inputs.length
+    active = min(max(inputs.activation, m.least), 1.0)
     # OpenSim starts with a tendon strained by 1 %.
     fibers = fibers_at(
         m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos)
@@ -387,7 +391,8 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
             step = -fraction * previous_error / (stiffness - of_tendon)
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
-                step, fraction = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
+                step = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0
+                fraction = 0.0
             fibers = fibers_at(m, length, max(previous_length + step, m.shortest))
             fiber_force, error = fiber_balance(m, fibers, active * by_velocity)
             if fraction <= SMALLEST:
@@ -462,7 +467,8 @@ def find_velocity_factor(
     if rate == 0.0:
         return 1.0
     # The products with cosines and the limit are those of OpenSim's initMuscleState.
-    fiber_stiffness, of_tendon = stiffness * fibers.cos, fibers.tendon_slope * m.strength / m.slack
+    fiber_stiffness = stiffness * fibers.cos
+    of_tendon = fibers.tendon_slope * m.strength / m.slack
     of_rate = rate
     if fibers.is_taut and abs(fiber_stiffness + of_tendon) > SIGNIFICANT:
         of_rate = fiber_stiffness / (fiber_stiffness + of_tendon) * rate

@@ -177,7 +177,8 @@ def _find_nearest_pose(
         step = search.compute_step(q)
         if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
             return q
-        cost, size = search.compute_cost(q), 1.0
+        cost = search.compute_cost(q)
+        size = 1.0
         while True:
             trial = search.restore_pose(q + size * step)
             if search.compute_cost(trial) < cost:
@@ -239,7 +240,8 @@ class _Search:
     def compute_step(self, q: Array) -> Array:
         """Return Newton's step (n,) along the surface, with the curvature of the constraints."""
         rows = self._compute_rows(self._compute_state(q))
-        gradient, weights = (self.counted * (q - self.wanted))[self.free], self.counted[self.free]
+        gradient = (self.counted * (q - self.wanted))[self.free]
+        weights = self.counted[self.free]
         # Multipliers by least squares, so that redundant constraints do no harm.
         multipliers = np.asarray(
             np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64

@@ -275,10 +275,8 @@ class _Builder:
             edges.append(self._add_free_joint(new_base(loose, edges), ground))
         bodies = []
         for edge, outer, backward in branches:
-            carrier, mobilizer = (
-                edge.child if backward else edge.parent,
-                edge.build_mobilizer(reversed=backward),
-            )
+            carrier = edge.child if backward else edge.parent
+            mobilizer = edge.build_mobilizer(reversed=backward)
             properties = mass_properties(self.bodies[outer], outer)
             bodies.append(
                 MobileBody(_get_last_name(outer), outer, index[carrier], properties, mobilizer)
@@ -315,14 +313,17 @@ class _Builder:
             body: path of the body.
             ground: path of ground.
         """
-        name, motions = f"free_{_get_last_name(body)}", MOTIONS["FreeJoint"]
-        path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
+        name = f"free_{_get_last_name(body)}"
+        motions = MOTIONS["FreeJoint"]
+        path = f"{self.placements.path(self.model.joint_set)}/{name}"
+        first = len(self.coordinates)
         for index, motion_type in enumerate(motion_types(motions, 6)):
             coordinate_name = f"{name}_coord_{index}"
             self.coordinates.append(
                 CoordinateInfo(coordinate_name, f"{path}/{coordinate_name}", path, motion_type)
             )
-        indices, identity = tuple(range(first, first + 6)), np.eye(4)
+        indices = tuple(range(first, first + 6))
+        identity = np.eye(4)
         return _Edge("FreeJoint", path, ground, body, identity, identity, motions, indices)
 
     def _split_child(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:

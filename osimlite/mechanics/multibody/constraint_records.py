@@ -127,7 +127,8 @@ def count_constraint_work(equations: int, size: int, entries: int) -> dict[str, 
     """
     rows = equations * size
     # The larger of both solvers' needs: by multipliers, and in the null space.
-    by_multipliers, by_directions = 2 * (equations + size), 2 * (equations + size + size * size)
+    by_multipliers = 2 * (equations + size)
+    by_directions = 2 * (equations + size + size * size)
     return {
         "WORK_ROWS": rows,
         "WORK_ERRORS": equations,

@@ -74,7 +74,8 @@ class MassCentres:
 
     def kinetic_energy(self) -> float:
         """Return the kinetic energy (J), of translation and rotation of all bodies."""
-        w, v = self.state.velocities[:-1, :3], self.velocities()
+        w = self.state.velocities[:-1, :3]
+        v = self.velocities()
         return 0.5 * float(np.sum(w * self._spins()) + np.sum(self.masses[:, None] * v * v))
 
     def momentum(self) -> tuple[Array, Array]:
@@ -97,7 +98,8 @@ class MassCentres:
 
 def mass_matrix(state: MechanismKinematics) -> Array:
     """Return the mass matrix M (n, n) of the kinetic energy uᵀ M u / 2."""
-    program, data = state.program, _load_inertias(state, np.zeros(3))
+    program = state.program
+    data = _load_inertias(state, np.zeros(3))
     with check_finite(data):
         composite_rigid_body(program.model, data, make_floats([0.0] * len(state.q)))
     return program.mass_matrix(data)
@@ -112,8 +114,10 @@ def missing_forces(state: MechanismKinematics, udot: Array, gravity: Array) -> A
         gravity: acceleration of gravity in ground (3,), m/s².
     """
     program = state.program
-    model, udots = program.model, make_floats(udot[program.order].tolist())
-    data, missing = _load_inertias(state, gravity, udots), make_floats([0.0] * len(udot))
+    model = program.model
+    udots = make_floats(udot[program.order].tolist())
+    data = _load_inertias(state, gravity, udots)
+    missing = make_floats([0.0] * len(udot))
     with check_finite(data):
         add_generalized_forces(model, data, missing)
     # The wrenches in `data` are those of inertia, minus what the accelerations need.
@@ -130,11 +134,9 @@ def _load_inertias(
         gravity: acceleration of gravity in ground (3,), m/s².
         udot: derivatives of the speeds, by degrees of freedom; None for zero.
     """
-    model, reals, data = (
-        state.program.model,
-        state.program.reals,
-        make_floats(state.vectors[0].tobytes()),
-    )
+    model = state.program.model
+    reals = state.program.reals
+    data = make_floats(state.vectors[0].tobytes())
     with check_finite(data):
         for link in range(model[MODEL.LINKS]):
             acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
@@ -162,8 +164,11 @@ def accelerations(state: MechanismKinematics, applied: Array) -> Array:
         SimulationError: a motion that the constraints allow moves no mass, or a number is not
             finite.
     """
-    program, mechanism, size = state.program, state.mechanism, len(state.q)
-    model, data = program.model, _load_inertias(state, mechanism.gravity)
+    program = state.program
+    mechanism = state.mechanism
+    size = len(state.q)
+    model = program.model
+    data = _load_inertias(state, mechanism.gravity)
     _, y, f = state.vectors
     derivative = make_floats([*f[:size], *applied[program.order].tolist()])
     right = at(derivative, size)

@@ -256,7 +256,8 @@ class _FormulaReader(SimplifiedSteps):
             return True
         opened = self._waiting.pop()
         if name := opened.name:
-            expected, count = 2 if name in OF_TWO else 1, len(self._operands) - opened.before
+            expected = 2 if name in OF_TWO else 1
+            count = len(self._operands) - opened.before
             if count != expected:
                 raise FormulaError(
                     f"'{name}' takes {format_count(expected, 'argument')}, not {count}"

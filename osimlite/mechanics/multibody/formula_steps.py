@@ -105,7 +105,8 @@ class SimplifiedSteps:
         Raises:
             FormulaError: a step stands for an unknown name, or is NaN for all values of the variables.
         """
-        needed, waiting = set[int](), [result]
+        needed = set[int]()
+        waiting = [result]
         while waiting:
             register = waiting.pop()
             if register >= self._first and register not in needed:
@@ -194,7 +195,8 @@ class SimplifiedSteps:
         """
         inner = self._factor_of_multiple(register)
         if inner is not None:
-            factor, register = factor * inner[0], inner[1]
+            factor = factor * inner[0]
+            register = inner[1]
         elif (number := self._get_constant(register)) is not None:
             return self._append_derived_number(factor * number)
         return self._append_step("*", self._append_step("number", value=factor), register)
@@ -295,10 +297,8 @@ class SimplifiedSteps:
             return self._scale(left_constant, right)
         if right_constant is not None:
             return self._scale(right_constant, left)
-        left_negated, right_negated = (
-            self._get_argument("negative", left),
-            self._get_argument("negative", right),
-        )
+        left_negated = self._get_argument("negative", left)
+        right_negated = self._get_argument("negative", right)
         if left_negated is not None or right_negated is not None:
             product = self.add(
                 "*",
@@ -340,10 +340,8 @@ class SimplifiedSteps:
                 if right_constant == 1.0
                 else self._scale(_evaluate_law("divide", 1.0, right_constant), left)
             )
-        left_negated, right_negated = (
-            self._get_argument("negative", left),
-            self._get_argument("negative", right),
-        )
+        left_negated = self._get_argument("negative", left)
+        right_negated = self._get_argument("negative", right)
         if left_negated is not None or right_negated is not None:
             ratio = self.add(
                 "divide",

@@ -100,11 +100,9 @@ class Multivariate(SmoothFunction):
         """
         size = len(arguments)
         indices: Any = range(size)
-        values, table, gradient = (
-            make_floats(arguments),
-            make_floats([*arguments, *self.table]),
-            make_floats([0.0] * size),
-        )
+        values = make_floats(arguments)
+        table = make_floats([*arguments, *self.table])
+        gradient = make_floats([0.0] * size)
 
         def at_rates(*moving: int) -> tuple[float, float]:
             """Return the value, and its second derivative while some arguments change by 1.
@@ -116,7 +114,8 @@ class Multivariate(SmoothFunction):
             value, _, curvature = evaluate_monomials(size, indices, table, values, rates, gradient)
             return value, curvature
 
-        value, hessian = at_rates()[0], make_zero_derivatives(size)[2]
+        value = at_rates()[0]
+        hessian = make_zero_derivatives(size)[2]
         for k in indices:
             hessian[k][k] = at_rates(k)[1]
         for row, column in combinations(indices, 2):
@@ -335,7 +334,8 @@ class ScaledFunction(SmoothFunction):
     @property
     def table(self) -> Sequence[float]:
         """Table of the function with another factor."""
-        type_and_factor, remainder = self.function.table[:2], self.function.table[2:]
+        type_and_factor = self.function.table[:2]
+        remainder = self.function.table[2:]
         return (
             [type_and_factor[0], self.scale * type_and_factor[1], *remainder]
             if type_and_factor
@@ -448,7 +448,8 @@ def table_at_knots(function: SmoothFunction) -> list[float]:
     Kernels evaluate the piece after a knot. Where OpenSim evaluates the piece before it, the knot
     is moved to the next larger float. This matters where slopes or values jump.
     """
-    table, inner = [*function.table], function
+    table = [*function.table]
+    inner = function
     while isinstance(inner, ScaledFunction):
         inner = inner.function
     if isinstance(inner, PiecewiseLinear | PiecewiseConstant | SimmCubicSpline):
@@ -471,7 +472,8 @@ def _find_interval(knots: Sequence[float], x: float) -> int:
     """
     if x <= knots[0] or x >= knots[-1]:
         return 0 if x <= knots[0] else len(knots) - 2
-    low, high = 0, len(knots)
+    low = 0
+    high = len(knots)
     while high - low > 1:
         middle = (low + high) // 2
         if x < knots[middle]:

@@ -56,7 +56,8 @@ def _make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
 
     Translations come first, then rotations; those of a ball joint are one motion.
     """
-    axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((joint_class.moves or "").split())]
+    axes = {"x": X, "y": Y, "z": Z}
+    words = [*enumerate((joint_class.moves or "").split())]
     translations = [translate(axes[word[1]], index) for index, word in words if word[0] == "t"]
     rotations = [rotate_about(axes[word[1]], index) for index, word in words if word[0] == "r"]
     if joint_class.speeds_are_rates:

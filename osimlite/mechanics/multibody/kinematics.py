@@ -137,7 +137,8 @@ class MechanismKinematics:
     @cached_property
     def jacobians(self) -> Array:
         """Jacobian of each body, from the n speeds to its velocity (b + 1, 6, n)."""
-        program, size = self.program, len(self.q)
+        program = self.program
+        size = len(self.q)
         first = program.model[MODEL.WORK_COLUMN]
         columns = (
             np.frombuffer(self.vectors[0])[first : first + 6 * size]
@@ -174,7 +175,9 @@ class MechanismKinematics:
     def _links(self) -> Array:
         """Results of the link of each body, and of ground as the last (b + 1, LINK_WORK.SIZE)."""
         model = self.program.model
-        first, count, size = model[MODEL.WORK_LINK], model[MODEL.LINKS], LINK_WORK.SIZE
+        first = model[MODEL.WORK_LINK]
+        count = model[MODEL.LINKS]
+        size = LINK_WORK.SIZE
         result = np.zeros((count + 1, size))
         result[:-1] = np.frombuffer(self.vectors[0])[first : first + size * count].reshape(
             count, size
@@ -219,7 +222,8 @@ class MechanismKinematics:
             body: index of the body, -1 for ground.
             station: point in the frame of the body (3,), m.
         """
-        arm, w = self.rotations[body] @ station, self.velocities[body][:3]
+        arm = self.rotations[body] @ station
+        w = self.velocities[body][:3]
         bias: Array = self.biases[body]
         return bias[3:] + cross(bias[:3], arm) + cross(w, cross(w, arm))
 

@@ -43,7 +43,8 @@ def solve_with_null_space(rows: Array, values: Array) -> tuple[Array, Array]:
     lengths = np.linalg.norm(rows, axis=1)
     # An equation of rounding errors is scaled down instead of up, so that it does not count.
     lengths[lengths <= ROUNDING * max(lengths.max(), 1.0)] = max(1.0, lengths.max())
-    rows, values = rows / lengths[:, None], values / lengths
+    rows = rows / lengths[:, None]
+    values = values / lengths
     # Independent equations are solved by a QR factorization, which is faster than the SVD.
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")

@@ -352,7 +352,8 @@ class LinkPacker:
             constraints: constraints to include.
             lock_count: number of coordinates that are locked besides.
         """
-        ints, size = self.ints, len(self.order)
+        ints = self.ints
+        size = len(self.order)
         for link in self.links:
             self.numbers += _list_inertia(link)
         ints[MODEL.FIXED_AT] = len(self.numbers)
@@ -392,9 +393,12 @@ class LinkPacker:
             Degree of freedom above each one on the path to ground, or -1.
         """
         self.ints[MODEL.LINK_AT] = len(self.ints)
-        ancestors, last_freedoms, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
+        ancestors = [-1] * self.ends[-1]
+        last_freedoms = [-1] * len(self.links)
+        operation = 0
         for number, link in enumerate(self.links):
-            first, end = self.ends[number], self.ends[number + 1]
+            first = self.ends[number]
+            end = self.ends[number + 1]
             end_operation = operation + len(link.operations)
             self.ints += LINK.record(
                 PARENT=link.parent,
@@ -509,7 +513,8 @@ class LinkPacker:
         """
         if not enforced:
             return
-        start, size = len(self.ints), self.ints[MODEL.DOFS]
+        start = len(self.ints)
+        size = self.ints[MODEL.DOFS]
         self.ints[MODEL.CONSTRAINED] = start
         self.ints += [0] * CONSTRAINED.SIZE
         constraints = [constraint_record(item, self.places, self.balls) for item in enforced]
@@ -535,7 +540,8 @@ class LinkPacker:
             self.ints += ints
             self.numbers += constraint.numbers
             equations = end
-        record_at, ball_at = len(self.ints), len(self.ints) + len(records)
+        record_at = len(self.ints)
+        ball_at = len(self.ints) + len(records)
         self.ints += [*records, *self.balls.values()]
         self.ints[start : start + CONSTRAINED.SIZE] = CONSTRAINED.record(
             DYNAMICS=self.require_law("constrained_dynamics"),

@@ -251,7 +251,8 @@ class Mechanism(MechanismStructure):
         """
         if not self.turning:
             return self._unit
-        values, matrix = self.values(q), np.eye(len(self.coordinates))
+        values = self.values(q)
+        matrix = np.eye(len(self.coordinates))
         for mobilizer in self.turning:
             indices = list(mobilizer.coordinates)
             matrix[np.ix_(indices, indices)] = mobilizer.rate_matrix(values[indices])

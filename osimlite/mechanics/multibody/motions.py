@@ -277,8 +277,13 @@ class EllipsoidPoint(SmoothFunction):
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Return the value, the gradient (3,) and the Hessian (3, 3) at the three angles."""
         # The point is r times the outgoing Z axis, (sin b, -sin a cos b, cos a cos b).
-        a, b, r = float(arguments[0]), float(arguments[1]), self.radius
-        sa, ca, sb, cb = math.sin(a), math.cos(a), r * math.sin(b), r * math.cos(b)
+        a = float(arguments[0])
+        b = float(arguments[1])
+        r = self.radius
+        sa = math.sin(a)
+        ca = math.cos(a)
+        sb = r * math.sin(b)
+        cb = r * math.cos(b)
         if self.component == 0:
             return sb, [0.0, cb, 0.0], [[0.0] * 3, [0.0, -sb, 0.0], [0.0] * 3]
         # g(a) cos b with g = -sin a for y and cos a for z, so that g'' = -g.

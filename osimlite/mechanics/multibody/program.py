@@ -102,7 +102,8 @@ class PackedMechanism:
         size = len(self.order)
         if not self.constraints:
             return Equations(np.zeros(0), np.zeros((0, size)), np.zeros(0), np.zeros(0))
-        h, vector = self.model[self.model[MODEL.CONSTRAINED] :], np.frombuffer(data)
+        h = self.model[self.model[MODEL.CONSTRAINED] :]
+        vector = np.frombuffer(data)
         count = h[CONSTRAINED.EQUATIONS]
         # Columns are in the order of degrees of freedom; the mechanism's order is that of
         # coordinates.
@@ -126,13 +127,16 @@ class PackedMechanism:
     @cached_property
     def _entries(self) -> NDArray[np.int_]:
         """Row, column and offset in the work vector of the stored entries of M (3, k)."""
-        s, entries = self.model, []
+        s = self.model
+        entries = []
         for freedom in range(len(self.order)):
             record = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom :]
-            ancestor, offset = freedom, record[DOF.ROW]
+            ancestor = freedom
+            offset = record[DOF.ROW]
             while ancestor >= 0:
                 entries.append((self.order[freedom], self.order[ancestor], offset))
-                ancestor, offset = s[s[MODEL.DOF_AT] + DOF.SIZE * ancestor + DOF.ABOVE], offset + 1
+                ancestor = s[s[MODEL.DOF_AT] + DOF.SIZE * ancestor + DOF.ABOVE]
+                offset = offset + 1
         return np.array(entries, dtype=int).reshape(-1, 3).T
 
     def mass_matrix(self, data: Floats) -> Array:

@@ -171,7 +171,8 @@ class Placements:
                 f"the stations of the frame '{path}' are fixed to {join_words(sorted(set(bases)))}; fix all to one body"
             )
         a, b, c, origin = points
-        ab, normal = b - a, cross(b - a, c - a)
+        ab = b - a
+        normal = cross(b - a, c - a)
         if not np.linalg.norm(normal) > 0.0:
             raise ModelError(
                 f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it"

@@ -94,7 +94,8 @@ def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Smooth
     if count <= arguments:
         raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
     # OpenSim uses the coefficient after the weights as the constant, and ignores those after it.
-    weights, start = function.coefficients[:arguments], function.coefficients[arguments]
+    weights = function.coefficients[:arguments]
+    start = function.coefficients[arguments]
     return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(weights, start)
 
 

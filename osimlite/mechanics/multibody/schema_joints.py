@@ -55,7 +55,8 @@ def joint_motions(
             impossible.
         UnsupportedError: the joint or a function is of an unknown class.
     """
-    class_name, coordinates = type(joint).__name__, list(joint.coordinates)
+    class_name = type(joint).__name__
+    coordinates = list(joint.coordinates)
     if isinstance(joint, schema.CustomJoint):
         return _build_custom_motions(joint, path, opensim_derivatives)
     if isinstance(joint, EllipsoidJoint):
@@ -117,7 +118,8 @@ def _build_custom_motions(
     order: dict[str, int] = {}
     axes: list[JointAxis] = []
     for name, axis in joint.spatial_transform.axes().items():
-        where, words = f"{name} of '{path}'", axis.names
+        where = f"{name} of '{path}'"
+        words = axis.names
         for word in words:
             if word not in coordinates:
                 raise ModelError(

@@ -165,10 +165,8 @@ def _evaluate_derivative(points: Array, pieces: Array, arguments: Array, order: 
         order: order of the derivative.
     """
     piece_indices = np.searchsorted(points, arguments, side="right")
-    t, coefficients = (
-        (arguments - points[np.maximum(piece_indices - 1, 0)])[:, None],
-        pieces[piece_indices],
-    )
+    t = (arguments - points[np.maximum(piece_indices - 1, 0)])[:, None]
+    coefficients = pieces[piece_indices]
     result = np.zeros_like(coefficients[:, 0])
     # Horner's rule with the factors of the derivative.
     for power in range(pieces.shape[1] - 1, order - 1, -1):
@@ -232,17 +230,13 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
         * width[:, None, None] ** (1 - 2 * half_order)
     )
     # The values at the points are known; only derivatives are unknown.
-    left_derivatives, right_derivatives = (
-        slice(1, half_order),
-        slice(half_order + 1, 2 * half_order),
-    )
+    left_derivatives = slice(1, half_order)
+    right_derivatives = slice(half_order + 1, 2 * half_order)
     diagonal = np.zeros((len(points), half_order - 1, half_order - 1))
     diagonal[:-1] += stiffness[:, left_derivatives, left_derivatives]
     diagonal[1:] += stiffness[:, right_derivatives, right_derivatives]
-    rise, rhs = (
-        np.diff(values, axis=0)[:, None],
-        np.zeros((len(points), half_order - 1, values.shape[1])),
-    )
+    rise = np.diff(values, axis=0)[:, None]
+    rhs = np.zeros((len(points), half_order - 1, values.shape[1]))
     rhs[:-1] -= stiffness[:, left_derivatives, half_order, None] * rise
     rhs[1:] -= stiffness[:, right_derivatives, half_order, None] * rise
     result[:, 1:] = _solve_block_tridiagonal(
@@ -262,7 +256,8 @@ def _make_unit_interval_matrices(half_order: int) -> tuple[Array, Array]:
         integral of its squared m-th derivative (2m, 2m). All entries are fractions of whole
         numbers.
     """
-    size, denominator = 2 * half_order, math.factorial(half_order - 1)
+    size = 2 * half_order
+    denominator = math.factorial(half_order - 1)
     ends = np.zeros((size, size))
     for order in range(half_order):
         ends[order, order] = math.factorial(order)
@@ -288,7 +283,9 @@ def _solve_block_tridiagonal(diagonal: Array, off_diagonal: Array, rhs: Array) -
     """
     if len(diagonal) == 1:
         return np.asarray(np.linalg.solve(diagonal, rhs), dtype=np.float64)
-    size, lower, upper = diagonal.shape[1], off_diagonal[::2], off_diagonal[1::2]
+    size = diagonal.shape[1]
+    lower = off_diagonal[::2]
+    upper = off_diagonal[1::2]
     count = len(upper)
     wide = np.zeros((len(lower), size, 2 * size + rhs.shape[2]))
     wide[:, :, :size], wide[:count, :, size : 2 * size] = lower.transpose(0, 2, 1), upper
@@ -325,7 +322,8 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
     # The penalty of the values s is sᵀ K s. Gauss quadrature of K is exact here, and its
     # eigenvectors make the evaluation for each smoothing parameter p cheap.
     nodes, weights = np.polynomial.legendre.leggauss(half_order)
-    width, middle = np.diff(points) / 2.0, (points[1:] + points[:-1]) / 2.0
+    width = np.diff(points) / 2.0
+    middle = (points[1:] + points[:-1]) / 2.0
     abscissae = (middle[:, None] + width[:, None] * nodes).ravel()
     basis_derivatives = _evaluate_derivative(
         points, _compute_pieces(points, np.eye(n), half_order), abscissae, half_order
@@ -341,10 +339,8 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
     def criterion(logarithm: float) -> float:
         """Return what the smoothing minimizes, at the logarithm of the smoothing."""
         residual_factors = 1.0 - 1.0 / (1.0 + math.exp(logarithm) * roughness)
-        trace, error = (
-            float(residual_factors.sum()) / n,
-            float(np.sum((residual_factors * loads) ** 2)) / n,
-        )
+        trace = float(residual_factors.sum()) / n
+        error = float(np.sum((residual_factors * loads) ** 2)) / n
         # Generalized cross validation (Woltring 1986), else the mean squared error for a known
         # variance.
         if error_variance < 0.0:
@@ -364,19 +360,24 @@ def _find_minimum(function: Callable[[float], float], start: float) -> float:
         function: function of one number.
         start: start of the search.
     """
-    step, limit = math.log(2.0), 60.0
-    middle, right = start, start + step
+    step = math.log(2.0)
+    limit = 60.0
+    middle = start
+    right = start + step
     if function(right) < function(middle):
         while right < start + limit and function(right) < function(middle):
-            middle, right = right, right + step
+            middle = right
+            right = right + step
         left = middle - step
     else:
         left = middle - step
         while left > start - limit and function(left) <= function(middle):
-            middle, left = left, left - step
+            middle = left
+            left = left - step
         right = middle + step
     while right - left > 1e-9:
-        first, second = right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)
+        first = right - _GOLDEN * (right - left)
+        second = left + _GOLDEN * (right - left)
         if function(first) <= function(second):
             right = second
         else:

@@ -151,7 +151,8 @@ class PairContact:
         """
         # A response finds the record of its pair by the number of integers between them: those of
         # the pairs (two links each) and of the responses so far.
-        result, back = [], (ITEM.OWN + 2) * len(self.pairs)
+        result = []
+        back = (ITEM.OWN + 2) * len(self.pairs)
         for pair in self.pairs:
             one = self.surfaces[pair.first]
             two = self.surfaces[pair.second]
@@ -346,7 +347,8 @@ class HuntCrossley(PairContact):
             raise builder.make_unsupported_error(
                 force, " with an ellipsoid, and Simbody's early return"
             )
-        path, vt = builder.path(force), force.transition_velocity
+        path = builder.path(force)
+        vt = force.transition_velocity
         return cls(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
 
 
@@ -435,7 +437,8 @@ def read_surface(
             force, f" on the {get_class_name(geometry)} '{builder.path(geometry)}'"
         )
     frame, body, placed = find_frame(builder, geometry)
-    center, axes = placed[:3, 3], placed[:3, :3]
+    center = placed[:3, 3]
+    axes = placed[:3, :3]
     # The half space is solid at x > 0 of the geometry's frame.
     normal = -axes[:, 0]
     if isinstance(geometry, ContactEllipsoid):
@@ -444,7 +447,8 @@ def read_surface(
             raise ModelError(
                 f"the radii of '{builder.path(geometry)}' are not all positive; make them positive"
             )
-        place, still = to_triple(center), (0.0, 0.0, 0.0)
+        place = to_triple(center)
+        still = (0.0, 0.0, 0.0)
         rows = to_triple(axes[0]), to_triple(axes[1]), to_triple(axes[2])
         # The longest radius bounds the ellipsoid, as a sphere's radius does, where only a bound is
         # needed.

@@ -75,7 +75,8 @@ class Controls:
         return [len(ends), *ends, *tables], numbers, kernel
 
     def _compute_in_python(self, s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> None:
-        first, time = s[item + ITEM.RECORD], w[WORK.TIME]
+        first = s[item + ITEM.RECORD]
+        time = w[WORK.TIME]
         for number, functions in enumerate(self.functions):
             w[first + number] = sum(evaluate_function(function, time) for function in functions)
 
@@ -126,7 +127,8 @@ class ModelControls:
         names: list[str] = []
         self._first: dict[str, int] = {}
         for actuator in builder.list_actuators():
-            path, count = builder.path(actuator), actuator.control_count
+            path = builder.path(actuator)
+            count = actuator.control_count
             self._first[path] = len(names)
             names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
         functions: list[list[SmoothFunction]] = [[] for _ in names]

@@ -108,7 +108,9 @@ def read_external_loads(
             or an identifier does not match three columns.
     """
     if isinstance(source, ExternalLoads):
-        loads, folder, file = source, Path(), None
+        loads = source
+        folder = Path()
+        file = None
     elif Path(source).suffix.lower() in TABLES:
         # A table alone does not say where forces act.
         message = "this table does not name the bodies on which its forces act: name it in a document of ExternalLoads"

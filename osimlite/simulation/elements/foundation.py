@@ -143,7 +143,8 @@ def _read_mesh(
             f"the force '{builder.path(force)}': a contact stiffness must not be negative"
         )
     mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).transform(placed)
-    center, still = to_triple(mesh.center), (0.0, 0.0, 0.0)
+    center = to_triple(mesh.center)
+    still = (0.0, 0.0, 0.0)
     return ContactSurface(
         geometry.name, body, frame, center, mesh.radius, still, material, mesh=mesh
     )
@@ -228,7 +229,9 @@ class Springs:
                 v,
                 turning,
             )
-            force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
+            force = plus(force, push)
+            torque = plus(torque, turn)
+            energy = energy + stored
         return force, torque, energy
 
 

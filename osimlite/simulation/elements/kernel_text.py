@@ -128,7 +128,8 @@ class KernelText:
         """
         force_type = self.force_type
         force = self.force_type.geometry.displacement_output[0]
-        rows, changed = (force, *(state.rate for state in force_type.states)), self.changed_outputs
+        rows = (force, *(state.rate for state in force_type.states))
+        changed = self.changed_outputs
         arguments = self._arguments
         # Each input that matters gets a direction of the dual numbers; the other columns of the
         # Jacobian are 0.
@@ -207,7 +208,8 @@ class KernelText:
         # together, then the law.
         first, second = stages.asked, stages.sought
         *_, curves = force_type.terms
-        places, number = {}, self.size - curves.size
+        places = {}
+        number = self.size - curves.size
         for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
             places[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
         count = len(first.curves)
@@ -395,7 +397,8 @@ class KernelText:
     @property
     def _law_lines(self) -> list[str]:
         """Lines that call the law and record its results, without the force being applied."""
-        force_type, lines = self.force_type, []
+        force_type = self.force_type
+        lines = []
         if force_type.law is not None:
             results = f"{', '.join(force_type.outputs)} = " if force_type.outputs else ""
             lines.append(f"{results}{self._write_call(self._arguments)}")

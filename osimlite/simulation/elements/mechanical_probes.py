@@ -168,7 +168,8 @@ def _measure_joint_power(
     driven, exponent, is_sum = probe.reading.details
     powers = np.zeros(len(system.mechanism.coordinates))
     if any(driven):
-        state, count = system.state, len(system.order)
+        state = system.state
+        count = len(system.order)
         q, u = state.values(y), state.speeds(y)
         forces = state.spread_to_all(
             system.compute_applied_forces(t, y)[count : 2 * count], [0.0] * len(q)

@@ -77,7 +77,8 @@ def read_metabolic_probe(
     first = -1
     if not probe.report_total_metabolics_only:
         names = ("BASAL", *(item.name for item in parameters))
-        labels, first = (*labels, *(f"{probe.name}_{name}" for name in names)), 2
+        labels = (*labels, *(f"{probe.name}_{name}" for name in names))
+        first = 2
     return Reading(labels, tuple(subjects), first, basal, curve)
 
 
@@ -258,10 +259,8 @@ def _measure_smoothed(
     """
     rates = []
     for places, numbers in zip(probe.places, probe.numbers, strict=True):
-        m, by = (
-            Bhargava2004(*numbers[: -len(SmoothTransitions._fields)]),
-            SmoothTransitions(*numbers[-len(SmoothTransitions._fields) :]),
-        )
+        m = Bhargava2004(*numbers[: -len(SmoothTransitions._fields)])
+        by = SmoothTransitions(*numbers[-len(SmoothTransitions._fields) :])
         # The record has the quantities in the order of `BHARGAVA_INPUTS`.
         activation, control, active, passive, length, velocity, factor = (
             system.read_record(*place) for place in places

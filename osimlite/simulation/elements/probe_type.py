@@ -185,7 +185,8 @@ class DeclaredProbe(Silent):
         """Return the record that the kernels compute; none if the probe has no law."""
         if self.probe_type.law is None:
             return []
-        reading, integrals = self.reading, len(self.states)
+        reading = self.reading
+        integrals = len(self.states)
         numbers = [reading.constant, *(number for row in self.numbers for number in row)]
         ints = [len(self.places), reading.first, integrals, 0, len(numbers)]
         # What a probe reads is in the records of forces, whose offsets are known after packing:

@@ -63,7 +63,8 @@ def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -
     Raises:
         ModelError: the numbers of signals and vectors, or of weights and controls, differ.
     """
-    path, vectors = builder.path(controller), controller.synergy_vectors
+    path = builder.path(controller)
+    vectors = controller.synergy_vectors
     counts = [
         (item, getattr(type(item), "control_count", 1))
         for item in find_actuators(builder, controller)

@@ -109,7 +109,8 @@ class TriangleMesh:
             polygons: the polygons.
             file: the file, for messages.
         """
-        points, triangles = polygons.points.tolist(), []
+        points = polygons.points.tolist()
+        triangles = []
         for around in np.split(polygons.corners, polygons.ends[:-1]):
             match around.tolist():
                 case [a, b, c]:
@@ -260,7 +261,8 @@ def _find_nearest_on_triangles(corners: Array, places: Array) -> Array:
     height = _dot_rows(places - a, normal) / _dot_rows(normal, normal)
     on_plane = places - height[:, None] * normal
     inside = np.ones(len(places), dtype=bool)
-    best, least = on_plane.copy(), np.full(len(places), np.inf)
+    best = on_plane.copy()
+    least = np.full(len(places), np.inf)
     for start, end in ((a, b), (b, c), (c, a)):
         along = end - start
         # The projection is inside the triangle if it is on the same side of all edges; else the

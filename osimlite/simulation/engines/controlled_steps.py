@@ -128,7 +128,8 @@ class ControlledSteps(Stepper):
         """
         ends = (*self.previous, self.time, self.state, self.derivative)
         size = len(self.state)
-        engine, tolerance = self._engine, self._accuracy / 10.0
+        engine = self._engine
+        tolerance = self._accuracy / 10.0
 
         def interpolate(t: float) -> list[float]:
             y: Any = [0.0] * size
@@ -160,10 +161,14 @@ class ControlledSteps(Stepper):
     def catch_up(self) -> None:
         """Call `observe` for all steps for which it was not called yet."""
         waiting, self._put_off = self._put_off, []
-        size, end, now = len(self.state), self.state, self.time
+        size = len(self.state)
+        end = self.state
+        now = self.time
         for log, forces in waiting:
             for row, pushes in zip(log.tolist(), forces, strict=True):
-                t, y, f = row[0], row[1 : 1 + size], row[1 + size :]
+                t = row[0]
+                y = row[1 : 1 + size]
+                f = row[1 + size :]
                 self.previous = self._seen
                 self.time, self.state, self.derivative = self._seen = t, y, f
                 self._engine.store_contact_loads(pushes)
@@ -262,7 +267,8 @@ class ControlledSteps(Stepper):
         h = max(shortest_step(self.time, self.attempted), self._options.step_bounds[0])
         # These evaluations raise a clearer error than the one below if the derivative is not
         # finite.
-        f0, size = self._evaluate(t0, y0), len(self._engine.order)
+        f0 = self._evaluate(t0, y0)
+        size = len(self._engine.order)
         # The derivative may not exist after this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])
         off = [

@@ -81,7 +81,8 @@ class NumberUpdater:
             The changed model; None if more than numbers changed.
         """
         new_elements: dict[str, Any] = {}
-        owners, controls = list(owners), self._forces.controls
+        owners = list(owners)
+        controls = self._forces.controls
         controllers = [
             self._builder.path(owner) for owner in owners if isinstance(owner, Controller)
         ]

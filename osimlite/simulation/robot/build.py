@@ -285,7 +285,8 @@ def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
         frames: fixed transforms around them; the last two may be replaced.
     """
     motion, last = motions[-1], frames[-1]
-    turn, shift = last[:3, :3], last[:3, 3]
+    turn = last[:3, :3]
+    shift = last[:3, 3]
     along = np.linalg.norm(np.cross(motion.axis, shift)) <= _ALONG * float(np.linalg.norm(shift))
     # A fixed offset commutes with a translation, and with a rotation about an axis through its
     # origin.

@@ -22,7 +22,8 @@ def merge_fixed(robot: Robot) -> Robot:
     links = {link.name: link for link in robot.links}
     # For every link, the link it became part of and its frame there.
     home: dict[str, tuple[str, Array]] = {robot.links[0].name: (robot.links[0].name, np.eye(4))}
-    joints, names = [], {name: name for name in links}
+    joints = []
+    names = {name: name for name in links}
     for joint in robot.joints:
         base, start = home[joint.parent]
         if joint.kind != "fixed":
@@ -31,7 +32,8 @@ def merge_fixed(robot: Robot) -> Robot:
             continue
         child_frame = start @ joint.origin
         home[joint.child] = (base, child_frame)
-        base_link, is_root = links[base], base == robot.links[0].name
+        base_link = links[base]
+        is_root = base == robot.links[0].name
         if not base_link.bodies:
             names[base] = joint.child
         links[base] = _weld_links(base_link, links[joint.child], child_frame, massless=is_root)
@@ -54,7 +56,8 @@ def _weld_links(link: RobotLink, other: RobotLink, placed: Array, *, massless: b
         placed: frame of the other link in the first (4, 4).
         massless: whether the mass of the other link is left out.
     """
-    turn, shift = placed[:3, :3], placed[:3, 3]
+    turn = placed[:3, :3]
+    shift = placed[:3, 3]
     visuals, collisions = (
         tuple(replace(shape, origin=placed @ shape.origin) for shape in shapes)
         for shapes in (other.visuals, other.collisions)

@@ -121,7 +121,8 @@ class MeshFiles:
             # Names that differ by case only are one file on Windows and macOS.
             used_names = {name.casefold() for name in self.files}
             base = f"{MESH_FOLDER}/{legal(stem)}"
-            name, count = f"{base}{kind}", 1
+            name = f"{base}{kind}"
+            count = 1
             while name.casefold() in used_names:
                 count += 1
                 name = f"{base}_{count}{kind}"

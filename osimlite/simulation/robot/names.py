@@ -83,7 +83,8 @@ def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
     Returns:
         One name for each, in the same order.
     """
-    result, used_names = [*names], set[str]()
+    result = [*names]
+    used_names = set[str]()
     # Names that keep their spelling come first, since False sorts before True.
     for index in sorted(range(len(names)), key=lambda index: spell(names[index]) != names[index]):
         result[index] = make_unique_name(spell(names[index]), used_names)

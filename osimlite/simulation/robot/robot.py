@@ -312,7 +312,8 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
             key=lambda p: sum(weights[row][place] for row, place in enumerate(p)),
         )
     )
-    moments, axes = moments[order], axes[:, order]
+    moments = moments[order]
+    axes = axes[:, order]
     axes = axes * np.where(np.diag(axes) < 0.0, -1.0, 1.0)
     # A reflection becomes a rotation by turning the axis that is least determined.
     if np.linalg.det(axes) < 0.0:

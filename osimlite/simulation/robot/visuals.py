@@ -154,7 +154,8 @@ class _Collector:
         Returns:
             Shape and frame (4, 4); None if it cannot be drawn, which is noted.
         """
-        note, identity = self.note, np.eye(4)
+        note = self.note
+        identity = np.eye(4)
         # The sign of a scale mirrors, which matters for meshes only.
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:

@@ -153,7 +153,8 @@ class Library:
         return self._specialisations[key]
 
     def _free(self, name: str) -> str:
-        free, number = escape_name(name), 1
+        free = escape_name(name)
+        number = 1
         while free in self._taken:
             number += 1
             free = f"{name}_{number}"
@@ -260,7 +261,8 @@ class Library:
 
     def reach(self, symbols: Sequence[str]) -> set[str]:
         """Return the names of all functions that exported functions need."""
-        pending, seen = list(symbols), set()
+        pending = list(symbols)
+        seen = set()
         while pending:
             for name in self.called[pending.pop()]:
                 if name not in seen:

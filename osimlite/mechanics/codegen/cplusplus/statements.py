@@ -192,7 +192,8 @@ class FunctionWriter(ExpressionWriter):
         # Python evaluates the end once, before the loop.
         if self.function.constant_index(stop_node) is None:
             end = self.new_name(f"{counter}_end")
-            ends, stop = f", {end} = {stop}", end
+            ends = f", {end} = {stop}"
+            stop = end
         start = f"int64_t {counter} = {first}{ends}"
         if len(texts) < 3:
             return f"for ({start}; {counter} < {stop}; ++{counter})"

@@ -63,7 +63,8 @@ class PrescribedLoad(GivenLoad):
     def read(self, builder: ElementBuilder, force: Any) -> Load:
         """Return the load of a force."""
         frame = builder.resolve_target(force, "socket_frame", force.socket_frame)
-        placed, ground = builder.find_placement(frame), FramePlacement(GROUND, np.eye(4))
+        placed = builder.find_placement(frame)
+        ground = FramePlacement(GROUND, np.eye(4))
         groups = []
         for what in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, what).objects

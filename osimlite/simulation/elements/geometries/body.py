@@ -134,10 +134,8 @@ def compute_parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> flo
         Rate, m/s.
     """
     one, two = station(model, data, g[2], vector(gp, 0)), station(model, data, g[3], vector(gp, 3))
-    between, parting = (
-        minus(one, two),
-        minus(velocity(model, data, g[2], one), velocity(model, data, g[3], two)),
-    )
+    between = minus(one, two)
+    parting = minus(velocity(model, data, g[2], one), velocity(model, data, g[3], two))
     length = norm(between)
     return dot(parting, between) / length if length > 0.0 else 0.0
 

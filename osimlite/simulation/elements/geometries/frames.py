@@ -54,11 +54,10 @@ def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Flo
     for k in range(3):
         store_vector(work, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
         store_vector(work, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
-    one, two = at(work, AXES), at(work, AXES + 9)
-    start, end = (
-        station(model, data, g[0], vector(gp, 9)),
-        station(model, data, g[1], vector(gp, 21)),
-    )
+    one = at(work, AXES)
+    two = at(work, AXES + 9)
+    start = station(model, data, g[0], vector(gp, 9))
+    end = station(model, data, g[1], vector(gp, 21))
     store_vector(work, 6, start)
     store_vector(work, 9, end)
     x, y, z = rotate(one, vector(two, 0)), rotate(one, vector(two, 3)), rotate(one, vector(two, 6))

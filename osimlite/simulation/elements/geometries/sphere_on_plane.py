@@ -174,7 +174,8 @@ class SphereOnPlane(ForceGeometry):
             of the half space's.
         """
         half_space, sphere = force.location
-        pushed, point = np.array(record[:3], dtype=float), np.array(record[3:6], dtype=float)
+        pushed = np.array(record[:3], dtype=float)
+        point = np.array(record[3:6], dtype=float)
         row: list[float] = []
         for sign, body in ((1.0, sphere.body), (-1.0, half_space.body)):
             row += [

@@ -184,9 +184,11 @@ class BulletEngine(KernelEngine):
         bias b of the joints needs. With M = 1, f = b - a and no applied forces, the joints get the
         accelerations a of Bullet's step.
         """
-        first, size = self._forces, len(self.order)
+        first = self._forces
+        size = len(self.order)
         values, rates, biases = data[self._moves : first].reshape(3, -1)
-        count, applied = len(values), f[size : 2 * size]
+        count = len(values)
+        applied = f[size : 2 * size]
         forces = self.compute_joint_forces(y.tolist(), applied)
         result = self.world.accelerations_by_step(values.tolist(), rates.tolist(), forces)
         applied[:] = 0.0

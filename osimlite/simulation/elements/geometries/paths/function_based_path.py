@@ -99,12 +99,14 @@ class CoordinatePath:
             arguments: index in y of each argument, -1 for a locked coordinate.
             values: value of each argument that is locked.
         """
-        size, work = len(arguments), FUNCTION_WORK.DERIVATIVES + len(arguments)
+        size = len(arguments)
+        work = FUNCTION_WORK.DERIVATIVES + len(arguments)
         if isinstance(function, Formula):
             # A formula is differentiated symbolically, and its derivatives are formulas of the same
             # record.
             formulas = [function, *(function.derivative(k) for k in range(size))]
-            ints, numbers = [size, len(formulas), *arguments], [*values]
+            ints = [size, len(formulas), *arguments]
+            numbers = [*values]
             for steps, constants in map(program, formulas):
                 ints += [len(steps) // 3, len(numbers), *steps]
                 numbers += constants
@@ -125,12 +127,15 @@ class CoordinatePath:
         # Factors are multiplied into the coefficients, so that one kernel evaluates all
         # polynomials.
         while isinstance(function, ScaledFunction):
-            factor, function = factor * function.scale, function.function
+            factor = factor * function.scale
+            function = function.function
         if isinstance(function, WeightedSum):
-            order, coefficients = 1, (function.start, *reversed(function.weights))
+            order = 1
+            coefficients = (function.start, *reversed(function.weights))
         else:
             assert isinstance(function, MultivariatePolynomial)
-            order, coefficients = max(map(sum, function.powers)), function.coefficients
+            order = max(map(sum, function.powers))
+            coefficients = function.coefficients
         numbers = [*values, *(factor * coefficient for coefficient in coefficients)]
         work += size * (order + 1) + 2 * size
         return ForceRecord(

@@ -203,7 +203,8 @@ class ThroughPoints:
         nodes = [(point, places.freedom(point.coordinate)) for point in self.points]
         # Each surface has two tangent points.
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
-        ints, numbers = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
+        ints = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)]
+        numbers = list[float]()
         for number, (node, of) in enumerate(nodes):
             # With geodesics all lines pull except chords of surfaces, because points may move in
             # their bodies.
@@ -215,10 +216,8 @@ class ThroughPoints:
             node_ints, node_numbers = node.pack(places, of, len(numbers), self.path, piece)
             ints += node_ints
             numbers += node_numbers
-        kernel, work = (
-            "wrapped_path" if self.surfaces else "straight_path",
-            PATH_WORK.ORDER + len(nodes) * (1 + NODE_WORK.SIZE),
-        )
+        kernel = "wrapped_path" if self.surfaces else "straight_path"
+        work = PATH_WORK.ORDER + len(nodes) * (1 + NODE_WORK.SIZE)
         if self.geodesic and self.surfaces:
             for surface in self.surfaces:
                 wraps += len(numbers), surface.first, surface.last, surface.begin
@@ -226,7 +225,8 @@ class ThroughPoints:
             # The most surfaces on one segment decide how much work memory a search needs.
             most = max(Counter(surface.first for surface in self.surfaces).values())
             slots, work = layout_slots(most, len(self.surfaces), work)
-            kernel, wraps = "geodesic_path", wraps + slots
+            kernel = "geodesic_path"
+            wraps = wraps + slots
         return [
             *parts,
             ForceRecord(kernel, (*ints, *wraps), tuple(numbers), record_size=work, is_part=True),

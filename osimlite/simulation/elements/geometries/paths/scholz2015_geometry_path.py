@@ -156,7 +156,9 @@ class Cable:
             places: placement of the bodies in the links of the tree.
         """
         longest_run = run_length = 0
-        ints, numbers, work = list[int](), list[float](), CABLE_WORK.FIRST
+        ints = list[int]()
+        numbers = list[float]()
+        work = CABLE_WORK.FIRST
         for element in self.elements:
             # The solver couples obstacles between two points, so its size follows from the longest
             # run of obstacles.
@@ -191,7 +193,8 @@ class Cable:
             Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))
         ]
         _, path = self.make_records(Places(mechanism, {}, placements))
-        ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.record_size)
+        ints = np.array([0] * ITEM.OWN + list(path.ints))
+        work = np.zeros(path.record_size)
         # Only cables need the engines while a model is built. As Python the search takes seconds.
         from osimlite.simulation.engines.linking import READY_CODE
 
@@ -241,7 +244,8 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
             f"the path of '{builder.path(owner)}' must begin and end with a point; add the missing one"
         )
     # OpenSim solves it in the written default pose, and again after the assembly.
-    written, assembled = builder.mechanism.values({}), builder.mechanism.default_state()[0]
+    written = builder.mechanism.values({})
+    assembled = builder.mechanism.default_state()[0]
     cable = Cable(elements).solve_at(builder.mechanism, written)
     if cable and not np.array_equal(written, assembled):
         cable = cable.solve_at(builder.mechanism, assembled)
