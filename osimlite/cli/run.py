@@ -66,8 +66,8 @@ def run(
         Option(
             "--refine",
             metavar="TOL[:HESSIAN]",
-            help="For one Moco study: divide mesh intervals until no error is above this, with second "
-            "derivatives that are exact or limited-memory.",
+            help="For one Moco study: refine the mesh until the error of every interval is at most TOL. "
+            "HESSIAN is exact (the default) or limited-memory.",
             show_default=False,
         ),
     ] = None,
@@ -212,6 +212,7 @@ def _run_alone(
 
     from osimlite.cli._console import complain, say
     from osimlite.cli._progress import progress_bar
+    from osimlite.errors import DocumentError
     from osimlite.lint.diagnostic import Report
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
@@ -232,9 +233,12 @@ def _run_alone(
                 write_outside=write_outside,
             )
     except FaultySetup as fault:
-        # Only the errors: the warnings do not stop the setup.
-        _show_findings(Report(fault.report.errors, fault.report.texts))
-        raise
+        # Only the errors: warnings do not stop a setup. The message of the exception would repeat
+        # the first of them.
+        errors = fault.report.errors
+        _show_findings(Report(errors, fault.report.texts))
+        errors_text = "this error" if len(errors) == 1 else "these errors"
+        raise DocumentError(f"did not run because of {errors_text}", file=str(setup)) from None
     _print_outcome(setup, outcome)
     # Ipopt's status after Ctrl-C.
     if outcome.summary.get("status") == "User_Requested_Stop":
@@ -316,6 +320,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
 
     from osimlite.base.text import format_count
     from osimlite.cli._console import show, show_rows
+    from osimlite.fitting.fit_messages import RECOMMENDS
     from osimlite.tools.many import STATUSES
 
     visible_trials = trials
@@ -331,9 +336,13 @@ def _show_trials(trials: list[RunRecord]) -> None:
         visible_trials = worst[-MOST_ROWS:][::-1]
     rows = []
     for trial in visible_trials:
-        result_text = trial.failure or "; ".join(
-            f"{name}: {fact}" for name, fact in trial.messages[:2]
-        )
+        # The first messages, and those about errors that exceed a recommended limit.
+        messages = [
+            message
+            for index, message in enumerate(trial.messages)
+            if index < 2 or RECOMMENDS in message[1]
+        ]
+        result_text = trial.failure or "; ".join(f"{name}: {fact}" for name, fact in messages)
         if trial.warnings:
             remark = (
                 f"; and {format_count(len(trial.warnings) - 1, 'more warning')}"

@@ -14,6 +14,8 @@ IMPLAUSIBLE_ERROR_M = 1.0
 """Root mean square of marker errors (m) that no pose of a person leaves."""
 MAX_NAMED_COORDINATES = 8
 """Number of undetermined coordinates that a message names."""
+RECOMMENDS = "OpenSim recommends"
+"""Begins the note of a message about marker errors beyond the recommended limits."""
 NO_EFFECT = "without effect on the fit"
 """Consequence for parts of unknown classes where a motion is fitted to markers."""
 MAX_NAMED_PARTS = 3
@@ -41,7 +43,7 @@ def describe_fit(
         advised = (
             ""
             if rms < advice[0] and largest < advice[1]
-            else f"; OpenSim recommends less than {limits_text}{marker_note}"
+            else f"; {RECOMMENDS} less than {limits_text}{marker_note}"
         )
         # Errors of metres are typical of millimetres that are read as metres.
         advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
