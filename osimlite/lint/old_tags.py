@@ -101,6 +101,11 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
         )
     },
     "SmoothSphereHalfSpaceForce": {"derivative_smoothing": "no release has read it"},
+    # OpenSim 2 wrote these into its setups.
+    "Tool": {"input_directory": "write the folder into the names of the files"},
+    "InverseKinematicsTool": {
+        "coordinates_in_degrees": "the header of the coordinate_file says inDegrees"
+    },
 }
 """Tags of real files that OpenSim 4.6 reads in no version of a document, and what does their work."""
 _COMMENTS: Final = frozenset(

@@ -57,6 +57,17 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     }
 
 
+@pytest.mark.parametrize(("folder", "severity"), [("data", "warning"), (" ", "info")])
+def test_the_input_directory_of_old_setups_is_no_misspelling(project, folder, severity):
+    """OpenSim 2 wrote this property; OpenSim 4.6 ignores it in files of every version."""
+    text = (project / "ik.xml").read_text()
+    old = f"<input_directory>{folder}</input_directory><model_file>"
+    (project / "ik.xml").write_text(text.replace("<model_file>", old, 1))
+    (finding,) = validate(project / "ik.xml", select=["OSIM101"]).findings
+    assert (finding.severity.value, finding.suggestion) == (severity, None)
+    assert "ignores <input_directory>" in finding.message and finding.fix is not None
+
+
 @pytest.mark.parametrize(
     ("missing", "writable"),
     [("leg_walk.trc", False), ("leg_loads.mot", True), ("leg_states.sto", True)],

@@ -34,11 +34,11 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
 
     OpenSim ignores such an element without a message and keeps the default. With a misspelt
     `<stiffness>` a contact stiffness is 0, and the motion becomes NaN; with a misspelt `<ForceSet>`
-    a model has no forces. In setups, properties of older versions are a warning, or an info if the
-    element is empty or disables something that is disabled anyway. A misspelt element with the
-    default value is a warning too, as is one that no version reads, such as the `<location>` of a
-    MovingPathPoint. A `<Comment>` is an info. Of several elements with the same tag only the first
-    is reported, with the number of the others.
+    a model has no forces. Harmless elements are a warning: a misspelt element with the default
+    value, a property of an older version in a setup, and an element that OpenSim ignores in files
+    of every version, such as the `<location>` of a MovingPathPoint. A `<Comment>` is an info, and
+    so is an element in a setup that is empty or disables something that is disabled anyway. Of
+    several elements with the same tag only the first is reported, with the number of the others.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -93,10 +93,12 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
     if reason is not None:
         fix = remove_element(subject.source, note.number)
         message = (
-            f"<{note.word}> of {describe_object(owner)} is read by no version of OpenSim: "
-            f"{reason}; delete it"
+            f"OpenSim 4.6 ignores <{note.word}> of {describe_object(owner)} in files of every "
+            f"version: {reason}; delete it"
         )
-        return _UnknownTag(note, owner, message, WARNING, fix=fix)
+        # Old programs write the tags of setups also where they have no value.
+        is_empty = subject.model is None and _is_switched_off(subject, note.number)
+        return _UnknownTag(note, owner, message, INFO if is_empty else WARNING, fix=fix)
     if is_comment(note.word):
         message = (
             f"<{note.word}> in {describe_object(owner)} is a comment written as an element; "
