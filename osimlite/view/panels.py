@@ -69,7 +69,9 @@ GAP_ROWS = 2
 PANEL_WIDTH_IN = 3.6
 """Width of a panel with its margins, inches."""
 PANEL_MARGINS_IN = {"left": 0.62, "right": 0.16, "bottom": 0.26, "top": 0.34}
-"""Margins around the axes of a panel for ticks, label and title, inches."""
+"""Margins around the axes of a panel for ticks, label and title, inches.
+
+Half of the last number of the abscissa extends into the right margin."""
 LABEL_HEIGHT_IN = 0.16
 """Height of the label of the abscissa, which only the lowest panel of a column has, inches."""
 NOTE_LINE_IN = 0.15

@@ -351,3 +351,12 @@ def test_limits_near_the_curves_are_lines() -> None:
     ]
     # A distant limit would flatten the curve.
     assert drawn == [[0.01, 1.0], []]
+
+
+def test_the_last_number_of_the_abscissa_is_inside_the_picture():
+    items, _ = panels_of([Column(name, "deg", wave()) for name in "abc"])
+    (figure,) = drawn(items)
+    width = figure.bbox.width
+    for axes in figure.axes:
+        for label in axes.get_xticklabels():
+            assert label.get_window_extent().x1 <= width
