@@ -41,7 +41,7 @@ PROJECTS = ("pipelines/pendulum", "pipelines/walking", "setups", "documents")
 """Folders of fixtures that are checked as whole projects."""
 
 MIN_MODELS, MIN_PROJECTS = 12, 3
-NOTE = "not measured: needs osimlite[sim]"
+NOTE = "did not run: they need osimlite[sim]"
 """What reports say of the rules that need numbers."""
 
 NAMES_AN_EXTRA = {

@@ -134,7 +134,7 @@ class Finding:
         return escape_unprintable(f"{self.place}: {self.severity} {self.code} {self.message}{hint}")
 
 
-NOT_MEASURED = " not measured: "
+NOT_RUN = " did not run: "
 """Separator between the file with its rules and the reason in `Report.unmeasured`."""
 
 
@@ -166,8 +166,8 @@ class Report:
         texts: text of each file with findings, for the snippets of a reporter.
         checked: number of files.
         known: number of findings that a baseline left out.
-        unmeasured: for each file where some rules were not measured, a sentence with its name, the
-            rules and the reason.
+        unmeasured: for each file where some rules did not run, because the model could not be
+            measured, a sentence with its name, the rules and the reason.
         passed: files of a folder that were skipped because they are not OpenSim's.
     """
 
@@ -224,14 +224,12 @@ class Report:
         """
         notes = []
         for text in self.unmeasured:
-            before, _, reason = text.partition(NOT_MEASURED)
+            before, _, reason = text.partition(NOT_RUN)
             # From the right, since the name of a file can contain anything.
             file, _, families = before.rpartition(": rules ")
-            if reason.startswith("needs osimlite["):
+            if reason.startswith("they need osimlite["):
                 notes.append(
-                    MissingPackageNote(
-                        file, families[:6], f"rules {families}{NOT_MEASURED}{reason}"
-                    )
+                    MissingPackageNote(file, families[:6], f"rules {families}{NOT_RUN}{reason}")
                 )
         return notes
 

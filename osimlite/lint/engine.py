@@ -12,7 +12,7 @@ from osimlite.io.document.survey import Survey, survey_source
 from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.construction import CONSTRUCTION
-from osimlite.lint.diagnostic import NOT_MEASURED, Finding, Report
+from osimlite.lint.diagnostic import NOT_RUN, Finding, Report
 from osimlite.lint.measures import MEASURES
 from osimlite.lint.project_files import is_document, is_table
 from osimlite.lint.registry import Check, FindingCollector, Rule, all_rules, get_rule
@@ -150,8 +150,9 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     why_not = why_not or unbuilt
     unmeasured = []
     if why_not and measure:
-        families = join_words(dict.fromkeys(sorted(rule.code[:6] for rule in left_out)))
-        unmeasured.append(f"{subject.file or 'the model'}: rules {families}{NOT_MEASURED}{why_not}")
+        # OSIM63x stands for OSIM631 to OSIM639.
+        families = join_words(dict.fromkeys(sorted(f"{rule.code[:6]}x" for rule in left_out)))
+        unmeasured.append(f"{subject.file or 'the model'}: rules {families}{NOT_RUN}{why_not}")
     return Report(unique, unmeasured=unmeasured)
 
 

@@ -38,7 +38,7 @@ MECHANISM = "mechanism"
 MEASURES = "measures"
 """What rules are about that need them."""
 
-NEEDS_SIM = "needs osimlite[sim]"
+NEEDS_SIM = "they need osimlite[sim]"
 """Begins the reason why nothing is measured where the numeric packages are not installed."""
 
 MAX_WRAPS_UNCOMPILED = 12

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from osimlite.io.document.source import Source
 from osimlite.lint import Config, measures, validate
 from osimlite.lint.many import check_files
+from osimlite.lint.reporters.terminal import describe_unmeasured
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from tests.cli.command import run
 
@@ -27,7 +29,7 @@ def jumping(fixtures: Path, tmp_path: Path) -> Path:
 
 
 WHY = (
-    "rules OSIM42, OSIM53 and OSIM63 not measured: needs osimlite[sim] (numpy is not installed); "
+    "rules OSIM42x, OSIM53x and OSIM63x did not run: they need osimlite[sim] (numpy is not installed); "
     "run: pip install 'osimlite[sim]'"
 )
 """What is reported in an environment without numpy."""
@@ -109,6 +111,14 @@ def test_a_model_that_cannot_be_computed_is_named_with_the_reason(fixtures):
     assert why.startswith("m.osim: ") and "ScrewJoint" in why
 
 
+def test_a_reason_that_ends_with_a_suggestion_gets_no_full_stop(fixtures):
+    text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text()
+    name = re.search(r"<socket_parent_frame>([^<]*)", text)[1]
+    report = validate(Source(text.replace(f"{name}</", f"{name}x</", 1).encode(), "m.osim"))
+    (why,) = report.unmeasured
+    assert why.endswith("?") and describe_unmeasured(report) == why
+
+
 def test_numbers_beyond_what_is_computed_with_are_no_traceback(fixtures):
     text = (fixtures / "lint" / "OSIM633" / "fail-01-example.osim").read_text()
     text = text.replace("WrapSphere", "WrapEllipsoid").replace(
@@ -116,7 +126,7 @@ def test_numbers_beyond_what_is_computed_with_are_no_traceback(fixtures):
     )
     report = validate(Source(text.encode()))
     assert [why.partition(" (")[0] for why in report.unmeasured] == [
-        "the model: rules OSIM63 not measured: a number is too large to compute with"
+        "the model: rules OSIM63x did not run: a number is too large to compute with"
     ]
 
 

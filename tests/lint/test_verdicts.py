@@ -64,7 +64,7 @@ def test_a_rule_that_reads_the_model_needs_no_numeric_library(tmp_path: Path):
     codes: dict[str, set[str]] = {name: set() for name in files}
     for finding in json.loads(done.stdout):
         if finding["name"] == "not-measured":
-            assert "needs osimlite[sim]" in finding["message"]
+            assert "they need osimlite[sim]" in finding["message"]
             codes[finding["file"]].add("note")
         else:
             codes[finding["file"]].add(finding["code"])

@@ -61,7 +61,9 @@ def describe_unmeasured(report: Report) -> str:
         return ""
     count = len(report.unmeasured) - 1
     other_files = f" (and {count} more {_pluralize('file', count)})" if count else ""
-    return escape_unprintable(f"{report.unmeasured[0]}{other_files}.")
+    # A reason may end with a suggestion.
+    end = "" if not other_files and report.unmeasured[0].endswith("?") else "."
+    return escape_unprintable(f"{report.unmeasured[0]}{other_files}{end}")
 
 
 def describe_skipped(report: Report, everything: bool) -> str:
