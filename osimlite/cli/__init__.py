@@ -38,9 +38,11 @@ def create_app(names: Sequence[str] = COMMANDS) -> Typer:
     """Create the typer application of the given commands."""
     import typer
 
+    from osimlite.cli._help import DESCRIPTION, PROGRAM_OPTIONS
+
     application = typer.Typer(
         name="osimlite",
-        help="Build, check, translate and simulate OpenSim models (.osim) without OpenSim.",
+        help=DESCRIPTION,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
@@ -52,12 +54,12 @@ def create_app(names: Sequence[str] = COMMANDS) -> Typer:
 
     @application.callback(invoke_without_command=True)
     def osimlite(
-        version: bool = typer.Option(False, "--version", help="Print the version and stop."),
+        version: bool = typer.Option(False, "--version", help=PROGRAM_OPTIONS["--version"]),
         verbose: bool = typer.Option(
             False,
             "--verbose",
             "-v",
-            help="With --version: also show how the numerical code (the kernels) is compiled.",
+            help=PROGRAM_OPTIONS["-v, --verbose"],
         ),
     ) -> None:
         if version:
@@ -79,6 +81,15 @@ def _print_help(name: str, command: Command) -> None:
     from osimlite.cli._help import format_help
 
     show(format_help(name, command, count_columns(), bold=wants_colour()))
+
+
+def _print_overview() -> None:
+    """Print the help of the program: all commands and what each does."""
+    from osimlite.cli._console import count_columns, show, wants_colour
+    from osimlite.cli._help import format_overview
+
+    commands = {name: load_command(name) for name in COMMANDS}
+    show(format_overview(commands, count_columns(), bold=wants_colour()))
 
 
 def _print_version(*, verbose: bool) -> None:
@@ -200,6 +211,9 @@ def _run(words: list[str]) -> None:
                 if values is not None:
                     command(**values)
                     raise SystemExit(0)
+            if words in (["--help"], ["-h"]) and COMPLETION_VARIABLE not in os.environ:
+                _print_overview()
+                raise SystemExit(0)
             raise SystemExit(
                 create_app(names)(args=words, prog_name="osimlite", standalone_mode=False)
             )

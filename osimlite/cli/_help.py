@@ -1,7 +1,8 @@
-"""Help of one command: options beside their descriptions, which have most of the width."""
+"""Help of the program and of each command: names beside descriptions, which have most of the width."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -13,8 +14,42 @@ NAME_WIDTH = 22
 """Width of the column of options; a longer option stands in a line of its own."""
 MAX_WIDTH = 120
 """Longer lines are hard to read."""
+DESCRIPTION = "Build, check, translate and simulate OpenSim models (.osim) without OpenSim."
+"""What the program does, in one sentence."""
+PROGRAM_OPTIONS = {
+    "--version": "Print the version and stop.",
+    "-v, --verbose": "With --version: also show how the numerical code (the kernels) is compiled.",
+    "--install-completion": "Install completion for the current shell.",
+    "--show-completion": "Print the completion for the current shell, to copy or adapt it.",
+    "-h, --help": "Show this text.",
+}
+"""Options of the program without a command."""
+COMMAND_HINT = "'osimlite COMMAND --help' explains a command and its options."
+"""Last sentence of the help of the program."""
 PLACEHOLDERS = {int: "N", float: "NUMBER", str: "TEXT", Path: "FILE"}
 """Placeholders of values by their type, where an option has none."""
+
+
+def format_overview(commands: Mapping[str, Command], width: int, *, bold: bool = False) -> str:
+    """Return the help of the program.
+
+    Args:
+        commands: the commands by name, in the order of the help.
+        width: letters of a line.
+        bold: whether headings and names are bold.
+    """
+    width = min(width, MAX_WIDTH)
+    start, end = ("\033[1m", "\033[0m") if bold else ("", "")
+    lines = [f"{start}Usage:{end} osimlite [OPTIONS] COMMAND [ARGUMENTS]", ""]
+    lines += [*_wrap(DESCRIPTION, width, 0), "", f"{start}Commands:{end}"]
+    for name, command in commands.items():
+        # The first paragraph of the docstring; 'osimlite COMMAND --help' shows all.
+        text = " ".join((command.__doc__ or "").strip().split("\n\n")[0].split())
+        lines += _format_entry(name, text, width, start, end)
+    lines += ["", f"{start}Options:{end}"]
+    for name, text in PROGRAM_OPTIONS.items():
+        lines += _format_entry(name, text, width, start, end)
+    return "\n".join([*lines, "", *_wrap(COMMAND_HINT, width, 0), ""])
 
 
 def format_help(name: str, command: Command, width: int, *, bold: bool = False) -> str:

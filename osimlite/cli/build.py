@@ -91,10 +91,12 @@ def _list_models() -> None:
     from osimlite.models import BUILT_IN
     from osimlite.models.source import describe_model
 
+    width = max(map(len, BUILT_IN))
     for name in BUILT_IN:
+        text = f"{name:{width}}  {describe_model(name)}"
         show(
             textwrap.fill(
-                f"{name}  {describe_model(name)}", width=79, subsequent_indent=" " * (len(name) + 2)
+                text, width=79, subsequent_indent=" " * (width + 2), break_on_hyphens=False
             )
             + "\n"
         )

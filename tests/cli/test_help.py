@@ -76,6 +76,17 @@ def test_a_pair_of_files_has_no_dots():
     assert "PATH...\n" in format_help("validate", load_command("validate"), 80)
 
 
+def test_the_help_of_the_program_names_all_commands_and_options(application):
+    done = run("--help")
+    assert done.code == 0 and max(map(len, done.out.splitlines())) <= 80
+    for name in COMMANDS:
+        assert f"\n  {name} " in done.out
+    group = get_command(application)
+    for parameter in group.params:
+        for spelling in parameter.opts:
+            assert spelling in done.out
+
+
 def test_help_names_every_option_with_its_default(application):
     for name, command in get_command(application).commands.items():
         text = format_help(name, load_command(name), 80)
