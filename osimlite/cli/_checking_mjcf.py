@@ -44,14 +44,16 @@ def _make_table(result: Any, name: str) -> Any:
     The last columns are the ratio of the implied optimal fiber length to the model's, and the
     difference of the tendon slack lengths.
     """
-    table = create_table(f"{name}: root mean square errors")
+    table = create_table(
+        f"{name}: root mean square errors, and optimal fiber and tendon slack lengths compared with the model's"
+    )
     for column in (
         "muscle",
         "length, mm",
         "moment arm, mm",
         "force, Fmax",
-        "fiber length, x",
-        "slack length, mm",
+        "fiber length, ratio",
+        "slack change, mm",
     ):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
     for muscle in sorted(result.muscles, key=lambda muscle_check: -muscle_check.worst_arm.rms):

@@ -37,11 +37,13 @@ class Conversion:
         files: written files, the main one first.
         fidelity: record of what was translated, approximated and left out.
         summary: facts about the conversion, as plain data.
+        start_note: advice where simulations must start, or "".
     """
 
     files: list[Path]
     fidelity: Fidelity
     summary: dict[str, object] = field(default_factory=dict)
+    start_note: str = ""
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,7 @@ class Request:
             fidelity,
             summary_path,
         ]
-        return Conversion(files, result.fidelity, summary)
+        return Conversion(files, result.fidelity, summary, result.start_note)
 
     def _export(
         self,
@@ -284,7 +286,10 @@ class Request:
                 **option_values,
             )
             guard.protect_files(exported)
-            return Conversion(exported.write(self.folder), exported.fidelity)
+            files = exported.write(self.folder)
+            # Some formats cannot express the initial state.
+            start_note = getattr(exported, "start_note", "")
+            return Conversion(files, exported.fidelity, start_note=start_note)
         return self._export_scene(model, exporter, motion, folders, option_values, guard)
 
     def _export_scene(
@@ -466,6 +471,8 @@ def report(request: Request, result: Conversion) -> None:
         f"components: {exact_count} exact, {changed_count} approximated or converted, {dropped_count} left out"
     )
     say("wrote " + join_words([str(path) for path in result.files], max_count=4))
+    if result.start_note:
+        say(result.start_note)
 
 
 def print_formats() -> None:

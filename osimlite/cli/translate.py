@@ -136,7 +136,7 @@ def translate(
     if len(translated.fidelity):
         from osimlite.cli._fidelity_table import tabulate
 
-        print_table(tabulate(translated.fidelity, to.upper()))
+        print_table(tabulate(translated.fidelity, to))
     exact_count, changed_count, lost_count = translated.fidelity.counts()
     say(
         f"components: {exact_count} exact, {changed_count} approximated or converted, {lost_count} left out"

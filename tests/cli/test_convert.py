@@ -46,6 +46,7 @@ def test_the_format_follows_from_the_names(
     assert (summary["from"], summary["to"]) == ("osim", target)
     assert summary["files"][0] == Path(main_file).name
     assert fidelity["target"].startswith(target)
+    assert target != "mjcf" or "Lost or approximated in MJCF (MuJoCo): " in out
     assert summary["parts"]["left_out"] == len(
         {each["component"] for each in fidelity["records"] if each["how"] == "dropped"}
     )
