@@ -58,13 +58,17 @@ def scale(
         -o subject.osim
     """
     # Numpy and the fitting package are imported only when the command runs, so that help is fast.
+    import itertools
+
     from osimlite.base.files import make_folder_of
+    from osimlite.base.text import suggest_name
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
     from osimlite.errors import SettingError
     from osimlite.fitting.scale_tool import scale as scaled
     from osimlite.io.document.printer import write
     from osimlite.io.document.reader import read
+    from osimlite.schema.markers import Marker
 
     # BODY=A:B,C:D gives several pairs; "BODY.XZ" restricts the factor to these axes.
     measurements = {
@@ -84,8 +88,17 @@ def scale(
     if not (measurements or factors or place or mass > 0.0):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
     with progress_bar("scaling", None):
+        model = read(file)
+        # A setup may name markers that the model lacks, as in OpenSim; here it is a spelling error.
+        marker_names = {marker.name for marker in model.components(Marker)}
+        for pairs, _ in measurements.values():
+            for name in itertools.chain.from_iterable(pairs):
+                if name not in marker_names:
+                    raise SettingError(
+                        f"--distance: '{model.name}' has no marker '{name}'{suggest_name(name, marker_names)}"
+                    )
         result = scaled(
-            read(file),
+            model,
             static,
             measurements=measurements,
             factors=factors,

@@ -73,6 +73,10 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         (("scale", "box.osim", "--factor", "c=2"), "'box' has no body 'c'"),
         (("scale", "box.osim", "walk.trc", "--distance", "c.X=one:two"), "'box' has no body 'c'"),
         (
+            ("scale", "box.osim", "walk.trc", "--distance", "b=one:twoo"),
+            "--distance: 'box' has no marker 'twoo'; did you mean 'two'?",
+        ),
+        (
             ("scale", "box.osim", "--factor", "b=0"),
             "expected positive factors of 'b', found 0, 0, 0",
         ),
