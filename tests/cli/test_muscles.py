@@ -86,7 +86,7 @@ def test_pictures(file):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--coordinate", "y"), "--coordinate: 'one' has no coordinate 'y'"),
+        (("--coordinate", "y"), "--coordinate: 'one' has no coordinate 'y'; it has x"),
         (("--coordinate", "x=1"), "--coordinate takes NAME=LOW:HIGH"),
         (("--coordinate", "x=2:1"), "the lower end of the range first"),
         (("--muscle", "/forceset/mo"), "no muscle '/forceset/mo'; did you mean '/forceset/mu'"),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import suggest_name
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.extremes import methods_of_any_numbers
@@ -26,6 +26,8 @@ from osimlite.mechanics.multibody.parts import (
 )
 from osimlite.mechanics.multibody.spatial import Array
 
+MAX_NAMED_COORDINATES = 8
+"""Number of coordinates that a message about an unknown one lists."""
 Values = ArrayLike | Mapping[str, float]
 """One number per coordinate: an array in coordinate order, or numbers by coordinate name."""
 
@@ -106,7 +108,9 @@ class MechanismStructure:
                 raise ModelError(
                     f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(alike)}"
                 ) from None
-            suggestion = suggest_name(name, self.coordinate_names)
+            names = self.coordinate_names
+            known = join_words(names, max_count=MAX_NAMED_COORDINATES)
+            suggestion = suggest_name(name, names) or (f"; it has {known}" if names else "")
             raise ModelError(f"'{self.name}' has no coordinate '{name}'{suggestion}") from None
 
     def placement(self, name: str) -> FramePlacement:
