@@ -8,6 +8,19 @@ from pathlib import Path
 import pytest
 
 from osimlite import Body, Mesh, Model, PinJoint, validate, write
+from osimlite.lint import Config
+
+
+def test_a_folder_with_two_paths_is_named_once(tmp_path: Path, monkeypatch) -> None:
+    model = Model(name="m")
+    body = model.add(Body(name="b", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
+    body.attached_geometry.append(Mesh(name="bone", mesh_file="bone.vtp"))
+    model.add(PinJoint(name="j").between(model.ground, body))
+    write(model, tmp_path / "m.osim")
+    monkeypatch.chdir(tmp_path)
+    config = Config(select=("OSIM701",), mesh_paths=(str(tmp_path),))
+    (finding,) = validate("m.osim", config=config).findings
+    assert "searched . and Geometry;" in finding.message
 
 
 @pytest.mark.parametrize("name", [os.devnull, "folder.vtp", "link.vtp", "Geometry"])

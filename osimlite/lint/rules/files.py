@@ -50,8 +50,12 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
         folder / "Geometry",
         *(folder / path for path in subject.config.mesh_paths),
     )
-    folder_paths = [str(path) for path in search_folders]
-    tried = join_words(dict.fromkeys(folder_paths))
+    # The settings may name the model's folder again, by another path.
+    unique_paths: dict[str, str] = {}
+    for path in search_folders:
+        unique_paths.setdefault(os.path.realpath(path), str(path))
+    folder_paths = [*unique_paths.values()]
+    tried = join_words(folder_paths)
     # A hundred meshes lie in one folder, which is listed once.
     remedy = f"name its folder {MESH_FOLDER_HINT}"
     folders = _FolderListings()
