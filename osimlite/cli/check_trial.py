@@ -78,11 +78,11 @@ def _show_verdicts(report: TrialReport) -> None:
     """Print the worst value of each quantity, grouped by file."""
     from itertools import groupby
 
-    from osimlite.cli._console import add_row, create_table, print_table, show
+    from osimlite.cli._console import add_row, create_table, print_table, say, show
 
     for file, verdicts in groupby(report.worst, key=lambda row: row.file):
         table = create_table()
-        for column in ("", "", "limits", ""):
+        for column in ("result", "value", "limits", "quantity"):
             table.add_column(
                 column, overflow="fold", justify="right" if column == "limits" else "left"
             )
@@ -91,3 +91,5 @@ def _show_verdicts(report: TrialReport) -> None:
         show(f"{file}\n")
         print_table(table)
         show("\n")
+    if report.verdicts:
+        say("Limits: up to the first number a value is good, up to the second it is okay.\n")

@@ -61,6 +61,7 @@ iframe { width: 100%; height: 600px; border: 1px solid #d7dde5; border-radius: 6
 td.number, .good, .okay, .bad { white-space: nowrap }
 td { overflow-wrap: anywhere }
 .source { color: #5a6675; font-size: 13px }
+td.source { overflow-wrap: break-word }
 .good { color: #1a7f37 } .okay { color: #9a6700 } .bad { color: #cf222e; font-weight: 600 }
 ul.note { color: #5a6675; margin: 0 0 10px; padding-left: 20px; overflow-wrap: anywhere }
 img { max-width: 100%; height: auto; display: block }
@@ -167,7 +168,8 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
         '<h2>Is it good enough?</h2><p class="note">The worst value of each kind. Good: within '
         "every published limit; okay: "
         "beyond the stricter of two limits; bad: beyond "
-        "all.</p><table><tr><th></th><th></th><th>limits</th><th></th></tr>"
+        "all. Limits: up to the first number a value is good, up to the second it is okay.</p>"
+        "<table><tr><th>result</th><th>value</th><th>limits</th><th>quantity</th></tr>"
         f"{rows}</table>{unchecked}"
     )
 

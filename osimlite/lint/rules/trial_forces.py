@@ -126,12 +126,12 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
     """A residual force is large.
 
     Checks the forces at the joint to ground, ideally zero: those of inverse dynamics, and of the
-    residual actuators of RRA, CMC and StaticOptimization. A peak of up to 10 N is good and one of
-    more than 25 N bad, a root mean square up to 5 N and more than 10 N (the table in OpenSim's best
-    practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks
-    and others advise peaks of at most 5 % of the largest external force (2015, Is my model good
-    enough?, https://doi.org/10.1115/1.4029304). A peak that is within one of both limits is okay.
-    Residuals of inverse dynamics count as an info where RRA or CMC follow.
+    residual actuators of RRA, CMC and StaticOptimization. OpenSim's best practices
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) call a peak good up
+    to 10 N and bad above 25 N, and a root mean square good up to 5 N and bad above 10 N. Hicks and
+    others advise peaks of at most 5 % of the largest external force (2015, Is my model good
+    enough?, https://doi.org/10.1115/1.4029304). A peak that exceeds one of the two limits, but not
+    both, is okay. Residuals of inverse dynamics are an info if the trial has RRA or CMC, too.
 
     Motion, masses and measured loads contradict each other. The residual force compensates for it
     instead of the muscles.
@@ -156,13 +156,12 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
 def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
     """A residual moment is large.
 
-    Checks the moments at the joint to ground, as residual-force checks the forces. A peak of up to
-    50 N m is good and one of more than 75 N m bad, a root mean square up to 30 N m and more than 50
-    N m (the table in OpenSim's best practices,
-    https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks and others
-    advise at most 1 % of the largest external force times the height of the mass centre (2015, Is
-    my model good enough?, https://doi.org/10.1115/1.4029304), which is much less: what is within
-    OpenSim's limit alone is okay.
+    Checks the moments at the joint to ground, as residual-force checks the forces. OpenSim's best
+    practices (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) call a
+    peak good up to 50 N m and bad above 75 N m, and a root mean square good up to 30 N m and bad
+    above 50 N m. Hicks and others advise at most 1 % of the largest external force times the height
+    of the mass centre (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304), which is
+    much less. A peak between this limit and OpenSim's is okay.
 
     The trunk is where most of the mass is, and its mass centre is hard to measure: the residual
     moments show that it is off, or that the loads act in another place.
@@ -200,8 +199,8 @@ def report_reserve_moment(trial: Trial, report: FindingCollector) -> None:
     this joint are too small.
 
     ```trial
-    - peak of the reserve of 'ankle_angle_r', of its joint moment: 34 %
-    + peak of the reserve of 'ankle_angle_r', of its joint moment: 2 %
+    - peak of the reserve of 'ankle_angle_r' relative to its joint moment: 34 %
+    + peak of the reserve of 'ankle_angle_r' relative to its joint moment: 2 %
     ```
     """
     advice = (
@@ -279,8 +278,8 @@ def report_passive_force(trial: Trial, report: FindingCollector) -> None:
     not; static optimization ignores them, and is wrong by them.
 
     ```trial
-    - peak of the passive force of 'rect_fem_r', of its strength: 130 %
-    + peak of the passive force of 'rect_fem_r', of its strength: 12 %
+    - peak of the passive force of 'rect_fem_r' relative to its max_isometric_force: 130 %
+    + peak of the passive force of 'rect_fem_r' relative to its max_isometric_force: 12 %
     ```
     """
     advice = (

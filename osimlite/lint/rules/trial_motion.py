@@ -33,7 +33,7 @@ SWAPPED = Threshold(
     "swapped-frames",
     2.0,
     "%",
-    "share of the frames in which two markers would fit better exchanged",
+    "share of the frames in which two markers fit better if swapped",
 )
 BEYOND = Threshold(
     "beyond-range",

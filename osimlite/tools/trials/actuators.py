@@ -203,7 +203,7 @@ def measure_reserves(
         if moment is None or reserve[row] < MIN_RESERVE_NM:
             continue
         judged_count += 1
-        subject = f"the reserve of '{name}', of its joint moment"
+        subject = f"the reserve of '{name}' relative to its joint moment"
         comparison = f"{reserve[row]:.3g} N m at {table.times[row]:g} s, the motion takes {np.abs(moment).max():.3g} N m"
         peak = 100.0 * float(reserve[row] / np.abs(moment).max())
         position = tool.folder.locate_row(file, row)
@@ -226,7 +226,7 @@ def measure_reserves(
             Measurement(
                 "reserve-moment",
                 "peak",
-                "reserves of less than 1 N m, of their joint moments",
+                "the reserves relative to their joint moments; all are below 1 N m",
                 0.0,
                 "%",
             ),

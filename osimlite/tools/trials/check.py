@@ -395,8 +395,6 @@ def _plan_results_without_setup(
     missing_classes = [tool_class for tool_class in SETUPS if tool_class not in present_classes]
     if missing_classes:
         yield (
-            "other results",
-            partial(
-                _raise_missing, MissingInput(f"there is no setup of {join_words(missing_classes)}")
-            ),
+            f"results of {join_words(missing_classes)}",
+            partial(_raise_missing, MissingInput("the trial has no such setup")),
         )

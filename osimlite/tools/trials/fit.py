@@ -110,7 +110,7 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
             np.where(np.isfinite(motion.marker_errors), motion.marker_errors, np.nan) ** 2, axis=0
         )
     )
-    worst_note = f"most of {motion.markers[int(np.nanargmax(rms_by_marker))]}, {100.0 * np.nanmax(rms_by_marker):.3g} cm"
+    worst_note = f"largest: {motion.markers[int(np.nanargmax(rms_by_marker))]}, {100.0 * np.nanmax(rms_by_marker):.3g} cm"
     yield (
         file,
         Measurement(
@@ -132,7 +132,7 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
     for first_name, second_name, frames in pairs:
         percentage = 100.0 * len(frames) / SWAP_FRAMES
         times = motion.times[frames]
-        subject = f"share of frames in which the markers '{first_name}' and '{second_name}' would fit better exchanged"
+        subject = f"share of frames in which the markers '{first_name}' and '{second_name}' fit better if swapped"
         location = f"from {times[0]:g} to {times[-1]:g} s"
         yield (
             data,
@@ -142,7 +142,11 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
         yield (
             data,
             Measurement(
-                "swapped-markers", "share", "share of frames with markers to exchange", 0.0, "%"
+                "swapped-markers",
+                "share",
+                "share of frames in which two markers fit better if swapped",
+                0.0,
+                "%",
             ),
         )
 
@@ -416,7 +420,7 @@ def measure_filter(tool: TrialTool) -> Numbers:
         yield tool.job.file, Measurement("filter-content", "change", subject, size, unit)
         motion = filtered
     if _is_from_markers(file) and (noise_share := _measure_noise(motion, start, end)) is not None:
-        subject = "noise: the power of the accelerations above 15 Hz, of all"
+        subject = "noise: the part of the power of the accelerations that is above 15 Hz"
         filter_note = (
             f"the motion is filtered at {tool.cutoff:g} Hz"
             if tool.cutoff > 0.0

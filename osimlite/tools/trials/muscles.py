@@ -49,7 +49,7 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
             reported_count += 1
             time = float(table.times[row])
             position = tool.folder.locate_time(file, time)
-            subject = f"the passive force of '{name}', of its strength"
+            subject = f"the passive force of '{name}' relative to its max_isometric_force"
             force_note = f"{column[row]:.4g} N at {time:g} s"
             yield (
                 file,
@@ -63,7 +63,7 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
             Measurement(
                 "passive-force",
                 "peak",
-                "the passive force of any muscle, of its strength",
+                "the passive force of any muscle relative to its max_isometric_force",
                 0.0,
                 "%",
             ),
