@@ -28,6 +28,7 @@ class SharedForces:
         activations: activations (t, a); NaN at times without a solution.
         strengths: force of each actuator at an activation of 1 (t, a), N or N m.
         coordinates: names of the coordinates to accelerate (m,).
+        units: units of their generalized forces (m,), N or N m.
         lacking: generalized forces (t, m) that the actuators cannot supply, N or N m; the smallest
             possible ones at times without a solution.
         solved: whether each time has a solution (t,).
@@ -38,6 +39,7 @@ class SharedForces:
     activations: Array
     strengths: Array
     coordinates: tuple[str, ...]
+    units: tuple[str, ...]
     lacking: Array
     solved: NDArray[np.bool_]
 
@@ -63,7 +65,8 @@ class SharedForces:
         sizes = np.abs(self.lacking[row])
         worst = [index for index in np.argsort(-sizes) if sizes[index] > 0.1 * sizes.max()]
         return join_words(
-            [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], max_count=3
+            [f"{self.lacking[row, k]:.4g} {self.units[k]} at {self.coordinates[k]}" for k in worst],
+            max_count=3,
         )
 
     def describe_unsolved(self) -> str:
@@ -76,7 +79,8 @@ class SharedForces:
         if not len(failed):
             return ""
         worst = failed[np.argmax(np.abs(self.lacking[failed]).max(axis=1))]
+        counts = f"{len(failed)} of {format_count(len(self.times), 'time')}"
         return (
-            f"no solution at {len(failed)} of {format_count(len(self.times), 'time')}, from {self.times[failed[0]]:g} s "
-            f"on, where nothing is written; at {self.times[worst]:g} s the actuators lack {self.describe_lack(worst)}"
+            f"no solution at {counts} (the first is {self.times[failed[0]]:g} s), where the tables have NaN; "
+            f"at {self.times[worst]:g} s the actuators lack {self.describe_lack(worst)}"
         )

@@ -119,7 +119,12 @@ class StaticOptimization:
             and not tree.find(info.path).is_free_to_satisfy_constraints
         ]
         self.names = tuple(item.name for item in self._actuators)
-        self.coordinates = tuple(mechanism.coordinates[index].name for index in self._free)
+        free_coordinates = [mechanism.coordinates[index] for index in self._free]
+        self.coordinates = tuple(coordinate.name for coordinate in free_coordinates)
+        self.units = tuple(
+            "N m" if coordinate.motion_type == "rotational" else "N"
+            for coordinate in free_coordinates
+        )
         # Fewer unknowns than equations have no solution but by chance.
         if len(self.names) < len(self.coordinates) and not underactuated:
             raise ModelError(
@@ -173,6 +178,7 @@ class StaticOptimization:
             result,
             strengths * self.optimal_forces,
             self.coordinates,
+            self.units,
             lacking,
             solved,
         )

@@ -365,9 +365,11 @@ def _average_residual_columns(times: Array, columns: tuple[str, ...], rows: Arra
 
 
 def _describe_residuals(averages: list[float]) -> str:
-    """Return average residuals in words."""
+    """Return average residuals, which are forces (FX) and moments (MX), in words."""
     return ", ".join(
-        f"{name} {value:.4g}" for name, value in zip(RESIDUALS, averages, strict=True) if value
+        f"{name} {value:.4g} {'N' if name.startswith('F') else 'N m'}"
+        for name, value in zip(RESIDUALS, averages, strict=True)
+        if value
     )
 
 

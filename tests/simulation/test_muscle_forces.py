@@ -79,8 +79,8 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     # Two newtons are all that it has.
     assert other.columns == ("reserve",)
     assert not other.solved.any() and np.isnan(other.rows).all()
-    assert "no solution at 51 of 51 times, from 0 s on" in (said := other.describe_unsolved())
-    assert "the actuators lack 19.61 at y" in said
+    assert "no solution at 51 of 51 times (the first is 0 s)" in (said := other.describe_unsolved())
+    assert "the actuators lack 19.61 N at y" in said
     with pytest.warns(DeprecatedWarning, match="use describe_unsolved"):
         assert other.unsolved() == said
     off = lift(30.0, 10.0)
