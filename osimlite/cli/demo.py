@@ -325,8 +325,8 @@ def _describe_fall(motion: Trajectory) -> str:
     largest_difference = compute_distance_to_opensim(motion)
     return (
         f"Released at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee touches the ground. It falls in "
-        "the same way in OpenSim: no coordinate differs from OpenSim's most accurate motion by more than "
-        f"{largest_difference:.1e} rad or m."
+        "the same way in OpenSim: every coordinate stays within "
+        f"{largest_difference:.1e} rad or m of the motion that OpenSim computes at a tight accuracy."
     )
 
 

@@ -301,7 +301,7 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
         facts.add("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
         facts.add(
             "fixed point",
-            f"to {cycle.residual:.2g} after {format_count(cycle.iterations, 'step')} of Newton",
+            f"residual {cycle.residual:.2g} after {format_count(cycle.iterations, 'Newton step')}",
         )
     for neighbourhood in result.nearby:
         facts.add(

@@ -39,8 +39,8 @@ def modify(
         Option(
             "--from",
             metavar="PROGRAM",
-            help="'nimble': the model was made for nimblephysics (AddBiomechanics, SKEL, BioAMASS); write one whose "
-            "bodies move in OpenSim as they do there.",
+            help="'nimble': the model was made for nimblephysics (AddBiomechanics, SKEL, BioAMASS). Rewrite it so that "
+            "its bodies move in OpenSim as in nimblephysics.",
             show_default=False,
         ),
     ] = None,

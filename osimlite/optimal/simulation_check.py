@@ -51,8 +51,8 @@ class SimulationCheck:
         at_end = {path: float(column[-1]) for path, column in self.apart.items()}
         worst_path = max(at_end, key=lambda path: at_end[path])
         return (
-            f"within {MATCH_TOLERANCE:g} rad or m of it up to {self.matches_until:.4g} s of {self.times[-1]:.4g} s, "
-            f"{at_end[worst_path]:.2g} off at the end ({worst_path.rpartition('/')[2]})"
+            f"within {MATCH_TOLERANCE:g} rad or m of the solution until {self.matches_until:.4g} s of {self.times[-1]:.4g} s; "
+            f"at the end {worst_path.rpartition('/')[2]} differs by {at_end[worst_path]:.2g}"
         )
 
 

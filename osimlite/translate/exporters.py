@@ -129,7 +129,7 @@ URDF_CHOICES = (
     OptionSpec(
         "effort",
         float | None,
-        "Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
+        "Effort limit (N, N m) of joints whose actuators set no limit.",
         shown="no limit",
         group="URDF",
     ),
@@ -162,7 +162,7 @@ MJCF_CHOICES = (
     OptionSpec(
         "spline",
         str | None,
-        "Joints that follow splines: a 'quartic', or 'series', a quartic of a quartic.",
+        "Fit of joints that follow splines: one 'quartic', or a 'series' of two, the second applied to the first.",
         shown="series",
         group="MJCF",
     ),

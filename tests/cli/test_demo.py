@@ -32,7 +32,7 @@ def test_the_whole_tour(tmp_path: Path) -> None:
     assert "did you mean 'RFootContact'?" in done.out
     assert max(map(len, done.out.splitlines())) <= 80
     said = " ".join(done.out.split())
-    difference = re.search(r"most accurate motion by more than (\S+) rad", said)
+    difference = re.search(r"every coordinate stays within (\S+) rad or m of the motion", said)
     assert difference is not None and float(difference[1]) < 1e-4
     if by_bullet:
         apart = re.search(

@@ -50,7 +50,7 @@ def test_files_that_are_no_motion_are_named_for_what_they_are(
     for words, said in (
         (
             (walker, "m.trc"),
-            "m.trc: these are markers over time (.trc); a storage file is needed here (.sto, .mot)",
+            "m.trc: these are markers over time (.trc), but a storage file is needed here (.sto, .mot)",
         ),
         ((walker, "m.csv"), "m.csv: this is not a storage file (.sto, .mot)"),
         ((walker, walker), "this is XML, and no storage file"),

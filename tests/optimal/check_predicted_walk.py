@@ -115,7 +115,7 @@ def test_a_report_shows_what_was_found(walk):
     told = dict(outcome.messages)
     assert {"effort", "roughness", "objective"} <= {*told}
     near = re.fullmatch(
-        r"within 0\.01 rad or m of it up to (\S+) s of (\S+) s, (\S+) off at the end \(\w+\)",
+        r"within 0\.01 rad or m of the solution until (\S+) s of (\S+) s; at the end \w+ differs by \S+",
         told["simulated"],
     )
     assert near is not None

@@ -127,8 +127,8 @@ def _make_format_error(beginning: bytes) -> str:
     """Why a file without a line 'endheader' cannot be taken, by what it begins with."""
     if beginning.startswith(b"PathFileType"):
         return (
-            "these are markers over time (.trc); a storage file is needed here (.sto, .mot): inverse kinematics makes "
-            "coordinates of markers"
+            "these are markers over time (.trc), but a storage file is needed here (.sto, .mot); 'osimlite ik' computes "
+            "coordinates from markers"
         )
     if beginning.startswith(b"<"):
         return (

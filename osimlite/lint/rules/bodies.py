@@ -235,8 +235,8 @@ def _describe_closest(body: Body) -> str:
     # Each product stands in the matrix twice.
     distance, size = (math.hypot(*matrix, *matrix[3:]) for matrix in (differences, body.inertia))
     return (
-        f"; the closest possible one, {' '.join(f'{number:.4g}' for number in nearest)}, is "
-        f"{format_quantity(distance, 'kg m^2')} ({100 * distance / size:.2g} % of it) away"
+        f"; the closest possible inertia is {' '.join(f'{number:.4g}' for number in nearest)}, a "
+        f"change by {100 * distance / size:.2g} %"
     )
 
 

@@ -60,7 +60,7 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
             report(
                 f"{describe_object(muscle)} does not start in equilibrium: its fiber length is "
                 f"{length:.3g} optimal lengths (in equilibrium {settled:.3g}), its tendon force "
-                f"{tension:.3g} of max_isometric_force (in equilibrium {settled_tension:.3g})",
+                f"{tension:.3g} times max_isometric_force (in equilibrium {settled_tension:.3g})",
                 muscle,
                 tag="default_fiber_length" if hasattr(muscle, "default_fiber_length") else None,
             )

@@ -174,8 +174,8 @@ MADE_UP = Threshold(
 RATE = Threshold(
     "resting-point",
     0.005,
-    "m per rad or m",
-    "largest accepted rate at which OpenSim lets a point move beyond the range of its coordinate",
+    "m/rad, or m/m",
+    "largest accepted motion of a path point per coordinate at an end of the range, where OpenSim stops the point",
 )
 
 
@@ -235,8 +235,8 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
             )
         else:
             report(
-                f"{names} stays in place outside the range of '{end.coordinate}', but OpenSim "
-                "computes path speeds and moment arms as if it still moved, by "
+                f"OpenSim stops {names} at the ends of the range of '{end.coordinate}', but beyond "
+                "them it computes path speeds and moment arms as if the point moved on, by "
                 f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}; add a "
                 "CoordinateLimitForce",
                 owner,

@@ -19,8 +19,8 @@ PENNATION = Threshold(
     "rad",
     "fibers with a larger pennation angle cannot pull on the tendon",
 )
-SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fiber starts shorter")
-LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber starts longer")
+SHORTEST = Threshold("shortest-fiber", 0.2, "optimal lengths", "smallest plausible fiber length")
+LONGEST = Threshold("longest-fiber", 2.0, "optimal lengths", "largest plausible fiber length")
 
 
 @rule("OSIM621", "doubtful-muscle", severity=WARNING, thresholds=(PENNATION, SHORTEST, LONGEST))
@@ -147,8 +147,8 @@ def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
             )
         elif (ratio := (length - slack) / optimal) > longest:
             report(
-                f"{length_text}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack "
-                "tendon",
+                f"{length_text}: even with a slack tendon its fibers need {ratio:.3g} optimal fiber "
+                "lengths",
                 muscle,
                 tag="optimal_fiber_length",
             )

@@ -113,8 +113,9 @@ def read_external_loads(
         file = None
     elif Path(source).suffix.lower() in TABLES:
         # A table alone does not say where forces act.
-        message = "this table does not name the bodies on which its forces act: name it in a document of ExternalLoads"
-        raise DocumentError(f"{message}, or use --applied-to", file=str(source))
+        message = "this table does not name the bodies on which its forces act"
+        next_step = "add --applied-to, or use a file of ExternalLoads that names this table"
+        raise DocumentError(f"{message}: {next_step}", file=str(source))
     else:
         loads = read_object(source, ExternalLoads)
         folder = Path(source).parent

@@ -119,7 +119,7 @@ def _add_follower(
         helper = add_helper(draft, driver.coordinate, inner)
         assert helper is not None
         follower = Follower(helper.joint, compose_with_line(helper.line, outer))
-        replacement = "a quartic of a quartic, fitted"
+        replacement = "two quartics in series, fitted"
         # The error is measured between the points of the fit as well.
         x = np.linspace(lower, upper, 400)
         fit = PolynomialFit(

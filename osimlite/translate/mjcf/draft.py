@@ -38,7 +38,7 @@ Contact = Literal["native", "none"]
 Fit = Literal["none", "wraps", "force"]
 """What is fitted to the model: nothing, wrap geoms of tendons, or also the forces of muscles."""
 Spline = Literal["quartic", "series"]
-"""Form of fitted functions: a quartic, or a quartic of a quartic."""
+"""Form of fitted functions: a quartic, or two in series (one applied to the result of the other)."""
 Value = str | bool | int | float | Sequence[float] | Array | None
 """Value of an attribute; None leaves the attribute out."""
 C = TypeVar("C", bound=Component)

@@ -102,7 +102,7 @@ def add_paths(draft: MjcfDraft) -> None:
         errors = _measure_errors(draft, tendon, test_poses, test_samples[path])
         # Exact tendons need no record.
         if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):
-            approximation = "the nearest tendon that its own points and surfaces make"
+            approximation = "the best tendon through its points and around its surfaces"
             replacement = f"{approximation}, fitted" if fits else approximation
             draft.fidelity.add(
                 "path",
