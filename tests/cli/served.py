@@ -35,6 +35,14 @@ def load() -> None:
             with suppress(ImportError):
                 for module in [line.module] if isinstance(line, ast.ImportFrom) else []:
                     import_module(module or "")
+    # Pictures need these, and the list of fonts that Matplotlib makes anew for each empty cache.
+    for module in (
+        "matplotlib.figure",
+        "matplotlib.backends.backend_agg",
+        "matplotlib.font_manager",
+    ):
+        with suppress(ImportError):
+            import_module(module)
 
 
 def keep_quiet() -> None:

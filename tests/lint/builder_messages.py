@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,6 +49,7 @@ class Message(NamedTuple):
         return re.search(".*?".join(parts), message, re.DOTALL) is not None
 
 
+@cache
 def read_messages() -> list[Message]:
     """Return every message, sorted by module."""
     files: list[Path] = []

@@ -17,7 +17,7 @@ from tests.mechanics.codegen.node import call_javascript, needs_node
 from tests.mechanics.codegen.random_functions import make_function, make_inputs
 from tests.suite import choose
 
-SEEDS = range(1, 1 + choose(20, 200))
+SEEDS = range(1, 1 + choose(12, 200))
 INPUTS = 12
 
 
