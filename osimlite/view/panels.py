@@ -391,7 +391,7 @@ def _select_cycles(curve: PanelCurve) -> list[tuple[float, float]]:
 def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
     """Yield the rows of each page.
 
-    A group stays in one row where it fits in one.
+    A group stays in one row where it fits in one and that costs no further row.
     """
     count = len(panels)
     # Four panels are two rows of two.
@@ -400,6 +400,9 @@ def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
     for panel in panels:
         groups.setdefault(panel.group, []).append(panel)
     rows = _fill_rows(groups.values(), width)
+    if len(rows) > ceil(count / width):
+        # Pairs in rows of three would leave the last column empty; each panel names its group.
+        rows = [list(panels[first : first + width]) for first in range(0, count, width)]
     height = MAX_PANELS // MAX_COLUMNS
     pages = ceil(len(rows) / height)
     for first in range(0, len(rows), size := ceil(len(rows) / max(1, pages)) or 1):
