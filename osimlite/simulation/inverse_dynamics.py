@@ -27,6 +27,9 @@ from osimlite.simulation.recorded_motion import (
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads
 
+FORCE_UNITS = {"rad": "N·m", "m": "N"}
+"""Units of generalized forces by the units of their coordinates."""
+
 
 @dataclass(frozen=True, eq=False)
 class GeneralizedForces(StoTable):
@@ -37,6 +40,14 @@ class GeneralizedForces(StoTable):
     """
 
     motion: RecordedMotion | None = field(default=None, repr=False)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the columns; that of a coupled coordinate is unknown, and without a motion those of forces."""
+        coordinates = self.motion.mechanism.coordinates if self.motion is not None else ()
+        units = {f"{info.name}_force": FORCE_UNITS.get(info.unit, "") for info in coordinates}
+        units |= {name: "N·m" for name in self.columns if name.endswith("_moment")}
+        return {name: unit for name in self.columns if (unit := units.get(name))}
 
 
 def kinematics(

@@ -75,6 +75,9 @@ def test_results_are_tables_of_other_libraries() -> None:
         "y_force"
     ][-1]
     assert table.motion is not None and table.motion.values[:, 4].tolist() == TIMES.tolist()
+    # A free joint: three angles and three positions.
+    assert {table.units[name] for name in table.columns if name.endswith("_moment")} == {"N·m"}
+    assert table.units["y_force"] == frame.attrs["units"]["y_force"] == "N"
     followed: Any = osimlite.kinematics(model, {"y": TIMES}, times=TIMES)
     assert followed.to_frame()["y"].tolist() == TIMES.tolist()
     assert followed.to_xarray()["value"].sel(coordinate="y").values.tolist() == TIMES.tolist()
