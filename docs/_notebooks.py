@@ -1,7 +1,8 @@
 """The notebooks of the manual as pages with all that they show: executed when the site is built.
 
 A hook of MkDocs. Outputs are put into the pages when these are HTML already: nothing in them is
-Markdown. The environment variable ``OSIMLITE_MANUAL=quick`` builds the site without executing
+Markdown. An executed notebook is cached until it, osimlite, an installed package or a model that it
+needs changes. The environment variable ``OSIMLITE_MANUAL=quick`` builds the site without executing
 anything, for the checks of every push.
 """
 
@@ -10,10 +11,14 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 import sysconfig
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from hashlib import sha256
 from html import escape
+from importlib.metadata import distributions
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,10 +29,15 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+from osimlite.base.writing import user_cache_folder, write_cached
+
 FOLDER = Path(__file__).parent / "notebooks"
 SHARED = Path(os.environ.get("OSIMLITE_SHARED") or Path(__file__).parents[2] / "shared")
 MODELS = (FOLDER, SHARED / "corpus" / "models" / "m0014")
 """Where the models that notebooks need are looked for."""
+
+PACKAGE = Path(__file__).parents[1] / "osimlite"
+"""Sources of osimlite."""
 
 KERNELS = 2
 """How many notebooks are executed at a time."""
@@ -44,7 +54,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     notebooks = sorted(FOLDER.glob("*.ipynb"))
     with ThreadPoolExecutor(KERNELS) as pool:
         for path, notebook in zip(
-            notebooks, pool.map(executed if EXECUTE else read, notebooks), strict=True
+            notebooks, pool.map(execute_once if EXECUTE else read, notebooks), strict=True
         ):
             text = "\n\n".join(parts(path, notebook))
             files.append(File.generated(config, f"notebooks/{path.stem}.md", content=text))
@@ -66,6 +76,45 @@ def on_page_content(html: str, **_: Any) -> str:
 def read(path: Path) -> Any:
     """Read a notebook."""
     return nbformat.read(path, as_version=4)
+
+
+def execute_once(path: Path) -> Any:
+    """A notebook with its outputs from the cache, or executed."""
+    folder = user_cache_folder()
+    if folder is None:
+        return executed(path)
+    cached = folder / f"notebook-{compute_key(path)}.ipynb"
+    if cached.exists():
+        # Entries that were used are kept longest.
+        cached.touch()
+        return read(cached)
+    notebook = executed(path)
+    write_cached(cached, nbformat.writes(notebook))
+    return notebook
+
+
+def compute_key(path: Path) -> str:
+    """Return a name of all that the outputs of a notebook depend on."""
+    key = sha256(path.read_bytes())
+    for name in read(path).metadata.get("needs", []):
+        for folder in MODELS:
+            if (folder / name).exists():
+                key.update((folder / name).read_bytes())
+    key.update(list_sources().encode())
+    return key.hexdigest()[:32]
+
+
+@cache
+def list_sources() -> str:
+    """Return the versions of all packages, and digests of the files of osimlite."""
+    versions = sorted(f"{each.name} {each.version}" for each in distributions())
+    files = sorted(
+        file
+        for file in PACKAGE.rglob("*")
+        if file.is_file() and file.suffix != ".so" and "__pycache__" not in file.parts
+    )
+    digests = [f"{file} {sha256(file.read_bytes()).hexdigest()}" for file in files]
+    return "\n".join([sys.version, *versions, *digests])
 
 
 def executed(path: Path) -> Any:

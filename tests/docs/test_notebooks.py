@@ -6,6 +6,7 @@ import re
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,3 +52,35 @@ def test_it_runs(name: str) -> None:
     text = "\n\n".join(notebooks.parts(path, notebook))
     shown = notebooks.on_page_content(re.sub(r"^output .*$", r"<p>\g<0></p>", text, flags=re.M))
     assert all(words in shown for words in SHOWN[name]) and "<p>output" not in shown
+
+
+def test_an_executed_notebook_is_cached_until_something_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nbformat, notebooks = import_module("nbformat"), import_module("docs._notebooks")
+    runs: list[Path] = []
+
+    def execute(path: Path) -> Any:
+        runs.append(path)
+        notebook = notebooks.read(path)
+        notebook.cells[0].outputs = [nbformat.v4.new_output("stream", text=f"run {len(runs)}")]
+        return notebook
+
+    def write(source: str) -> None:
+        cells = [nbformat.v4.new_code_cell(source, id="first")]
+        nbformat.write(nbformat.v4.new_notebook(cells=cells), path)
+
+    def read_output() -> str:
+        return str(notebooks.execute_once(path).cells[0].outputs[0].text)
+
+    path = tmp_path / "a.ipynb"
+    monkeypatch.setattr(notebooks, "executed", execute)
+    monkeypatch.setattr(notebooks, "user_cache_folder", lambda: tmp_path / "cache")
+    write("1")
+    assert [read_output(), read_output()] == ["run 1", "run 1"]
+    write("2")
+    assert read_output() == "run 2"
+    monkeypatch.setattr(notebooks, "list_sources", lambda: "another version of osimlite")
+    assert [read_output(), read_output()] == ["run 3", "run 3"]
+    monkeypatch.setattr(notebooks, "user_cache_folder", lambda: None)
+    assert [read_output(), read_output()] == ["run 4", "run 5"]
