@@ -61,6 +61,7 @@ COMMANDS = {
     "build": "build human -o built.osim",
     "validate": "validate many",
     "format": "format many --check",
+    "rule": "rule OSIM421",
     "upgrade": "upgrade model.osim -o upgraded.osim",
     "diff": "diff model.osim human.osim",
     "info": "info model.osim",
@@ -69,9 +70,13 @@ COMMANDS = {
     "convert": "convert model.osim --motion long.mot -o film.glb",
     "convert, screenshot": "convert model.osim --motion long.mot -o picture.png",
     "view --screenshot": "view model.osim long.mot --screenshot view.png",
+    "view --html": "view model.osim long.mot --html view.html",
     "simulate": "simulate jumper.osim --to 60 -o simulated",
     "simulate --plot": "simulate jumper.osim --to 1 --plot -o drawn",
+    "simulate --animate": "simulate jumper.osim --to 1 --animate -o drawn",
     "sweep": "sweep walker.osim --vary LHip_rz=-10deg:10deg --samples 4000 -o sweep.parquet",
+    "sweep --plot": "sweep walker.osim --vary LHip_rz=-10deg:10deg --samples 1000 --plot"
+    " -o sweep.parquet",
     "optimize": "optimize walker.osim --objective distance --vary LHip_rz=-20deg:20deg"
     " --vary RHip_rz=-20deg:20deg",
     "gait": "gait steady-walker --perturb 0.05 --basin -o gait",
@@ -81,9 +86,11 @@ COMMANDS = {
     "scale": "scale model.osim long.trc --mass 72 --place -o scaled.osim",
     "fit": "fit model.osim long.trc -o fitted",
     "ik": "ik model.osim long.trc -o ik",
+    "ik --plot": "ik model.osim long.trc --plot -o ik",
     "kinematics": "kinematics model.osim long.mot --trc -o kinematics",
     "inverse-dynamics": "inverse-dynamics model.osim long.mot -o moments",
     "static-optimization": "static-optimization model.osim long.mot --forces reserves.xml -o forces",
+    "static-optimization --plot": "static-optimization model.osim long.mot --plot -o so",
     "run, scaling": "run scale.xml -o run",
     "run, IK": "run ik_long.xml -o run",
     "run, ID": "run id_long.xml -o run",
@@ -92,6 +99,7 @@ COMMANDS = {
     "run, RRA": "run rra.xml -o run",
     "run, CMC": "run cmc.xml -o run",
     "run, Moco": "run walks.omoco -o run",
+    "run --report": "run so_long.xml -o run --report report.html",
     "check-trial": "check-trial .",
     "scone": "scone human-walks",
     "doctor": "doctor",
@@ -127,6 +135,7 @@ def record_command(
     columns: int = COLUMNS,
     clone: Path = ROOT,
     moments: Sequence[float] = MOMENTS_S,
+    height: int = LINES,
 ) -> Recording:
     """Run osimlite at an emulated terminal, read its screen at some times, and send Ctrl-C.
 
@@ -136,6 +145,7 @@ def record_command(
         columns: width of the terminal.
         clone: clone of the repository whose osimlite runs.
         moments: times at which the screen is read, s; the last one is that of Ctrl-C.
+        height: height of the terminal.
     """
     started = time.monotonic()
     child, terminal = pty.fork()
@@ -146,8 +156,8 @@ def record_command(
         environment = {**os.environ, "TERM": "xterm-256color", "PYTHONPATH": str(clone)}
         environment.pop("COLUMNS", None)
         os.execve(sys.executable, [sys.executable, "-m", "osimlite", *arguments], environment)
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", LINES, columns, 0, 0))
-    screen = pyte.Screen(columns, LINES)
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", height, columns, 0, 0))
+    screen = pyte.Screen(columns, height)
     stream = pyte.ByteStream(screen)
     recording = Recording()
     clock = _make_clock(child, started)
