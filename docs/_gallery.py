@@ -19,6 +19,8 @@ from tempfile import TemporaryDirectory
 
 PAGE = Path(__file__).with_name("gallery.md")
 FOLDER = PAGE.parent / "gallery"
+COMPARED = "Before and after\n"
+"""Heading of the part with pictures of an earlier version."""
 MAX_WIDTH = 900
 """Largest width of a picture, pixels."""
 COLORS = 128
@@ -26,8 +28,12 @@ COLORS = 128
 
 
 def sections(text: str) -> list[str]:
-    """Return the parts of the page, each of which makes its picture in a folder of its own."""
-    return re.split(r"^## ", text, flags=re.M)[1:]
+    """Return the parts of the page, each of which makes its picture in a folder of its own.
+
+    The part "Before and after" is made by `docs/_compare.py`.
+    """
+    parts = re.split(r"^## ", text, flags=re.M)[1:]
+    return [part for part in parts if not part.startswith(COMPARED)]
 
 
 def name_of(section: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -41,6 +42,30 @@ def test_every_picture_is_in_the_repository_and_small() -> None:
     for name in names:
         picture = (gallery.FOLDER / name).read_bytes()
         assert picture.startswith(PNG) and len(picture) < 150_000
+
+
+def test_every_comparison_has_a_picture_of_before_and_one_of_after() -> None:
+    compare = pytest.importorskip("docs._compare", reason="needs pyte (extra 'dev')")
+    shown = re.findall(
+        r"\]\(gallery/(before|after)/([\w-]+)\.webp\)", gallery.PAGE.read_text("utf-8")
+    )
+    # Each picture of before stands above that of after.
+    assert shown == [(when, name) for name in compare.DRAW for when in ("before", "after")]
+    files = {path.relative_to(gallery.FOLDER) for path in gallery.FOLDER.rglob("*.webp")}
+    assert files == {Path(when, f"{name}.webp") for when, name in shown}
+    sizes = [(gallery.FOLDER / file).stat().st_size for file in files]
+    assert max(sizes) < 150_000 and sum(sizes) < 1_500_000
+
+
+def test_a_comparison_runs_the_editor_and_a_terminal(tmp_path: Path) -> None:
+    compare = pytest.importorskip("docs._compare", reason="needs pyte (extra 'dev')")
+    pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
+    lines = [*compare.talk_to_server(compare.ROOT, tmp_path)]
+    start = lines.index("$ quick fixes with the cursor at the start")
+    assert lines[start + 1] == "  Change to '/bodyset/rod' (look at the result)"
+    assert any(line.startswith("  exit code 130") for line in lines)
+    screen = compare.read_screen(compare.ROOT, tmp_path, ["rule", "OSIM301"])
+    assert "OSIM301" in screen[0] and max(map(len, screen)) <= 80
 
 
 def test_pictures_are_shrunk() -> None:
