@@ -18,7 +18,7 @@ Vary = Annotated[
         "--vary",
         metavar="NAME=RANGE",
         help="NAME: a coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY, or a parameter of the model "
-        "function or controller (default: all of these). RANGE: LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. "
+        "function or controller (default: all of these parameters). RANGE: LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. "
         "Wildcards, factors, and controls that change over time: docs/sweeps.md.",
         show_default=False,
     ),

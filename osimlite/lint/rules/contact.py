@@ -23,10 +23,11 @@ from osimlite.schema.tree import Use
 def report_contact_without_partner(subject: Subject, report: FindingCollector) -> None:
     """A contact force has no pair of surfaces that can touch.
 
-    Reports contact forces that list no contact geometry, or only one, over all their parameter
-    sets; and forces whose surfaces cannot touch: all are on one body, or have shapes between which
-    OpenSim computes no contact. A HuntCrossleyForce acts between spheres, ellipsoids, and these and
-    a half-space; an ElasticFoundationForce between a mesh and a mesh, a sphere or a half-space.
+    Reports contact forces whose parameter sets together list fewer than two contact geometries;
+    and forces whose surfaces cannot touch: all are on one body, or have shapes between which
+    OpenSim computes no contact. A HuntCrossleyForce acts between two surfaces that are spheres,
+    ellipsoids or half-spaces, but not between two half-spaces. An ElasticFoundationForce acts
+    between a mesh and another mesh, a sphere or a half-space.
 
     Such a force never acts, and OpenSim gives no message.
 

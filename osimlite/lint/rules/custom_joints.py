@@ -162,7 +162,7 @@ def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
 def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """A coordinate of a custom joint moves nothing.
 
-    Reports coordinates that no axis uses, or that only functions use which do not change with them
+    Reports coordinates that no axis uses, and coordinates whose functions do not change with them
     in the default pose: constant functions, functions with the weight 0, or functions of one
     variable that read another coordinate.
 

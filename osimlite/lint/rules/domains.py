@@ -134,8 +134,8 @@ def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """A number makes OpenSim fail or compute NaN.
 
     Reports values outside their domain that OpenSim is known to reject or to compute wrong results
-    with: contact stiffness 0, a negative mass, a limit without transition, or with one that is lost
-    in the rounding of the limit.
+    with: contact stiffness 0, a negative mass, a limit whose transition is 0, or so small that
+    adding it does not change the limit.
 
     OpenSim gives no message for most of them. A contact stiffness of 0 gives 0/0 as soon as the
     surfaces touch.
@@ -182,9 +182,9 @@ def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
     """A number is outside the sensible range of its property.
 
     Reports numbers outside the domain that the property declares: a negative radius or dissipation,
-    an opacity of 3; numbers of 1e20 and more; and positive sizes of 1e-20 and less. From 1e100, and
-    up to 1e-100, it is an error. Of damped Millard muscles, optimal fiber lengths below 1e-6 m are
-    reported, and are an error up to 3e-8 m.
+    an opacity of 3. Also reports numbers of 1e20 and more (1e100 and more are an error), positive
+    sizes of 1e-20 and less (1e-100 and less are an error), and optimal fiber lengths of damped
+    Millard muscles below 1e-6 m (3e-8 m and less are an error).
 
     OpenSim computes with it anyway: a negative dissipation adds energy in each impact, and a sphere
     with a negative radius touches nothing. Powers of numbers beyond 1e100 are infinite: OpenSim

@@ -113,10 +113,10 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
 def report_included_file(subject: Subject, report: FindingCollector) -> None:
     """An object is stored in another file.
 
-    Reports `file=` on an object: for information, as a warning if that file does not exist, does
+    Reports `file=` on an object, for information. It is a warning if that file does not exist, does
     not contain the object, is not an ordinary file (a pipe, a device) or is larger than the setting
-    `largest-file` allows, and as an error if the element itself has content, or if another
-    component refers to an object that has no name without its file.
+    `largest-file` allows. It is an error if the element itself has content, or if the file cannot
+    be read and another component refers to the object.
 
     OpenSim reads the object from the other file, and rewrites that file when it saves the model; if
     the file is missing, it continues with an empty object. It ignores the content of an element

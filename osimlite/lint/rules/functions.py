@@ -196,10 +196,10 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
 def report_coefficient_count(subject: Subject, report: FindingCollector) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
-    Reports linear functions without coefficients (an error), polynomials of several variables whose
-    number does not match their dimension and order (an error), and linear functions on the axis of
-    a joint or of a coordinate coupler that have fewer (an error) or more than one per coordinate
-    and a constant. More than one coefficient for no coordinate is an error too.
+    Reports linear functions without coefficients (an error), and polynomials of several variables
+    whose number of coefficients does not match their dimension and order (an error). A linear
+    function of a joint axis or a coordinate coupler needs one coefficient for each coordinate, and
+    a constant. Fewer are an error, more are a warning (an error if there is no coordinate).
 
     OpenSim crashes on an empty list of a linear function, and fails when it needs the value of such
     a polynomial. Where the constant of a linear function is missing, it reads beyond the end of the

@@ -70,12 +70,12 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
 def report_fiber_limit(subject: Subject, report: FindingCollector) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
-    Reports muscles whose fibers in equilibrium, fully active, are as short as pennation
-    (`maximum_pennation_angle`) or the curve of active force lets them be where the path is
-    shortest; those whose fibers at rest are longer than 2 optimal lengths where it is longest; and
-    muscles that have no equilibrium in one of these poses. The poses are the default pose and five
-    values of each coordinate in the middle half of its range, with the others at their defaults: at
-    the ends of wide ranges most muscles reach a limit.
+    Reports three kinds of muscles. In the pose with the shortest path, their fully active fibers
+    reach the minimum length that pennation (`maximum_pennation_angle`) or the curve of active force
+    allows. In the pose with the longest path, their fibers at rest are longer than 2 optimal
+    lengths. Or they have no equilibrium in one of these poses. The poses are the default pose and
+    five values of each coordinate in the middle half of its range, with the others at their
+    defaults: at the ends of wide ranges most muscles reach a limit.
 
     A muscle whose fibers cannot shorten further has a slack tendon and no force, whatever its
     activation. Real fibers tear beyond twice their length. The lengths may belong to another

@@ -76,8 +76,9 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     Reports white space, `/`, `\`, `*` and `+` in the names of components.
 
     Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
-    removes white space from the names, but from references to them only at their ends: it refuses
-    the file unless only groups and controllers use a name with white space inside.
+    removes all white space from names, but keeps that in the middle of references. A reference to a
+    name with white space in its middle then leads nowhere: OpenSim rejects the file, unless only
+    groups and controllers have such references.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

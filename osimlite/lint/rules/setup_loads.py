@@ -134,9 +134,9 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
 
     Poses the model along the motion of the tool, and checks where measured forces act: no part of a
     foot or a hand is more than 40 cm from the origin, the mass centre, the joints, the markers and
-    the contact surfaces of its body, even if foot and shank are one body. Where a force is
-    expressed in a body, the rule checks whether its components point up more as they are than
-    rotated with that body. Torques are compared with the moment of the force at 40 cm, and the sum
+    the contact surfaces of its body, even if foot and shank are one body. For a force
+    that is expressed in a body, the rule checks in which frame its components point up more: in
+    ground (then the frame is wrong), or in that body. Torques are compared with the moment of the force at 40 cm, and the sum
     of all forces must point up if it is at least half the weight of the model.
 
     OpenSim applies the force where the setup says: joint moments are wrong by the force times that

@@ -28,8 +28,9 @@ def find_marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
 def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
     """A marker that a tool fits is not in the data.
 
-    Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the
-    data, and for pairs in each averaged row. It is an error if no marker is in both model and data.
+    Looks up each marker of the tasks, and of the pairs that measure lengths, among the labels of
+    the data. Markers of pairs must also be visible in every row over which a length is averaged. It
+    is an error if no marker is in both model and data.
     Also checks whether the markers are enough to determine the coordinates of the model.
 
     OpenSim ignores the marker without a message; with no common marker it crashes. It ignores a

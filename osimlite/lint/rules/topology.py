@@ -30,8 +30,8 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     Reports bodies that no chain of joints connects to ground.
 
     OpenSim adds a free joint to ground, and the body falls freely (a warning). If it has no mass,
-    OpenSim rejects the model; it also rejects the model, or crashes, if an offset frame or a joint
-    is on a body before the last such joint in the tree.
+    OpenSim rejects the model. It also rejects the model, or crashes, if an offset frame or a joint
+    is on a body that comes before the last added joint in the tree.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>

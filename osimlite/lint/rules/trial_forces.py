@@ -221,9 +221,10 @@ def report_reserve_moment(trial: Trial, report: FindingCollector) -> None:
 def report_tracking_error(trial: Trial, report: FindingCollector) -> None:
     """RRA or CMC does not follow its motion.
 
-    Checks the errors that both tools write (`_pErr.sto`): up to 2 degrees or 2 cm are good, more
-    than 5 are bad, of the root mean square of a translation more than 4 cm (the table in OpenSim's
-    best practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686).
+    Checks the errors that both tools write (`_pErr.sto`). OpenSim's best practices
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) call errors good up
+    to 2 degrees or 2 cm, and bad above 5 degrees or 5 cm. A root mean square of translations is bad
+    above 4 cm.
 
     The motion whose forces are computed is not that of the subject.
 
@@ -275,7 +276,7 @@ def report_passive_force(trial: Trial, report: FindingCollector) -> None:
     them and give no limit: this limit is osimlite's.
 
     Passive forces are not controlled. Antagonists must pull against them, which real muscles do
-    not; static optimization ignores them, and is wrong by them.
+    not. Static optimization ignores passive forces, so the forces that it computes are wrong.
 
     ```trial
     - peak of the passive force of 'rect_fem_r' relative to its max_isometric_force: 130 %

@@ -15,9 +15,9 @@ from osimlite.schema.specs import FieldSpec
 def report_newer_class(subject: Subject, report: FindingCollector) -> None:
     """A class or a property is newer than the target version of OpenSim.
 
-    Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the
-    version that the setting `target-version`, or the option `--target-version`, names: one of 4.0
-    to 4.6. Reports the first version that has them, and the earlier name of a property. Properties
+    Reports classes and properties that were added to OpenSim after the target version, with the
+    first version that has them and the earlier name of a property. The target version is 4.6, or
+    what the setting `target-version` or the option `--target-version` says (4.0 to 4.6). Properties
     with their default value are reported for information, and so is a format number that is too
     new: no version of OpenSim rejects a file for it.
 

@@ -79,8 +79,9 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
 
     The path never wraps around the surface; where the range ends before it begins, OpenSim also
     ignores all later wraps of the path. With a range beyond the last point it fails when it
-    computes a length, and its message names no wrap; only in poses where an earlier wrap has none
-    of its conditional points it does not fail. Points count from 1, and -1 stands for either end.
+    computes a length, and its message names no wrap. (It does not fail in poses in which no
+    conditional point of an earlier wrap is active.) Points count from 1, and -1 stands for either
+    end.
 
     ```xml
     - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
