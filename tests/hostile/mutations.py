@@ -1,6 +1,6 @@
 """Damage files at random, run a command on each, and look for crashes, hangs and changed files.
 
-One process serves all commands of a kind and is started anew when it dies or hangs, so that
+One process serves all commands and is started anew when it dies or hangs, so that
 thousands of commands take minutes. `python -m tests.hostile.mutations 500 [--seed 7] [.mot ...]`
 prints the table of all kinds, or of those that are named.
 """
@@ -8,7 +8,6 @@ prints the table of all kinds, or of those that are named.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import hashlib
 import json
 import os
@@ -43,9 +42,9 @@ WALL_SECONDS = 240.0
 SERVER = """
 import contextlib, io, json, os, resource, sys, time, traceback
 from osimlite.cli import main
-os.chdir(sys.argv[1])
 for line in sys.stdin:
-    order = json.loads(line)
+    folder, order = json.loads(line)
+    os.chdir(folder)
     begin, out, code = time.process_time(), io.StringIO(), None
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
@@ -218,19 +217,19 @@ def damage(data: bytes, rng: random.Random) -> bytes:
 
 
 class Server:
-    """A process that runs commands in one folder, and is started anew after a crash or a hang."""
+    """A process that runs commands, with a cache of its own, and is started anew after a crash or a hang."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self) -> None:
+        self._cache = tempfile.TemporaryDirectory()
         self._process: subprocess.Popen[str] | None = None
 
-    def run(self, words: list[str]) -> tuple[str, float, str]:
-        """Return how a command ends, its processor time (s) and its last words."""
+    def run(self, words: list[str], folder: Path) -> tuple[str, float, str]:
+        """Return how a command in a folder ends, its processor time (s) and its last words."""
         if self._process is None:
             environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
-            environment |= {"XDG_CACHE_HOME": str(self.folder.parent / "cache")}
+            environment |= {"XDG_CACHE_HOME": self._cache.name}
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", SERVER, str(self.folder)],
+                [sys.executable, "-P", "-c", SERVER],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
@@ -239,7 +238,7 @@ class Server:
             )
         process = self._process
         assert process.stdin is not None and process.stdout is not None
-        process.stdin.write(json.dumps(words) + "\n")
+        process.stdin.write(json.dumps([str(folder), words]) + "\n")
         process.stdin.flush()
         deadline = time.monotonic() + WALL_SECONDS
         while time.monotonic() < deadline:
@@ -247,16 +246,21 @@ class Server:
                 continue
             line = process.stdout.readline()
             if not line:
-                self.close()
+                self.end()
                 return f"crash {process.wait()}", 0.0, ""
             if line.startswith("ANSWER"):
                 code, used, text = json.loads(line[6:])
                 return str(code), used, text
-        self.close()
+        self.end()
         return "hang", WALL_SECONDS, ""
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, and remove its cache."""
+        self.end()
+        self._cache.cleanup()
+
+    def end(self) -> None:
+        """End the process; the next command starts another."""
         if self._process is not None:
             self._process.kill()
             # Leaving the context closes the pipes and waits.
@@ -265,12 +269,15 @@ class Server:
             self._process = None
 
 
-def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[str]]:
+def run_kind(
+    name: str, count: int, server: Server, seed: int = 1
+) -> tuple[Counter[str], list[str]]:
     """Damage files of a kind and run its commands on them.
 
     Args:
         name: of the kind, an ending.
         count: of mutations.
+        server: process that runs the commands.
         seed: the same seed, the same mutations.
 
     Returns: How often commands ended in each way, and a line for each fault: a traceback, a crash,
@@ -293,44 +300,38 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
                 (folder / beside[1:]).write_bytes(_made(beside[1:]))
             else:
                 shutil.copy(FIXTURES / beside, folder)
-        server = Server(folder)
-        with contextlib.closing(server):
-            for number in range(count):
-                data = damage(rng.choice(sources), rng)
-                file = folder / f"it{kind.ending}"
-                file.write_bytes(data)
-                before = _digests(Path(top))
-                for command in kind.commands:
+        for number in range(count):
+            data = damage(rng.choice(sources), rng)
+            file = folder / f"it{kind.ending}"
+            file.write_bytes(data)
+            before = _digests(Path(top))
+            for command in kind.commands:
+                code, used, text = server.run(
+                    [file.name if word == "@" else word for word in command], folder
+                )
+                if code == TERMINATED:
+                    # Nothing here sends that signal: somebody else has ended the process. It is
+                    # asked again.
                     code, used, text = server.run(
-                        [file.name if word == "@" else word for word in command]
+                        [file.name if word == "@" else word for word in command], folder
                     )
-                    if code == TERMINATED:
-                        # Nothing here sends that signal: somebody else has ended the process. It is
-                        # asked again.
-                        code, used, text = server.run(
-                            [file.name if word == "@" else word for word in command]
-                        )
-                    # A study is searched as long as it says, which no damage to it makes endless.
-                    limit = (
-                        SEARCH_SECONDS if name == ".omoco" and command[0] == "run" else HANG_SECONDS
-                    )
-                    is_good = code in ("0", "1", "2") and used <= limit
-                    counts[code if is_good else "fault"] += 1
-                    if not is_good:
-                        faults.append(f"{name} {number} {command[0]}: {code} {used:.1f} s {text}")
-                        _keep(file, number)
-                after = _digests(Path(top))
-                if changed := [
-                    path for path, digest in before.items() if after.get(path) != digest
-                ]:
-                    faults.append(f"{name} {number}: changed {changed}")
-                for path in set(after) - set(before):
-                    if not path.startswith(
-                        ("work/in/out", "work/in/built.osim", "work/in/page.html", "cache")
-                    ):
-                        faults.append(f"{name} {number}: wrote {path}")
-                    if not path.startswith("cache"):
-                        Path(top, path).unlink()
+                # A study is searched as long as it says, which no damage to it makes endless.
+                limit = SEARCH_SECONDS if name == ".omoco" and command[0] == "run" else HANG_SECONDS
+                is_good = code in ("0", "1", "2") and used <= limit
+                counts[code if is_good else "fault"] += 1
+                if not is_good:
+                    faults.append(f"{name} {number} {command[0]}: {code} {used:.1f} s {text}")
+                    _keep(file, number)
+            after = _digests(Path(top))
+            if changed := [path for path, digest in before.items() if after.get(path) != digest]:
+                faults.append(f"{name} {number}: changed {changed}")
+            for path in set(after) - set(before):
+                if not path.startswith(
+                    ("work/in/out", "work/in/built.osim", "work/in/page.html", "cache")
+                ):
+                    faults.append(f"{name} {number}: wrote {path}")
+                if not path.startswith("cache"):
+                    Path(top, path).unlink()
     return counts, faults
 
 
@@ -410,15 +411,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     chosen = parser.parse_intermixed_args()
     count = chosen.count
+    server = Server()
     for name in chosen.names:
         begin = time.monotonic()
-        counts, faults = run_kind(name, count, chosen.seed)
+        counts, faults = run_kind(name, count, server, chosen.seed)
         ends = ", ".join(f"{counts[code]} x {code}" for code in sorted(counts))
         sys.stdout.write(
             f"{name:8} {count} mutations: {ends}; {len(faults)} faults ({time.monotonic() - begin:.0f} s)\n"
         )
         sys.stdout.write("".join(f"    {fault}\n" for fault in faults[:20]))
         sys.stdout.flush()
+    server.close()
 
 
 if __name__ == "__main__":
