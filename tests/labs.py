@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from osimlite.io.tables.storage import StoTable, read_sto
+from tests.scripts import run_script
 
 LABS = Path(__file__).parents[1] / "fixtures" / "labs"
 
@@ -40,10 +39,7 @@ def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
         Whether OpenSim says that it worked within a minute of processor time, and what it logged.
     """
     results.mkdir(exist_ok=True)
-    command = [sys.executable, "-W", "ignore", "-c", _RUN, setup.name, str(results)]
-    ended = subprocess.run(
-        command, cwd=setup.parent, capture_output=True, text=True, timeout=300, check=False
-    )
+    ended = run_script(_RUN, setup.name, results, folder=setup.parent, check=False)
     log = ended.stdout + ended.stderr
     return "run: True" in log, log
 

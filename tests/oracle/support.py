@@ -5,8 +5,6 @@ from __future__ import annotations
 import gzip
 import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,6 +35,7 @@ from osimlite.schema.muscles import (
 )
 from tests.conftest import CorpusModel
 from tests.oracle.force_carrier import along, drive
+from tests.scripts import run_script
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 
@@ -198,15 +197,7 @@ CASES: dict[str, Change] = {
 
 def ask(script: str, folder: Path, *words: str) -> None:
     """Let OpenSim work in a process of its own, which may crash."""
-    done = subprocess.run(
-        [sys.executable, "-c", script, *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    run_script(script, *words, folder=folder)
 
 
 def model_with(kind: str) -> osimlite.Model:
@@ -475,9 +466,7 @@ def both(
             TOOL_SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more)
         )
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run(
-        [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
-    )
+    run_script(script, folder=folder)
     osimlite.run(folder / "ours.xml")
     return folder / "ours", folder / "theirs"
 

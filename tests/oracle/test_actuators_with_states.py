@@ -5,9 +5,6 @@ Derivatives, records, energies of random ones in random states; the steps of a m
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -19,6 +16,7 @@ from osimlite.simulation import read_sto
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.oracle.opensim_runs import simulated
+from tests.scripts import run_script
 from tests.simulation.elements.muscle_rows import MASS, hung, line
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -238,9 +236,7 @@ state = model.initSystem()
 model.realizeAcceleration(state)
 print(model.getStateVariableDerivativeValue(state, "/forceset/mu/activation"))
 """
-    result = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    result = run_script(program, folder=tmp_path)
     mechanism = build_mechanism(model)
     engine = CompiledEngine(mechanism, force_elements(model, mechanism))
     y = engine.state.pack_defaults()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
+
+from tests.scripts import CASADI, run_script
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = [
@@ -41,8 +41,7 @@ print(json.dumps([functions.states, functions.controls, rows]))
 @pytest.mark.parametrize("number", ["m0014", "m0036", "m0066", "m0115"])
 def test_accelerations_are_those_of_opensim(number, shared):
     (path,) = (shared / "corpus/models" / number).glob("*.osim")
-    command = [sys.executable, "-c", SCRIPT, str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=True)
+    done = run_script(SCRIPT, path, modules=CASADI)
     states, controls, rows = json.loads(done.stdout)
     opensim.Logger.setLevelString("error")
     model = opensim.Model(str(path))

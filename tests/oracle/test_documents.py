@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +12,7 @@ from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
 from tests.conftest import ROOT
 from tests.oracle.support import COMMENT_LINE
+from tests.scripts import run_script
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -40,7 +39,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # In a process of its own, and last what has defaults: in OpenSim they are those of all that is
     # read later.
     paths = sorted(DOCUMENTS, key=lambda path: path.stem == "defaults")
-    subprocess.run([sys.executable, "-c", PRINT, folder, *paths], check=True)
+    run_script(PRINT, folder, *paths)
     return folder
 
 

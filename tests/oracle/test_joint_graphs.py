@@ -8,8 +8,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +19,7 @@ from osimlite.errors import UnsupportedError
 from osimlite.lint import validate
 from osimlite.mechanics.multibody.build import build_mechanism
 from tests.oracle.support import claims_refusal
+from tests.scripts import run_script
 from tests.suite import choose
 
 pytestmark = pytest.mark.oracle
@@ -155,9 +154,7 @@ def test_a_joint_that_stands_twice_moves_as_in_opensim(
     other = ("PinJoint", "/ground", "/bodyset/b1")
     joints = [other, (first, *ends), (second, *(ends[::-1] if reverse else ends))]
     path.write_text(text(bodies, joints, [False] * 3))
-    done = subprocess.run(
-        [sys.executable, "-c", ASK, path], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = run_script(ASK, path, check=False)
     (finding,) = (finding for finding in validate(path, select="OSIM404"))
     assert ("rejects" in finding.message.replace("or rejects the model where", "")) == (
         done.returncode != 0

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.lint.setup_faults import FAULTS, TEXTS, Fault, put_in
+from tests.scripts import run_script
 
 pytest.importorskip("opensim")
 pytestmark = pytest.mark.oracle
@@ -38,9 +37,7 @@ def results(folder: Path, fault: Fault, tool: str) -> list[list[float]]:
     put_in(folder, fault)
     setup, file = RESULTS[tool]
     program = f"import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}('{setup}').run()"
-    subprocess.run(
-        [sys.executable, "-c", program], cwd=folder, check=True, timeout=100, capture_output=True
-    )
+    run_script(program, folder=folder)
     rows = (folder / file).read_text().split("endheader")[1].split("\n")[2:]
     return [list(map(float, row.split())) for row in rows if row.strip()]
 

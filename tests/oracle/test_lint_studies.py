@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from osimlite.lint import validate
 from tests.lint.setup_faults import FAULTS, SETUPS, STUDIES, Fault, put_in
+from tests.scripts import run_script
 from tests.suite import choose
 
 pytest.importorskip("opensim")
@@ -44,13 +43,7 @@ def test_opensim_refuses_the_studies_with_errors(tmp_path: Path) -> None:
             (folder / file.name).write_bytes(file.read_bytes())
         put_in(folder, fault)
     folders = [str(tmp_path / str(fault.number)) for fault in asked]
-    run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *folders],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    run = run_script(PROGRAM, *folders)
     said = dict(
         json.loads(line) for line in run.stdout.splitlines() if line.startswith(f'["{tmp_path}')
     )

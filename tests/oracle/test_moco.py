@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import os
 import re
 import subprocess
 import sys
@@ -16,10 +15,10 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.io.tables.writers import write_trc
-from tests.conftest import ROOT
 from tests.optimal.small import coupled, links
 from tests.optimal.studies import moco_said, study_file
 from tests.optimal.study_faults import project
+from tests.scripts import CASADI, OPENSIM, run_script
 
 pytestmark = pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")
 
@@ -489,9 +488,8 @@ def test_what_moco_takes_without_a_word(old, new, said, tmp_path):
     study.write_text(text[: at[0]] + new + text[at[1] :])
     assert _said(tmp_path, ["-c", TAKEN]) == "Maximum_Iterations_Exceeded"
     # As CasADi and OpenSim cannot be loaded into one process, in another one.
-    command = [sys.executable, "-c", "import osimlite; osimlite.moco.solve('study.omoco')"]
-    done = subprocess.run(command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
-                          text=True, check=False)  # fmt: skip
+    code = "import osimlite; osimlite.moco.solve('study.omoco')"
+    done = run_script(code, folder=tmp_path, check=False, modules=CASADI)
     assert done.returncode == 1 and said in done.stderr.splitlines()[-1]
 
 
@@ -691,13 +689,11 @@ def _said(folder, command):
 
 def _record_iteration(folder, command):
     """What a program prints."""
-    done = subprocess.run(
-        [sys.executable, *command],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    first, code, *words = command
+    if first == "-m":
+        code = f"import runpy; runpy.run_module({code!r}, run_name='__main__', alter_sys=True)"
+    # One process cannot have both.
+    modules = OPENSIM if first == "-m" or re.search("import.*opensim", code) else CASADI
+    done = run_script(code, *words, folder=folder, check=False, modules=modules)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

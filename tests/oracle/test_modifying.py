@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from osimlite.fitting.modifying.path_fitting import fit_paths
 from osimlite.schema.difference import find_differences
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.tools import processors as p
+from tests.scripts import run_script
 from tests.simulation.elements.muscle_rows import hung, line
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -58,9 +57,7 @@ def changed(folder: Path, model: Path, operators: list[Any]) -> list[Any]:
     osimlite.write(osimlite.read(model), folder / "model.osim")
     processor = p.ModelProcessor(name="processor", filepath="model.osim", operators=operators)
     osimlite.write(processor, folder / "processor.xml")
-    subprocess.run(
-        [sys.executable, "-c", SCRIPT], cwd=folder, check=True, capture_output=True, timeout=100
-    )
+    run_script(SCRIPT, folder=folder)
     osimlite.write(process_model(processor, folder), folder / "ours.osim")
     ours, theirs = (osimlite.read(folder / f"{name}.osim") for name in ("ours", "theirs"))
     return [str(item) for item in find_differences(ours, theirs)]

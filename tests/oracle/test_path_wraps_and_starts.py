@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.simulation import Simulation
+from tests.scripts import run_script
 
 pytestmark = pytest.mark.oracle
 
@@ -40,13 +39,7 @@ def answer(code: str, path: Path) -> list[list[float]] | None:
     head = (
         'import json, sys, opensim as o\no.Logger.setLevelString("Off")\nm = o.Model(sys.argv[1])\n'
     )
-    done = subprocess.run(
-        [sys.executable, "-c", head + code, path],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    done = run_script(head + code, path, check=False)
     return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else None
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import gzip
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import osimlite
 from tests.oracle.support import compare
+from tests.scripts import run_script
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -80,7 +79,7 @@ def test_numbers_of_opensim(
         )
         (tmp_path / f"{results}.xml").write_text(own)
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    run_script(script)
     osimlite.run(tmp_path / "ours.xml")
     # Tables of inverse dynamics have eight decimals.
     compare(tmp_path / "ours", tmp_path / "theirs", 1e-8, 1e-6 if tool == "AnalyzeTool" else 1.5e-8)

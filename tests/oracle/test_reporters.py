@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402
 from tests.oracle.support import OPERATIONS, add_actuators, both, compare  # noqa: E402  # noqa: E402
+from tests.scripts import run_script  # noqa: E402
 
 REPORTERS = """<StatesReporter name="S"/><Actuation name="A"/><ProbeReporter name="P"/>
     <ProbeReporter name="Some"><step_interval>3</step_interval></ProbeReporter>"""
@@ -88,7 +87,7 @@ def test_along_a_forward_run(corpus: Any, tmp_path: Path, monkeypatch: pytest.Mo
     for results in ("ours", "theirs"):
         (tmp_path / f"{results}.xml").write_text(FORWARD.format(results=results, objects=REPORTERS))
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.ForwardTool('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    run_script(script)
     osimlite.run("ours.xml")
     names = sorted(path.name for path in (tmp_path / "theirs").iterdir())
     assert sorted(path.name for path in (tmp_path / "ours").iterdir()) == names

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import ScapulothoracicJoint
 from osimlite.schema.muscles import Muscle
 from tests.oracle.support import both, compare, real
+from tests.scripts import run_script
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -281,9 +281,7 @@ def test_forward_with_opensims_steps(
         (tmp_path / f"{results}.xml").write_text(text.replace(" Results ", results))
     tool = "AnalyzeTool" if "AnalyzeTool" in text else "ForwardTool"
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, timeout=100
-    )
+    run_script(script, folder=tmp_path)
     osimlite.run(tmp_path / "ours.xml")
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     assert sorted(path.name for path in ours.iterdir()) == sorted(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gzip
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +12,7 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto
 from osimlite.schema.muscles import Muscle
+from tests.scripts import run_script
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -100,7 +99,7 @@ def test_an_arm_with_muscles_of_other_classes(
         )
     done = osimlite.run(arm / "ours.xml", check=False)
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    run_script(script)
     (ours, our_forces), (theirs, their_forces) = (
         [read_sto(next((arm / folder).glob(f"*_{end}.sto"))) for end in ("activation", "force")]
         for folder in ("ours", "theirs")
@@ -156,7 +155,7 @@ def test_actuators_in_the_place_of_muscles(arm: Path, monkeypatch: pytest.Monkey
         (arm / f"{results}.xml").write_text(text)
     osimlite.run(arm / "ours.xml", check=False)
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    run_script(script)
     ours, theirs = (
         read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs")
     )
@@ -179,7 +178,7 @@ def test_an_elbow_that_follows_the_shoulder(arm: Path, monkeypatch: pytest.Monke
     osimlite.write(model, arm / "arm26_bounds.osim")
     assert osimlite.run(arm / "ours.xml", check=False).done
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    run_script(script)
     ours, theirs = (
         read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs")
     )

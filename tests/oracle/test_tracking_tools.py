@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import StoTable, read_sto
+from tests.scripts import run_script
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -72,9 +71,7 @@ def tracked(
     for results in ("ours", "theirs"):
         (folder / f"{results}.xml").write_text(SETUP.format(tool=tool, results=results, more=more))
     script = f"import opensim; opensim.Logger.setLevelString('Off'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run(
-        [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
-    )
+    run_script(script, folder=folder)
     outcome = osimlite.run(folder / "ours.xml")
     assert outcome.done, outcome.messages
     # OpenSim's table of states has two headers.

@@ -1,0 +1,33 @@
+"""Scripts in copies of a process that has imported what they need."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.scripts import run_script
+
+MODULES = ("json",)
+
+
+def test_a_script_has_its_folder_words_and_streams(tmp_path: Path) -> None:
+    code = "import os, sys\nprint(os.getcwd(), sys.argv[1:])\nprint('no', file=sys.stderr)\nassert not sys.stdin.read()"
+    done = run_script(code, "a", 2, folder=tmp_path, modules=MODULES)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{tmp_path} ['a', '2']\n", "no\n")
+    # Nothing is left of the one before.
+    assert run_script("", modules=MODULES).stdout == ""
+
+
+def test_a_script_that_fails_crashes_or_hangs_is_an_error_and_the_next_runs() -> None:
+    done = run_script("import sys; sys.exit(3)", check=False, modules=MODULES)
+    assert done.returncode == 3
+    crash = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
+    assert run_script(crash, check=False, modules=MODULES).returncode == -11
+    with pytest.raises(subprocess.CalledProcessError) as failed:
+        run_script("1 / 0", modules=MODULES)
+    assert "ZeroDivisionError" in failed.value.stderr
+    with pytest.raises(subprocess.TimeoutExpired):
+        run_script("import time; time.sleep(60)", timeout=0.2, modules=MODULES)
+    assert run_script("x = 1\nprint(x)", modules=MODULES).stdout == "1\n"
