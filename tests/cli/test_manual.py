@@ -71,7 +71,7 @@ def test_whatever_raises_errors_has_a_page():
         ("build dynamic-walker -o damaged.osim/x.osim", "docs/errors.md#files"),
         ("translate walker.osim -o damaged.osim", "docs/errors.md#files"),
         ("rule OSIM999", "docs/rules.md"),
-        ("simulate walker.osim --set RHip=1", "docs/from-opensim.md#simulate-a-model"),
+        ("simulate walker.osim --set RHip=1", "docs/simulating.md"),
         ("simulate walker.osim --controls hip=1", "docs/controls.md#set-controls"),
         ("simulate walker.osim --integrator euler", "docs/integrators.md"),
         ("sweep walker.osim --vary RHip=0:1", "docs/sweeps.md#variables"),
