@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.files import make_folder
+from osimlite.base.progress import watch_items
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
@@ -59,7 +60,7 @@ def plot_muscles(
     """
     base = make_folder(Path(folder))
     paths = []
-    for quantity, rows in curves.columns.items():
+    for quantity, rows in watch_items("drawing", curves.columns.items(), " quantities"):
         # A quantity that no muscle has, such as forces without equilibrium, gets no page.
         if not np.isfinite(rows).any():
             continue

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from osimlite.base.files import make_folder
+from osimlite.base.progress import watch_items
 from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import StoTable
@@ -107,21 +108,33 @@ def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[t
     times = np.asarray(motion.times, dtype=float)
     names = ColumnNames.from_model(getattr(motion, "model", None), mechanism)
     values = np.asarray(motion.values, dtype=float)
-    yield from _draw_table(
-        "Coordinates", times, dict(zip(motion.coordinates, values.T, strict=True)), names
-    )
-    states = getattr(motion, "auxiliary", {})
-    yield from _draw_table("States", times, states, names)
-    contacts = list(_one_of_each_pair(contact_forces(motion)))
-    if contacts:
-        yield "contact_forces.png", _plot_contacts(times, contacts)
+    coordinates = dict(zip(motion.coordinates, values.T, strict=True))
     other_forces = {
         label: column
         for label, column in motion.forces.items()
         if ".force." not in label and ".torque." not in label and "PotentialEnergy" not in label
     }
-    yield from _draw_table("Other forces", times, other_forces, names, "ModelForces")
-    yield from _draw_table("Probes", times, getattr(motion, "probes", {}), names, "ModelProbes")
+    plots = [
+        _draw_table("Coordinates", times, coordinates, names),
+        _draw_table("States", times, getattr(motion, "auxiliary", {}), names),
+        _draw_contacts(times, motion),
+        _draw_table("Other forces", times, other_forces, names, "ModelForces"),
+        _draw_table("Probes", times, getattr(motion, "probes", {}), names, "ModelProbes"),
+        _draw_energies(motion, mechanism),
+    ]
+    for pages in watch_items("drawing", plots, " plots"):
+        yield from pages
+
+
+def _draw_contacts(times: Array, motion: ShownMotion) -> Iterator[tuple[str, Any]]:
+    """Yield file name and figure of the contact forces, if there are any."""
+    contacts = list(_one_of_each_pair(contact_forces(motion)))
+    if contacts:
+        yield "contact_forces.png", _plot_contacts(times, contacts)
+
+
+def _draw_energies(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+    """Yield file name and figure of the energies, if the mechanism is known."""
     if mechanism is not None:
         yield "energy.png", _plot_energy(*compute_energies(motion, mechanism))
 

@@ -225,3 +225,14 @@ def test_failures_are_said_in_a_sentence(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MissingDependency, match=r"osimlite\[plot\]"):
         plot_simulation(motion, tmp_path)
+
+
+def test_drawing_reports_how_many_plots_are_done(tmp_path):
+    from osimlite.base.progress import listen_to_progress
+
+    reports = []
+    trajectory = simulate(dynamic_walker(), to=0.05)
+    with listen_to_progress(lambda *report: reports.append(report)):
+        plot_simulation(trajectory, tmp_path)
+    drawn = [report for report in reports if report[0] == "drawing"]
+    assert [report[1:] for report in drawn] == [(k, 6, " plots") for k in range(1, 7)]
