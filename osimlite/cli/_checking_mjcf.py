@@ -23,11 +23,15 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
 
     result = check_mjcf(read(file), mjcf)
     print_table(_make_table(result, mjcf.name))
+    say(
+        "fiber ratio: optimal fiber length relative to the model's; slack: change of the tendon slack length"
+    )
     if result.missing:
-        say(f"not in it: {join_words(list(result.missing), max_count=6)}")
+        say(f"the file lacks {join_words(list(result.missing), max_count=6)}")
     if result.coordinates:
         say(
-            f"no joint has the name of {join_words(list(result.coordinates), max_count=6)}: it stands where it stands"
+            f"the file has no joint for {join_words(list(result.coordinates), max_count=6)}, which does not move in the "
+            "comparison"
         )
     if result.bodies is not None:
         say(f"origins of bodies are off by {1e3 * result.bodies.rms:.2g} mm (root mean square)")
@@ -44,16 +48,14 @@ def _make_table(result: Any, name: str) -> Any:
     The last columns are the ratio of the implied optimal fiber length to the model's, and the
     difference of the tendon slack lengths.
     """
-    table = create_table(
-        f"{name}: root mean square errors, and optimal fiber and tendon slack lengths compared with the model's"
-    )
+    table = create_table(f"{name}: root mean square errors")
     for column in (
         "muscle",
         "length, mm",
         "moment arm, mm",
         "force, Fmax",
-        "fiber length, ratio",
-        "slack change, mm",
+        "fiber ratio",
+        "slack, mm",
     ):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
     for muscle in sorted(result.muscles, key=lambda muscle_check: -muscle_check.worst_arm.rms):

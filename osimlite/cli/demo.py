@@ -265,7 +265,7 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
         report_result(
             f"{simulation.engine.version}: over {motion.to:g} s, no coordinate differs by more than "
             f"{compute_largest_difference(compiled, bullet):.1e} rad or m from the motion of osimlite's own engine; the "
-            f"integrator took {_count_steps(bullet)} steps with PyBullet and {_count_steps(compiled)} with the own engine",
+            f"integrator took {_count_steps(bullet)} steps with PyBullet and {_count_steps(compiled)} without it",
             folder,
         )
 
