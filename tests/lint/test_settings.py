@@ -190,7 +190,7 @@ def test_a_baseline_holds_wherever_the_project_lies(tmp_path, monkeypatch):
     for place in ("here", "there"):
         (tmp_path / place).mkdir()
         monkeypatch.chdir(tmp_path / place)
-        geometry = str(tmp_path / place / "Geometry")
+        geometry = str(tmp_path / place / "Bones")
         Path("m.osim").write_text(model)
         report = validate("m.osim", config=Config(("OSIM701",), mesh_paths=(geometry,)))
         assert geometry in report.findings[0].message
