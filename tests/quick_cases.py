@@ -27,6 +27,10 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
         "/bodyset/b1-CustomJoint-PinJoint-False", "/bodyset/b1-WeldJoint-PinJoint-True",
     ),
     "tests/oracle/test_joint_reaction.py::test_forces_of_constraints": ("couplers",),
+    "tests/oracle/test_modifying.py::test_the_model_is_that_of_opensim": (
+        "m0001-muscles", "m0001-stiff", "m0001-reserves", "m0001-residuals", "m0001-actuators", "m0013-muscles",
+        "m0013-welds",
+    ),
     "tests/oracle/test_lab_pipelines.py::test_a_motion_off_the_constraints_is_tracked": ("rra.xml",),
     "tests/oracle/test_moco.py::test_loads": ("explicit",),
     "tests/optimal/check_studies.py::test_exact_hessian_finds_it_too": ("pendulum-50",),

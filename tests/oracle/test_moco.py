@@ -619,7 +619,14 @@ print(json.dumps(solution.getObjective()))
 """
 
 
-@pytest.mark.parametrize(("number", "mode"), [("m0115", "explicit"), ("m0116", "implicit")])
+@pytest.mark.parametrize(
+    ("number", "mode"),
+    [
+        ("m0115", "explicit"),
+        ("m0115", "implicit"),
+        pytest.param("m0116", "implicit", marks=pytest.mark.full),
+    ],
+)
 def test_columns_are_where_moco_looks_for_them(number, mode, tmp_path, corpus):
     """Moco has of a guess, anywhere between the bounds, the objective and the violation that it has here."""
     pytest.importorskip("opensim")
