@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -15,6 +13,7 @@ import osimlite
 from osimlite.cli import COMMANDS
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.source import make_model
+from tests.cli.command import run
 
 
 def blocks(text: str, language: str) -> list[str]:
@@ -62,10 +61,6 @@ def test_the_examples_of_the_table_have_existing_options(repo: Path) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "osimlite", command, "--help"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "Usage: osimlite" in done.stdout and len(done.stdout.splitlines()) > 5
+    done = run(command, "--help")
+    assert done.code == 0
+    assert "Usage: osimlite" in done.out and len(done.out.splitlines()) > 5

@@ -15,6 +15,7 @@ import pytest
 from osimlite.cli import COMMANDS
 from osimlite.lint import Config, all_rules, assert_valid, validate
 from osimlite.lint.settings import load_settings
+from tests.cli.command import run
 
 yaml = pytest.importorskip("yaml", reason="needs pyyaml (extra 'yaml')")
 
@@ -66,15 +67,13 @@ def test_hooks_pass_over_xml_of_others(repo: Path, tmp_path: Path) -> None:
         '<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>'
     )
     for hook in yaml.safe_load((repo / ".pre-commit-hooks.yaml").read_text(encoding="utf-8")):
-        command = [sys.executable, "-m", *hook["entry"].split()]
-        done = subprocess.run([*command, "pom.xml"], cwd=tmp_path, capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
+        _, *command = hook["entry"].split()
+        done = run(*command, "pom.xml", folder=tmp_path)
+        assert (done.code, done.err) == (0, "")
         names = [name for name in ("pom.xml", "id.xml", "a.sto") if re.search(hook["files"], name)]
-        done = subprocess.run([*command, *names], cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode and all(
-            name in done.stdout + done.stderr for name in names if name != "pom.xml"
-        )
-        assert "pom.xml" not in done.stdout + done.stderr
+        done = run(*command, *names, folder=tmp_path)
+        assert done.code and all(name in done.out + done.err for name in names if name != "pom.xml")
+        assert "pom.xml" not in done.out + done.err
     assert (tmp_path / "pom.xml").read_text() == "<project>\n<a/></project>"
 
 
