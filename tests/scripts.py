@@ -13,6 +13,7 @@ are the number of its process, and its exit code.
 from __future__ import annotations
 
 import atexit
+import gc
 import json
 import os
 import signal
@@ -25,6 +26,9 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from tests.leaving import leave
+from tests.suite import is_full
 
 ROOT = Path(__file__).resolve().parent.parent
 OPENSIM = ("opensim",)
@@ -67,7 +71,11 @@ def run_script(
     for file in files:
         file.seek(0)
         file.truncate()
-    order = {"script": script, "words": arguments, "folder": where, "environment": environment}
+    order: dict[str, object] = {
+        "script": script, "words": arguments, "folder": where, "environment": environment,
+        # The full suite sees what Python and libraries say as they end.
+        "ends": is_full(),
+    }  # fmt: skip
     server.stdin.write(json.dumps(order) + "\n")
     timer = threading.Timer(timeout, _kill, [int(server.stdout.readline())])
     timer.start()
@@ -118,13 +126,15 @@ def _stop(server: Any, files: list[Any]) -> None:
         file.close()
 
 
-def become_one() -> str:
-    """Wait for orders, and return the script in a process that is to run it.
+def become_one() -> tuple[str, bool]:
+    """Wait for orders, and return the script in a process that is to run it, and whether its interpreter shall end.
 
     Raises:
         SystemExit: no more orders come.
     """
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    # Collections of garbage would copy the pages of all that is imported.
+    gc.freeze()
     for line in sys.stdin:
         order: dict[str, Any] = json.loads(line)
         child = os.fork()
@@ -137,8 +147,7 @@ def become_one() -> str:
             os.chdir(order["folder"])
             sys.path[0] = ""
             sys.argv = ["-c", *order["words"]]
-            script: str = order["script"]
-            return script
+            return order["script"], order["ends"]
         print(child, file=answers, flush=True)
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), file=answers, flush=True)
     raise SystemExit
@@ -148,4 +157,13 @@ if __name__ == "__main__":
     # The imports put folders into the paths of programs and libraries, which is of no use here.
     for name in sys.argv[3:]:
         import_module(name)
-    exec(compile(become_one(), "<script>", "exec"), {"__name__": "__main__"})
+    text, ends = become_one()
+    code: object = None
+    try:
+        exec(compile(text, "<script>", "exec"), {"__name__": "__main__"})
+    except SystemExit as ended:
+        if ends:
+            raise
+        code = ended.code
+    if not ends:
+        leave(code)

@@ -31,3 +31,20 @@ def test_a_script_that_fails_crashes_or_hangs_is_an_error_and_the_next_runs() ->
     with pytest.raises(subprocess.TimeoutExpired):
         run_script("import time; time.sleep(60)", timeout=0.2, modules=MODULES)
     assert run_script("x = 1\nprint(x)", modules=MODULES).stdout == "1\n"
+
+
+def test_a_script_ends_as_python_does() -> None:
+    code = (
+        "import atexit, ctypes, sys, threading, time\n"
+        "atexit.register(print, 'last')\n"
+        "threading.Thread(target=lambda: (time.sleep(0.1), print('thread'))).start()\n"
+        "ctypes.CDLL(None).puts(b'in C')\n"
+        "sys.exit('words')"
+    )
+    done = run_script(code, check=False, modules=MODULES)
+    assert (done.returncode, done.stderr) == (1, "words\n")
+    assert done.stdout.split("\n") in (
+        ["thread", "last", "in C", ""],
+        ["in C", "thread", "last", ""],
+    )
+    assert run_script("import sys; sys.exit()", modules=MODULES).returncode == 0

@@ -9,6 +9,7 @@ code.
 from __future__ import annotations
 
 import ast
+import gc
 import json
 import os
 import sys
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import osimlite.cli
 from osimlite.cli import _progress
+from tests.leaving import leave
 
 
 def load() -> None:
@@ -35,12 +37,10 @@ def load() -> None:
             with suppress(ImportError):
                 for module in [line.module] if isinstance(line, ast.ImportFrom) else []:
                     import_module(module or "")
-    # Pictures need these, and the list of fonts that Matplotlib makes anew for each empty cache.
-    for module in (
-        "matplotlib.figure",
-        "matplotlib.backends.backend_agg",
-        "matplotlib.font_manager",
-    ):
+    # Pictures need Matplotlib and the list of fonts that it makes anew for each empty cache, help
+    # needs Typer.
+    drawing = "matplotlib.figure", "matplotlib.backends.backend_agg", "matplotlib.font_manager"
+    for module in (*drawing, "typer.main", "typer.rich_utils"):
         with suppress(ImportError):
             import_module(module)
 
@@ -50,8 +50,10 @@ def keep_quiet() -> None:
     _progress.LONG_S = inf
 
 
-def become_one() -> None:
-    """Wait for orders; this comes back in a process that is to be a command."""
+def become_one() -> bool:
+    """Wait for orders, and return in a process that is to be a command whether its interpreter shall end as well."""
+    # Collections of garbage would copy the pages of all that is imported.
+    gc.freeze()
     for line in sys.stdin:
         order = json.loads(line)
         child = os.fork()
@@ -64,7 +66,7 @@ def become_one() -> None:
             os.chdir(order["folder"])
             sys.path[0] = order["folder"]
             sys.argv = ["osimlite", *order["words"]]
-            return
+            return bool(order["ends"])
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
     raise SystemExit
 
@@ -72,5 +74,10 @@ def become_one() -> None:
 if __name__ == "__main__":
     load()
     keep_quiet()
-    become_one()
-    osimlite.cli.main()
+    ends = become_one()
+    try:
+        osimlite.cli.main()
+    except SystemExit as ended:
+        if ends:
+            raise
+        leave(ended.code)
