@@ -12,7 +12,8 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+
+from osimlite.base.named_tuples import NamedTuple
 
 DAY_S = 86_400.0
 UNUSED_DAYS = 90.0

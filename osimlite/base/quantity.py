@@ -7,8 +7,8 @@ import re
 import sys
 import warnings
 from pathlib import Path
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import DoubtfulWarning, UnitWarning
 
 _FORM = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|cm|mm|m)?(?:/s)?")

@@ -9,8 +9,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import join_words
 from osimlite.cli import _options as options

@@ -11,9 +11,10 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 from threading import Event, Lock
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from osimlite.base.cores import count_cores
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import SAFE_PATH
 from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, create_table, print_table, say

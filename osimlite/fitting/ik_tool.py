@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import find_marker_stations

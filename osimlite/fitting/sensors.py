@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.orientation_data import OrientationData

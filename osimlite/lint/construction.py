@@ -11,8 +11,9 @@ from collections import OrderedDict
 from enum import StrEnum
 from hashlib import blake2b
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, cast
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import find_missing_packages
 from osimlite.errors import OsimliteError
 from osimlite.lint.measures import MECHANISM, NEEDS_SIM

@@ -14,7 +14,8 @@ lines of the example, and a fault that has fixes says of what kind: ``error, fix
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+
+from osimlite.base.named_tuples import NamedTuple
 
 
 class RuleFault(NamedTuple):

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from time import time_ns
-from typing import NamedTuple
 
 from osimlite.base.cores import count_cores
 from osimlite.base.files import read_standard_input
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import replace
 from osimlite.base.writing import user_cache_folder
 from osimlite.errors import MissingFileError

@@ -16,9 +16,10 @@ from collections.abc import Container
 from hashlib import blake2b
 from importlib import import_module
 from math import degrees
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.base.files import read_file
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.pruning import mark_used
 from osimlite.base.require import find_missing_packages
 from osimlite.base.text import join_words

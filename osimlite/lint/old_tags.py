@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import Final, NamedTuple
+from typing import Final
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.schema.base import Object
 from osimlite.schema.specs import get_field_specs
 

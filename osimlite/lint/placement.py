@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import OsimliteError
 from osimlite.lint.axes import list_axes, list_coordinates
 from osimlite.lint.skeleton import build_skeleton

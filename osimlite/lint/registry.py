@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from inspect import cleandoc
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import shorten_message
 from osimlite.lint.diagnostic import Consequence, Finding, Fix, Severity

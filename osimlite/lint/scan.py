@@ -13,8 +13,8 @@ from functools import lru_cache
 from itertools import groupby, islice, pairwise
 from math import inf, nan, nextafter
 from operator import lt
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, RowLayout, compute_shapes

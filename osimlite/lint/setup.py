@@ -12,8 +12,9 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.document.cache import get_object
 from osimlite.io.document.survey import Survey
 from osimlite.lint.beside import list_documents, list_folders, read_beginning, read_table, read_tree

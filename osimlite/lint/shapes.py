@@ -10,7 +10,8 @@ method is that of R. D. Cameron et al., "Bitwise data parallelism in regular exp
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+
+from osimlite.base.named_tuples import NamedTuple
 
 # A code byte has the class of a character in its lower half, and in its upper half the classes that
 # must not follow it.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain
-from typing import NamedTuple, cast
+from typing import cast
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.mechanics.multibody.topology import new_base, spanning_tree

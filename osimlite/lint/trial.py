@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, nan
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.document.source import Position
 from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config

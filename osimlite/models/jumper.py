@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from math import pi, radians
 from pathlib import Path
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.tables.table_stream import TableStream
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.controller_types import PrescribedController

@@ -8,8 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from itertools import zip_longest
-from typing import Any, NamedTuple
+from typing import Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import ObjectField, Reference
 from osimlite.schema.model import Model

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
+
+from osimlite.base.named_tuples import NamedTuple
 
 REFUSED: Final = "OpenSim rejects the model"
 TOUCHING: Final = "forces and motion become NaN as soon as the surfaces touch"

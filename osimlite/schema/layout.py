@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import weakref
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.schema.base import Component, Object
 from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
 from osimlite.schema.states import find_variables

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import replace
 from osimlite.schema.fields import (
     FieldType,

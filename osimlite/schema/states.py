@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.schema.base import Component
 from osimlite.schema.specs import get_class_names
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import make_unique_name
 from osimlite.io.bvh import POSITIONS, ROTATIONS, BvhJoint, BvhMotion, find_angles
 from osimlite.mechanics.multibody.mechanism import Mechanism

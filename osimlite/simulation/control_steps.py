@@ -10,11 +10,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from math import floor, inf
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 from zlib import crc32
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable

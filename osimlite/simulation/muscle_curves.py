@@ -6,11 +6,12 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from osimlite.base.lazy import make_notebook_repr
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
 from osimlite.base.require import require
 from osimlite.base.text import format_count, join_words, suggest_name

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.layout import (
     CHAIN,
     DOF,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import inf, sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.simulation.elements.probe_type import INTEGRATE, DeclaredProbe
 from osimlite.simulation.engines.protocol import Engine

@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.files import make_folder, write_atomically
 from osimlite.base.lazy import make_notebook_repr, make_plot
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
 from osimlite.base.text import format_count, format_json
 from osimlite.io.tables.storage import StoTable, describe_times, format_sto

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.progress import watch_items
 from osimlite.base.text import join_words
 from osimlite.io.tables.storage import StoTable, read_sto

@@ -6,11 +6,11 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from osimlite.base.files import read_file
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import join_words
 from osimlite.errors import DocumentError, SettingError
 from osimlite.mechanics.multibody.spatial import Array

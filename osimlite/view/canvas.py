@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.meshes.surface import Indices
 from osimlite.mechanics.multibody.spatial import Array
 

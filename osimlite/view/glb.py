@@ -10,12 +10,13 @@ import json
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from osimlite import __version__
 from osimlite.base.files import write_atomically
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.progress import watch_items
 from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import format_count
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.lint import Finding, Severity

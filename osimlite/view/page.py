@@ -9,10 +9,11 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import format_count
 from osimlite.io.meshes.surface import Surface
 from osimlite.io.meshes.unit_shapes import compute_normals

@@ -9,10 +9,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
 from osimlite.base.writing import write_into
 from osimlite.mechanics.multibody.spatial import Array

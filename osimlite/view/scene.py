@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
-from typing import Literal, NamedTuple, cast
+from typing import Literal, cast
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.progress import watch_items
 from osimlite.base.records import dataclass
 from osimlite.io.meshes.surface import Surface

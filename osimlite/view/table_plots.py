@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path, PurePath
-from typing import NamedTuple
 
 import numpy as np
 
 from osimlite.base.files import make_folder
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import CoordinateInfo

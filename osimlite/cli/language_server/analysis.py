@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.cli.language_server.cursor import Cursor, find_cursor
 from osimlite.cli.language_server.text import Text
 from osimlite.io.document.source import Position, Source

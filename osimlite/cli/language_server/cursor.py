@@ -6,8 +6,9 @@ A half-typed file is not valid XML, but the text before the cursor usually is.
 from __future__ import annotations
 
 import re
-from typing import Literal, NamedTuple
+from typing import Literal
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.document.spans import Markup, find_markup
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField

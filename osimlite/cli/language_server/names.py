@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from osimlite.base.files import get_relative_path
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.cursor import Cursor, Element
 from osimlite.lint.beside import list_folders, read_beginning

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import Mechanism

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
+
+from osimlite.base.named_tuples import NamedTuple
 
 VARINT = 0
 """Wire type of integers of variable length."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.schema.base import Object
 from osimlite.schema.specs import FieldSpec
 

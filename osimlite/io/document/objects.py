@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from lxml import etree
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.document.lexical import ABSENT, UncleanText, make_converter
 from osimlite.io.document.names import decode_name, encode_name
 from osimlite.io.document.notes import Note, NoteKind

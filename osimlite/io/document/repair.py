@@ -10,10 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from html.entities import html5
-from typing import NamedTuple
 
 from lxml import etree
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import NotWellFormedError
 from osimlite.io.document.names import ATTRIBUTE, decode_name
 from osimlite.io.document.notes import Note, NoteKind

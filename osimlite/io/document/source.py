@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from osimlite.base.files import read_file
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import OsimliteError
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.spans import PlainSpans, Span, find_spans

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 from itertools import islice
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import UnsupportedError
 from osimlite.io.document.source import Position
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.lint.measures import PathJump
 from osimlite.lint.measuring.sweeps import Sweep
 from osimlite.mechanics.kernels.paths import NODE_TYPE

@@ -7,8 +7,9 @@ from contextlib import suppress
 from itertools import repeat
 from math import nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import ModelError
 from osimlite.lint.measures import FiberReach, MeasuringPose, MuscleStart
 from osimlite.mechanics.laws.muscles import MuscleInputs

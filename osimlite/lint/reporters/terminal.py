@@ -10,8 +10,9 @@ import re
 import textwrap
 from collections.abc import Callable, Hashable, Iterable
 from itertools import groupby
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import escape_unprintable, join_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 

@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import find_nearest, join_words
 from osimlite.lint.registry import ERROR, FAILS, NAN, REFUSES, WARNING, FindingCollector, rule
 from osimlite.lint.rules.functions import UNUSED, is_unused

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, cast
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.source import Source
 from osimlite.lint.axes import find_made_up_paths, refuses_axes

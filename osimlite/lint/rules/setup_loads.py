@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import join_words
 from osimlite.lint.placement import FramePose, locate_frame
 from osimlite.lint.posture import compute_poses_of_motion, make_model_subject

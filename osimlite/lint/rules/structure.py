@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import find_nearest, format_count, join_words
 from osimlite.io.document.lexical import reads_as
 from osimlite.io.document.notes import Note

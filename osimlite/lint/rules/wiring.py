@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import find_nearest, format_count
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, REFUSES, FindingCollector, rule

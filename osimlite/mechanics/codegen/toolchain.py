@@ -8,8 +8,8 @@ import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen.processor import machine_name
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels.constraint_equations import EQUATION_TYPE, VECTOR_TYPE
 from osimlite.mechanics.kernels.layout import COORDINATE

@@ -7,8 +7,9 @@ A constraint forbids some of the motions that the joints allow. Constraints betw
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.spatial import Array

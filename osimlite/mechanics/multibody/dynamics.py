@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.constrained_dynamics import constrained_dynamics

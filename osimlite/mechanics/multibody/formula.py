@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import ModelError

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import join_words, suggest_name
 from osimlite.mechanics.laws import formulas
 

@@ -11,11 +11,12 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.errors import ModelError, SimulationError
 from osimlite.mechanics.laws.rotations import X, Y, Z

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels.functions import FUNCTION_TYPE

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.joints import Mobilizer

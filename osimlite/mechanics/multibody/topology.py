@@ -6,7 +6,9 @@ The rules are those of Simbody's multibody graph maker, so that bodies are in Op
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
+
+from osimlite.base.named_tuples import NamedTuple
 
 
 class JointEdge(Protocol):

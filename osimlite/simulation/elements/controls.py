@@ -7,8 +7,9 @@ have no limits.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM, WORK

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.states import StateVariable

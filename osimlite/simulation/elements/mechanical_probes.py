@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import floor, inf, nan
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.probe_types import (

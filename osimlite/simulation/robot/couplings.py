@@ -6,10 +6,10 @@ Formats of robots can express a joint that is a multiple of another one, but no 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.constraints import Coupler

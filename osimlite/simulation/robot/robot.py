@@ -20,10 +20,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import permutations
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.multibody.functions import IDENTITY, SmoothFunction
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values

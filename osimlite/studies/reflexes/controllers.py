@@ -8,10 +8,9 @@ the state of a leg, and terms `gain * (t - start)**power`; see
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.quantity import warn_caller
 from osimlite.base.text import join_words, suggest_or_list
 from osimlite.mechanics.kernels.pointers import Ints

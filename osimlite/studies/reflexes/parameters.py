@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from osimlite.base.files import read_file
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.errors import DocumentError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import SettingNode, parse_finite

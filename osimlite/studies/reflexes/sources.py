@@ -6,10 +6,10 @@ The kernels compute the sensors, see :mod:`osimlite.mechanics.kernels.sensors`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.sensors import SENSES, SOURCE_TYPE
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import SettingNode

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.layout import OUTCOME

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from osimlite.base.named_tuples import NamedTuple
 
 if TYPE_CHECKING:
     from osimlite.studies.sweep.measures import RunMeasure

@@ -15,11 +15,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from osimlite.base.files import make_missing_error, open_file, replace_with
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
 from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import open_to_append

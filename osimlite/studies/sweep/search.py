@@ -7,10 +7,11 @@ an interrupted search continues where it was.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
 from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError

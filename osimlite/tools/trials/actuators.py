@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.tables.storage import StoTable
 from osimlite.lint.trial import Measurement
 from osimlite.mechanics.multibody.spatial import Array

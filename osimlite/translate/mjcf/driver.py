@@ -14,10 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
 from osimlite.mechanics.kernels.layout import ITEM, MODEL
 from osimlite.mechanics.multibody.functions import ConstantValue, Polynomial, SmoothFunction

@@ -16,11 +16,12 @@ import math
 from collections import ChainMap
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.laws.deprecated_muscles import schutte_velocity

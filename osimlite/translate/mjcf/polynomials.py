@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import Composition, find_knots, find_line

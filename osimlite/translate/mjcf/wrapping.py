@@ -19,11 +19,10 @@ Source: MuJoCo's XML reference (``spatial/geom``), its changelog for 4.0.0, and 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 
 Mask = NDArray[np.bool_]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.multibody.spatial import Array, rotation_of, rotation_xyz
 from osimlite.schema.coordinates import Coordinate

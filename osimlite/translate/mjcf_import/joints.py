@@ -9,10 +9,10 @@ divided into several joints with bodies of zero mass between them.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, SpatialTransform, TransformAxis

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.functions import ExpressionBasedFunction
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle, Muscle, RigidTendonMuscle

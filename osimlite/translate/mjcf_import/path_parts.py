@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import (

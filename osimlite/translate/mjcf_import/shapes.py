@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.geometry import Appearance, Brick, Cylinder, Ellipsoid, Geometry, Mesh, Sphere

@@ -6,10 +6,9 @@ The compiled model is the same in both versions; what a side site means is not
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf.wrapping import bend_tendon, norm
 from osimlite.translate.mjcf_import.poses import SampledPoses

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import NamedTuple
 
 from lxml import etree
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.document.lexical import UncleanText, parse_real, split_words
 from osimlite.io.document.names import decode_name
 from osimlite.schema.registry import cache_by_tags, find_class

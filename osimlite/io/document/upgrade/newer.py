@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import NamedTuple
 
 from lxml import etree
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.document.names import decode_name
 from osimlite.io.document.upgrade.draft import Element
 

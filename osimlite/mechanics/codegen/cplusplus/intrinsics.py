@@ -9,8 +9,9 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.codegen.cplusplus.types import (
     BOOLEAN,
     FLOAT,

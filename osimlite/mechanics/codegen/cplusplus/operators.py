@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import ast
 import math
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.codegen.cplusplus.inference import Specialisation
 from osimlite.mechanics.codegen.cplusplus.types import (
     Type,

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from math import nan
-from typing import Any, NamedTuple
+from typing import Any
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.deprecated_muscles import (

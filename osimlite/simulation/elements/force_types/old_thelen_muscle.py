@@ -1,7 +1,6 @@
 """Thelen2003Muscle_Deprecated: the first form of Thelen's muscle, which OpenSim keeps for old files."""
 
-from typing import NamedTuple
-
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.laws.deprecated_muscles import (
     NOTHING,
     OldMuscle,

@@ -1,8 +1,8 @@
 """RigidTendonMuscle: a muscle whose tendon keeps its slack length."""
 
 from math import sqrt
-from typing import NamedTuple
 
+from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.muscles import MuscleInputs
