@@ -13,6 +13,7 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
+from osimlite.base.patterns import compile_later
 from osimlite.errors import MissingFileError, MissingFolderError, SpecialFileError
 
 _SPECIAL = {
@@ -131,8 +132,8 @@ def describe_content(beginning: bytes) -> str | None:
     return None
 
 
-_DOCUMENT = re.compile(
+_DOCUMENT = compile_later(
     r"\s*(?:<\?[^>]*>\s*|<!--(?:[^-]|-(?!->))*-->\s*)*<OpenSimDocument\b[^>]*>\s*"
     r"(?:<!--(?:[^-]|-(?!->))*-->\s*)*<(\w+)"
 )
-_RESIDUALS = re.compile(r"Average Residuals:\s")
+_RESIDUALS = compile_later(r"Average Residuals:\s")

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Collection, Container, Iterable
 from itertools import chain, count
 
+from osimlite.base.patterns import compile_later
+
 _COLOUR = r"\x1b\[[0-9;]*m"
 # Bidirectional controls, line separators, and lone surrogates, which stand for bytes that are not
 # UTF-8.
@@ -13,9 +15,9 @@ _UNSAFE = r"[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2
 # Workflow commands: GitHub executes `::name::` at the start of a line; GitHub, Azure and TeamCity
 # execute `##name[` anywhere.
 _COMMAND = r"(?:(?<=\n)|\A)[ \t\xa0\u1680\u2000-\u200a\u202f\u205f\u3000]*:(?=:)|#(?=#\w*\[)"
-_EXECUTED = re.compile(f"{_COLOUR}|{_UNSAFE}|{_COMMAND}")
+_EXECUTED = compile_later(f"{_COLOUR}|{_UNSAFE}|{_COMMAND}")
 # Escapes in JSON: a surrogate pair, a lone surrogate, or any other escape.
-_JSON_ESCAPE = re.compile(r"\\(?:ud[89ab]..\\ud[c-f]..|u(d[89a-f]..)|.)")
+_JSON_ESCAPE = compile_later(r"\\(?:ud[89ab]..\\ud[c-f]..|u(d[89a-f]..)|.)")
 
 
 def escape_unprintable(text: str) -> str:

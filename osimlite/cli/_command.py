@@ -14,13 +14,14 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 
 if TYPE_CHECKING:
     from osimlite.base.options import OptionSpec
 
 _NUMBERS = {
-    int: re.compile(r"[0-9]+", re.ASCII),
-    float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII),
+    int: compile_later(r"[0-9]+", re.ASCII),
+    float: compile_later(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII),
 }
 """Number formats that typer and this parser read alike; other words are left to typer."""
 

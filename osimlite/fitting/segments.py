@@ -8,11 +8,12 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.mechanics.multibody.spatial import Array
 
 OPPOSITE_WORDS = {"r": "l", "l": "r", "right": "left", "left": "right"}
 """Words for one side of the body, and for the other."""
-_SIDE_PATTERN = re.compile(r"right|left|(?<![a-z])[rl](?![a-z])", re.IGNORECASE)
+_SIDE_PATTERN = compile_later(r"right|left|(?<![a-z])[rl](?![a-z])", re.IGNORECASE)
 """Words and letters for a side in a name."""
 
 

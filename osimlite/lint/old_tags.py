@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from typing import Final
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.schema.base import Object
 from osimlite.schema.specs import get_field_specs
 
@@ -123,7 +123,7 @@ _COMMENTS: Final = frozenset(
     )
 )
 """Tags, in small letters, of elements that programs write for comments."""
-_CONNECTEE = re.compile(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")
+_CONNECTEE = compile_later(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")
 
 
 def successor(cls: type[Object], tag: str) -> Successor | None:

@@ -10,20 +10,21 @@ from pathlib import Path
 
 from osimlite.base.files import TABLE_SUFFIXES as TABLE_SUFFIXES
 from osimlite.base.files import make_missing_error, read_at_most, unsaved
+from osimlite.base.patterns import compile_later
 from osimlite.errors import OsimliteError
 
 BEGINNING = 1 << 16
 """Number of bytes at the beginning of a file that decide whether it is OpenSim's."""
 
-_ROOT = re.compile(r"<(?:[\w.-]+:)?OpenSimDocument\b")
-_TAGS = re.compile(
+_ROOT = compile_later(r"<(?:[\w.-]+:)?OpenSimDocument\b")
+_TAGS = compile_later(
     r"<(?:!--.*?-->|!\[CDATA\[.*?\]\]>|[?!][^>]*+>|(/?)([A-Za-z_][\w:.-]*)[^<>]*?(/?)>)", re.DOTALL
 )
-_TOP = re.compile(
+_TOP = compile_later(
     r"\w*(?:Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet)", re.IGNORECASE
 )
 # A name of several words, or of letters and digits, is hardly another program's.
-_COMPOUND = re.compile(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
+_COMPOUND = compile_later(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
 
 
 def is_opensim_xml(beginning: bytes) -> bool:

@@ -15,6 +15,7 @@ from math import inf, nan, nextafter
 from operator import lt
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, RowLayout, compute_shapes
@@ -106,13 +107,13 @@ _SAMPLED = 200_000
 """Largest total of numbers in these rows."""
 # Python's float() also accepts underscores, which C++ does not, and NaN and infinity, which count
 # as missing here.
-_PLAIN = re.compile(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
-_WORD = re.compile(rb"\S+")
-_LETTER = re.compile(rb"[A-Za-z]")
+_PLAIN = compile_later(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+_WORD = compile_later(rb"\S+")
+_LETTER = compile_later(rb"[A-Za-z]")
 # A line with a digit, NaN or infinity is taken for a row, even if it has letters as well.
-_OF_ROW = re.compile(rb"\d|\b(?:nan|inf)", re.IGNORECASE)
+_OF_ROW = compile_later(rb"\d|\b(?:nan|inf)", re.IGNORECASE)
 # OpenSim takes a line that begins with a tab or a blank for no frame.
-_FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
+_FRAME = compile_later(rb"^[^\t\r\n ]", re.MULTILINE)
 
 
 @dataclass(slots=True)

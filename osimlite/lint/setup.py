@@ -7,7 +7,6 @@ refers to it.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from itertools import chain
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.io.document.cache import get_object
 from osimlite.io.document.survey import Survey
 from osimlite.lint.beside import list_documents, list_folders, read_beginning, read_table, read_tree
@@ -38,7 +38,7 @@ from osimlite.schema.tree import Tree, Use, is_a
 NO_FILE_CONSEQUENCE = "OpenSim rejects it unless a program or the GUI supplies one"
 """Consequence for a tool that lacks the name of a required file."""
 # Cheap test of the first bytes of a file, which saves parsing documents that cannot be tools.
-_NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
+_NAMES_MODEL = compile_later(rb"Tool|Moco|ModelProcessor")
 # Folders of data sets hold thousands of documents; a check must not read them all.
 _MAX_NEIGHBOURS = 200
 _MODEL_RULES = frozenset(("OSIM110", "OSIM111", "OSIM209"))

@@ -8,12 +8,13 @@ from bisect import bisect_left
 from collections.abc import Callable
 from operator import attrgetter
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.records import dataclass, field
 from osimlite.io.document.source import Position, Source
 from osimlite.lint.diagnostic import Finding
 
-_COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^<>]*?)-->")
-_LINE = re.compile(r"^\W*osimlite:\s*ignore\b(.*)$")
+_COMMENT = compile_later(r"<!--\s*osimlite:\s*ignore\b([^<>]*?)-->")
+_LINE = compile_later(r"^\W*osimlite:\s*ignore\b(.*)$")
 LAST_LINE = sys.maxsize
 
 

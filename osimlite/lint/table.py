@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import islice, pairwise
 from typing import ClassVar
 
+from osimlite.base.patterns import compile_later
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import MARK, Entry, MarkerHeader, StorageHeader, Word
 from osimlite.lint.checked import CheckTarget
@@ -16,8 +16,8 @@ from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.scan import RowScanner, TableRows, parse_number
 from osimlite.lint.suppressions import Suppression, read_header_suppressions
 
-_CELL = re.compile(rb"[^ \t\r\n]+")
-_ROW = re.compile(rb"[^ \t\r\n][^\n]*")
+_CELL = compile_later(rb"[^ \t\r\n]+")
+_ROW = compile_later(rb"[^ \t\r\n][^\n]*")
 
 
 class Table(CheckTarget):

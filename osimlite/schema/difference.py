@@ -11,6 +11,7 @@ from itertools import zip_longest
 from typing import Any
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import ObjectField, Reference
 from osimlite.schema.model import Model
@@ -197,12 +198,12 @@ class _Comparison:
         return value if isinstance(value, str) else value.name
 
 
-_MARKUP = re.compile(
+_MARKUP = compile_later(
     r"<!--.*?-->|<!\[CDATA\[(?P<section>.*?)\]\]>|<\?.*?\?>|"
     r"<(?P<close>/?)(?P<tag>[^\s/<>!?]+)(?P<attributes>[^<>]*?)(?P<empty>/?)>",
     re.DOTALL,
 )
-_ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
+_ATTRIBUTE = compile_later(r"([^\s=]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 
 
 def _compare_contents(path: str, property_path: str, old: str, new: str) -> Iterator[Difference]:

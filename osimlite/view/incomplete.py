@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.lint import Finding, Severity
@@ -20,7 +20,7 @@ MAX_SAME = 3
 """Number of parts with the same reason that are named one by one."""
 
 _MISSING_MESH = "the mesh file"
-_QUOTED_PATH = re.compile(r"'(/[^']+)'")
+_QUOTED_PATH = compile_later(r"'(/[^']+)'")
 
 
 class ShowableModel(NamedTuple):

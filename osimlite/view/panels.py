@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.require import require
 from osimlite.base.writing import write_into
 from osimlite.mechanics.multibody.spatial import Array
@@ -81,10 +82,10 @@ LETTERS_PER_INCH = 12.0
 """Number of letters of a title of 10 points in an inch."""
 
 _SIDE_TOKENS = (
-    (re.compile(r"(?:^|(?<=[._/ ]))[rl](?=[._/ ]|$)"), {"r": "l", "l": "r"}),
-    (re.compile(r"(?:^|(?<=[._/ ]))[RL](?=[._/ ]|[A-Z]|$)"), {"R": "L", "L": "R"}),
-    (re.compile(r"right|left"), {"right": "left", "left": "right"}),
-    (re.compile(r"Right|Left"), {"Right": "Left", "Left": "Right"}),
+    (compile_later(r"(?:^|(?<=[._/ ]))[rl](?=[._/ ]|$)"), {"r": "l", "l": "r"}),
+    (compile_later(r"(?:^|(?<=[._/ ]))[RL](?=[._/ ]|[A-Z]|$)"), {"R": "L", "L": "R"}),
+    (compile_later(r"right|left"), {"right": "left", "left": "right"}),
+    (compile_later(r"Right|Left"), {"Right": "Left", "Left": "Right"}),
 )
 """Patterns of the letters and words for a side in names of models, each with their opposites."""
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from osimlite.base.files import make_folder
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import CoordinateInfo
@@ -344,20 +345,20 @@ def _describe_vector(end: str, table: StoTable) -> str:
 
 
 _ENDINGS: tuple[tuple[re.Pattern[str], Callable[[str, StoTable], str]], ...] = (
-    (re.compile(r"(?P<stem>.+)_(?P<end>moment)"), lambda end, table: MOMENT),
-    (re.compile(r"(?P<stem>.+)_(?P<end>force)"), lambda end, table: FORCE),
-    (re.compile(r"(?P<stem>.+)_(?P<end>O[xyzXYZ]|[XYZ])"), _describe_vector),
+    (compile_later(r"(?P<stem>.+)_(?P<end>moment)"), lambda end, table: MOMENT),
+    (compile_later(r"(?P<stem>.+)_(?P<end>force)"), lambda end, table: FORCE),
+    (compile_later(r"(?P<stem>.+)_(?P<end>O[xyzXYZ]|[XYZ])"), _describe_vector),
     (
-        re.compile(r"(?P<stem>.+)_(?P<end>[fmp][xyz])"),
+        compile_later(r"(?P<stem>.+)_(?P<end>[fmp][xyz])"),
         lambda end, table: {"f": FORCE, "m": MOMENT, "p": "m"}[end[0]],
     ),
     (
-        re.compile(r"(?P<stem>.+)_(?P<end>[FTp][xyz])"),
+        compile_later(r"(?P<stem>.+)_(?P<end>[FTp][xyz])"),
         lambda end, table: {"F": FORCE, "T": MOMENT, "p": "m"}[end[0]],
     ),
-    (re.compile(r"(?P<stem>.+)\.(?P<end>force\.[XYZ])"), lambda end, table: FORCE),
-    (re.compile(r"(?P<stem>.+)\.(?P<end>torque\.[XYZ])"), lambda end, table: MOMENT),
-    (re.compile(r"(?P<stem>.+)\.?(?P<end>PotentialEnergy)"), lambda end, table: "J"),
+    (compile_later(r"(?P<stem>.+)\.(?P<end>force\.[XYZ])"), lambda end, table: FORCE),
+    (compile_later(r"(?P<stem>.+)\.(?P<end>torque\.[XYZ])"), lambda end, table: MOMENT),
+    (compile_later(r"(?P<stem>.+)\.?(?P<end>PotentialEnergy)"), lambda end, table: "J"),
 )
 """Ends of labels, and the functions that return their units."""
 _VECTORS = [pattern for pattern, _ in _ENDINGS[2:]]

@@ -9,6 +9,7 @@ import re
 from typing import Literal
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.io.document.spans import Markup, find_markup
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField
@@ -17,11 +18,11 @@ from osimlite.schema.specs import FieldSpec, get_field_specs
 
 Kind = Literal["tag", "closing tag", "attribute", "text", "comment"]
 
-_TAG_NAME = re.compile(r"[^\s/<>!?\"'&=]*")
-_NAME_GIVEN = re.compile(r"\sname\s*=\s*([\"'])(.*?)\1", re.DOTALL)
-_ATTRIBUTE_VALUE = re.compile(r"([^\s=\"'<>/]+)\s*=\s*([\"'])([^\"'<]*)$")
-_SPECIAL = re.compile(r"<[!?]")
-_WORD = re.compile(r"[^\s<>]*")
+_TAG_NAME = compile_later(r"[^\s/<>!?\"'&=]*")
+_NAME_GIVEN = compile_later(r"\sname\s*=\s*([\"'])(.*?)\1", re.DOTALL)
+_ATTRIBUTE_VALUE = compile_later(r"([^\s=\"'<>/]+)\s*=\s*([\"'])([^\"'<]*)$")
+_SPECIAL = compile_later(r"<[!?]")
+_WORD = compile_later(r"[^\s<>]*")
 
 
 class Element(NamedTuple):

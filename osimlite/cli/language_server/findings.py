@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 from lsprotocol import types
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import escape_unprintable
 from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Finding, Severity
 from osimlite.lint.fixes import select_edits
 
-_ENDS_HEADER = re.compile(r"(\r?\n)([ \t]*endheader)")
+_ENDS_HEADER = compile_later(r"(\r?\n)([ \t]*endheader)")
 
 SOURCE = "osimlite"
 """Origin that an editor shows for a diagnostic."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from functools import cached_property
 
 from lsprotocol import types
 
-_LINE_END = re.compile(r"\r\n?|\n")
+from osimlite.base.patterns import compile_later
+
+_LINE_END = compile_later(r"\r\n?|\n")
 
 
 class Text:

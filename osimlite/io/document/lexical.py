@@ -14,6 +14,7 @@ from functools import cache
 from math import isfinite
 from typing import Any, Literal
 
+from osimlite.base.patterns import compile_later
 from osimlite.schema.fields import FieldType, Reference, Value
 
 Trouble = Literal["unreadable", "cut", "too-many", "too-few", "empty", "ignored"]
@@ -24,7 +25,7 @@ ABSENT: Any = object()
 # Without `1`, which is true in the second property system of OpenSim and false in the first.
 _PLAIN_FLAGS = {"true": True, "false": False, "0": False}
 
-_PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_PREFIX = compile_later(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _SPECIAL = {
     "nan": math.nan,
     "inf": math.inf,
@@ -140,7 +141,7 @@ def split_words(raw: str) -> list[str]:
     return raw.split() if raw.isascii() else _OTHER.findall(raw)
 
 
-_OTHER = re.compile(r"[^ \t\n\r\f\v]+")
+_OTHER = compile_later(r"[^ \t\n\r\f\v]+")
 _WORDS: dict[str, Callable[[str], Any]] = {
     "double": parse_real,
     "int": parse_integer,

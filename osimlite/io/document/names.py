@@ -7,18 +7,21 @@ replaced by other characters while a text is parsed.
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
+
+from osimlite.base.patterns import compile_later
 
 _COLON = "\u02d0"
 _XMLNS = "xml\u0274s"
 _STAND_INS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
 
-ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?P<quoted>\"[^\"]*+\"|'[^']*+')")
+ATTRIBUTE = compile_later(
+    r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?P<quoted>\"[^\"]*+\"|'[^']*+')"
+)
 """Attribute in a start tag, and its value with quotation marks."""
-_COLONS = re.compile(b":")
-_NAMESPACE = re.compile(rb"(?<=\s)xmlns(?=\s*=)")
-_TAG_SO_FAR = re.compile(
+_COLONS = compile_later(b":")
+_NAMESPACE = compile_later(rb"(?<=\s)xmlns(?=\s*=)")
+_TAG_SO_FAR = compile_later(
     rb"</?[A-Za-z_\x80-\xff][^\s<>=\"'/]*"
     rb"(?:\s+[^\s<>=\"'/]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*"
     rb"(?:\s+[^\s<>=\"'/]+)?"

@@ -14,6 +14,7 @@ from html.entities import html5
 from lxml import etree
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.errors import NotWellFormedError
 from osimlite.io.document.names import ATTRIBUTE, decode_name
 from osimlite.io.document.notes import Note, NoteKind
@@ -22,32 +23,32 @@ from osimlite.io.document.spans import find_markup
 from osimlite.io.document.syntax import check_doctype
 
 # A line that begins with seven brackets is no XML in any case.
-_MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
-_HYPHENS = re.compile(r"-{2,}|-\Z")
+_MARK = compile_later(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
+_HYPHENS = compile_later(r"-{2,}|-\Z")
 # XML has five entities of its own; the others of HTML are known to editors.
 # OpenSim also rejects a character number without a semicolon.
-_AMPERSAND = re.compile(r"&(?!#(?!x?;))(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
+_AMPERSAND = compile_later(r"&(?!#(?!x?;))(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
 _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
-_NO_CHARACTER = re.compile("[\x01-\x08\x0e-\x1f\ufffe\uffff]")
-_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
-_VALUE = re.compile(
+_NO_CHARACTER = compile_later("[\x01-\x08\x0e-\x1f\ufffe\uffff]")
+_NUMBERED = compile_later(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
+_VALUE = compile_later(
     r"\"[^\"]*\"|'[^']*'|"
     r"(?<=\s)(?P<name>[^\s=\"'<>/]+)\s*=(?:\s*(?P<bare>[^\s=\"'<>/]+)(?=[\s/>])|(?=\s*/?>))"
 )
-_TOUCHING = re.compile(r"(?:\"[^\"]*\"|'[^']*')(?=[^\s/>?\"'])")
-_SOUND_DECLARATION = re.compile(
+_TOUCHING = compile_later(r"(?:\"[^\"]*\"|'[^']*')(?=[^\s/>?\"'])")
+_SOUND_DECLARATION = compile_later(
     r"<\?xml\s+version\s*=\s*([\"'])1\.[0-9]+\1(?:\s+encoding\s*=\s*([\"'])[A-Za-z][\w.-]*\2)?"
     r"(?:\s+standalone\s*=\s*([\"'])(?:yes|no)\3)?\s*\?>",
     re.ASCII,
 )
-_OPEN_DECLARATION = re.compile(r"[\s\ufeff]*(<\?xml\b[^<>]*>)(?<!\?>)")
-_NAMED = re.compile(r"<\?[^\W\d][\w.:-]*(?:\s|\?>)")
-_ENDING = re.compile(r"\]\]>")
-_XML_IN_CAPITALS = re.compile(r"<\?xml(?![\w.:-])", re.IGNORECASE)
+_OPEN_DECLARATION = compile_later(r"[\s\ufeff]*(<\?xml\b[^<>]*>)(?<!\?>)")
+_NAMED = compile_later(r"<\?[^\W\d][\w.:-]*(?:\s|\?>)")
+_ENDING = compile_later(r"\]\]>")
+_XML_IN_CAPITALS = compile_later(r"<\?xml(?![\w.:-])", re.IGNORECASE)
 _REPLACEMENT = "\ufffd"
-_BLANK_CONTROLS = re.compile("[\f\v]")
-_DECLARATION = re.compile(r"<\?xml\s")
-_SPECIAL = re.compile(r"<!(?:--|\[CDATA\[)")
+_BLANK_CONTROLS = compile_later("[\f\v]")
+_DECLARATION = compile_later(r"<\?xml\s")
+_SPECIAL = compile_later(r"<!(?:--|\[CDATA\[)")
 _EN_DASH = "\u2013"
 
 

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from osimlite.base.files import read_file
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.errors import OsimliteError
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.spans import PlainSpans, Span, find_spans
@@ -299,9 +300,9 @@ _MARKS = {
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
-_DECLARED = re.compile(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
+_DECLARED = compile_later(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
 
-_BYTEWISE = re.compile(
+_BYTEWISE = compile_later(
     r"utf-?8|us-ascii|ascii|iso-?8859|latin|windows-|cp\d|mac|koi8|gb|big5|shift|euc"
 )
 

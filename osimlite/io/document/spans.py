@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import overload
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 
 
 class Span(NamedTuple):
@@ -47,11 +48,11 @@ class Markup(NamedTuple):
 
 # Possessive quantifiers, and no match beyond the next "<": the time is linear in the length of any
 # text, also of one that is not XML.
-_MARKUP = re.compile(
+_MARKUP = compile_later(
     r"<(?:(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)|/(?P<close>[^\s<>]++)\s*+>|"
     r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*+(?P<empty>/?)>)"
 )
-_NAME = re.compile(r"[^\s/<>!?\"'&]++")
+_NAME = compile_later(r"[^\s/<>!?\"'&]++")
 _SPECIAL = {
     "!--": ("comment", "-->"),
     "![CDATA[": ("cdata", "]]>"),
@@ -92,7 +93,7 @@ def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
             )
 
 
-_REMARK = re.compile(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
+_REMARK = compile_later(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
 
 
 def blank_comments(text: str, character: str = " ") -> str:
@@ -171,10 +172,10 @@ def find_spans(text: str, *, as_opensim: bool = False) -> list[Span]:
     return [*map(Span._make, zip(tags, starts, tag_ends, inner_ends, ends, strict=True))]
 
 
-_BEGIN = re.compile(r"<[^/!?]")
+_BEGIN = compile_later(r"<[^/!?]")
 
 # Slower pattern for texts whose comments or sections contain what looks like a tag.
-_BEGIN_OR_HIDDEN = re.compile(r"<[^/!?]|<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
+_BEGIN_OR_HIDDEN = compile_later(r"<[^/!?]|<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
 
 
 class PlainSpans(Sequence[Span]):

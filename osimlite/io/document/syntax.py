@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from osimlite.base.patterns import compile_later
 from osimlite.errors import NotWellFormedError
 from osimlite.io.document.names import decode_name
 from osimlite.io.document.source import Position, Source
@@ -44,7 +45,7 @@ _PLAIN = (
 )
 
 
-_PLAIN_DOCTYPE = re.compile(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*+>")
+_PLAIN_DOCTYPE = compile_later(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*+>")
 """DOCTYPE that ends at its first ``>``, so that it declares nothing."""
 
 

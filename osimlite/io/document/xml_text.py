@@ -14,6 +14,7 @@ from typing import Any, cast
 
 from lxml import etree
 
+from osimlite.base.patterns import compile_later
 from osimlite.errors import ModelError
 from osimlite.io.document.names import decode_name, replace_colons
 
@@ -22,7 +23,7 @@ DIGEST_SIZE = 6
 MANY_ATTRIBUTES = 100
 """Number of attributes from which an element is read by XPath; elements of OpenSim have three."""
 
-_COMMENT = re.compile(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
+_COMMENT = compile_later(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
 
 
 @lru_cache(maxsize=4096)
@@ -54,7 +55,7 @@ def _load_digests() -> frozenset[bytes]:
     return frozenset(data[i : i + DIGEST_SIZE] for i in range(0, len(data), DIGEST_SIZE))
 
 
-NO_XML = re.compile("[\\0-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\uffff]")
+NO_XML = compile_later("[\\0-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\uffff]")
 """Characters that XML cannot contain."""
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from osimlite.base.patterns import compile_later
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.surface import Array
 
@@ -14,7 +15,7 @@ _HEAD = b"binary STL".ljust(80)
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _Triangles = np.ndarray[tuple[int], np.dtype[np.void]]
 _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_CORNER = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re.IGNORECASE)
+_CORNER = compile_later(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re.IGNORECASE)
 
 
 def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.0)) -> bytes:

@@ -9,6 +9,7 @@ import re
 from itertools import islice
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.errors import UnsupportedError
 from osimlite.io.document.source import Position
 
@@ -38,17 +39,18 @@ SUFFIXES = {
     **{f"Vec{size}": tuple(f"_{k + 1}" for k in range(size)) for size in (2, *range(4, 13))},
 }
 """Suffixes by type of a cell (``DataType``), which OpenSim appends to labels when it splits cells."""
-_SOLID = re.compile(rb"\S")
+_SOLID = compile_later(rb"\S")
 MARK = b"\xef\xbb\xbf"
 """Byte order mark of UTF-8."""
-_LINE = re.compile(rb"[^\n]*(?:\n|\Z)")
-_END = re.compile(rb"^[ \t]*endheader[ \t]*\r?(?:\n|\Z)", re.MULTILINE)
-_ANY_END = re.compile(_END.pattern, re.MULTILINE | re.IGNORECASE)
-_LABELS = re.compile(rb"^[ \t]*time\b", re.MULTILINE | re.IGNORECASE)
-_KEY = re.compile(r"\s*([^\s=]+)[\s=]*(.*)", re.ASCII)
+_LINE = compile_later(rb"[^\n]*(?:\n|\Z)")
+_END_LINE = rb"^[ \t]*endheader[ \t]*\r?(?:\n|\Z)"
+_END = compile_later(_END_LINE, re.MULTILINE)
+_ANY_END = compile_later(_END_LINE, re.MULTILINE | re.IGNORECASE)
+_LABELS = compile_later(rb"^[ \t]*time\b", re.MULTILINE | re.IGNORECASE)
+_KEY = compile_later(r"\s*([^\s=]+)[\s=]*(.*)", re.ASCII)
 _KEYS = {*COUNTS, "range", "version", "Angles", "Units"}
-_WORD = re.compile(r"\S+", re.ASCII)
-_BETWEEN_TABS = re.compile(r"[^\t\s][^\t]*(?<![\t\s])", re.ASCII)
+_WORD = compile_later(r"\S+", re.ASCII)
+_BETWEEN_TABS = compile_later(r"[^\t\s][^\t]*(?<![\t\s])", re.ASCII)
 
 
 def list_suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from osimlite.base.files import open_file
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.io.tables.headers import MAX_HEADER_BYTES, StorageHeader, list_suffixes
 
-_NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
+_NO_NUMBER = compile_later(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 """How programs on Windows wrote what is no number."""
 
 

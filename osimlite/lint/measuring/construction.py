@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.patterns import compile_later
 from osimlite.errors import DoubtfulWarning, OsimliteError, SimulationError, UnsupportedError
 from osimlite.lint.construction import Obstacle, Stage
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
@@ -37,7 +38,7 @@ from osimlite.simulation.system import System
 SINGULAR_RATIO = 1e-12
 """Ratio of the smallest to the largest eigenvalue below which a mass matrix counts as singular."""
 
-_QUOTED_PATH = re.compile(r"'(/[^']*)'")
+_QUOTED_PATH = compile_later(r"'(/[^']*)'")
 
 
 @np.errstate(all="ignore")

@@ -13,6 +13,7 @@ from itertools import groupby
 from typing import TypeVar
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import escape_unprintable, join_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 
@@ -101,8 +102,8 @@ _ONE_CAUSE_RULES = {"OSIM701"}
 """Rules whose findings are fixed together: two of them are folded already."""
 
 # Names are in quotes or are tags. A number includes its unit; paths count as numbers.
-_NAME_PATTERN = re.compile(r"'[^']*'|<\w+>")
-_NUMBER_PATTERN = re.compile(r"(?<!\S)[^\s']*/[^\s']*|(?<!\w)[-+]?[\d.][\w.+-]*")
+_NAME_PATTERN = compile_later(r"'[^']*'|<\w+>")
+_NUMBER_PATTERN = compile_later(r"(?<!\S)[^\s']*/[^\s']*|(?<!\w)[-+]?[\d.][\w.+-]*")
 
 
 class Fold(NamedTuple):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from math import isfinite
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
@@ -19,7 +19,7 @@ from osimlite.schema.functions import ExpressionBasedFunction
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.registry import get_plugin_classes
 
-_QUOTED = re.compile(r"'([^']+)'")
+_QUOTED = compile_later(r"'([^']+)'")
 
 
 @rule(

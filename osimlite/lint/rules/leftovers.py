@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from math import isfinite
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import find_nearest
 from osimlite.io.document.lexical import ABSENT, UncleanText, make_converter
 from osimlite.io.document.names import ATTRIBUTE
@@ -346,7 +347,7 @@ def _describe_unreadable(source: Source, number: int, kind: str) -> str:
     return ""
 
 
-_COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+_COMMENT = compile_later("<!--.*?-->", re.DOTALL)
 """XML comment."""
 _TOOL_CLASSES = {
     "CMC_Joint": dict.fromkeys(["on", "wrt_body", "express_body", "active", "coordinate"], "text")
@@ -358,9 +359,9 @@ _UNREAD_KINDS = frozenset(
     ("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag")
 )
 """Kinds of notes about elements that OpenSim does not read."""
-_QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
+_QUOTED = compile_later(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
 """Value of an attribute that contains a ">"."""
 # A tag is looked for from the last "<" before its ">": else the time would be that of all open
 # ones.
-_AFTER = re.compile(r"(?:</[^<>]+>|/>)\s*+([^<]++)")
-_BEFORE = re.compile(r"<[^/!?<>][^<>]*+(?<!/)>\s*+([^<]++)<(?![/!?])")
+_AFTER = compile_later(r"(?:</[^<>]+>|/>)\s*+([^<]++)")
+_BEFORE = compile_later(r"<[^/!?<>][^<>]*+(?<!/)>\s*+([^<]++)<(?![/!?])")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
+from osimlite.base.patterns import compile_later
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_comments
 from osimlite.lint.diagnostic import Edit, Fix
@@ -11,11 +10,11 @@ from osimlite.lint.fixes import remove_text, replace_text
 from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 
-_CONTROLS = re.compile("[\f\v]")
+_CONTROLS = compile_later("[\f\v]")
 # The bracket first: one character is searched for much faster than a class of them.
-_BLANK_BEFORE_END = re.compile(r">(?<=\s>)")
-_BLANK_IN_CLOSING = re.compile(r"</[^<>\s]+(\s+)>")
-_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
+_BLANK_BEFORE_END = compile_later(r">(?<=\s>)")
+_BLANK_IN_CLOSING = compile_later(r"</[^<>\s]+(\s+)>")
+_NUMBERED = compile_later(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
 
 @rule("OSIM008", "character-reference", severity=ERROR, fixes="safe", consequences=(RUNS,))

@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import find_nearest, format_count, join_words
 from osimlite.io.document.lexical import reads_as
 from osimlite.io.document.notes import Note
@@ -391,9 +392,9 @@ def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec |
     return None
 
 
-_SECTION = re.compile(r"<!\[CDATA\[(.*?)\]\]>", re.DOTALL)
-_SECTIONS = re.compile(r"<!\[CDATA\[.*?\]\]>|<!--.*?-->|<\?.*?>", re.DOTALL)
-_OFF = re.compile(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
+_SECTION = compile_later(r"<!\[CDATA\[(.*?)\]\]>", re.DOTALL)
+_SECTIONS = compile_later(r"<!\[CDATA\[.*?\]\]>|<!--.*?-->|<\?.*?>", re.DOTALL)
+_OFF = compile_later(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
 _FORMER = {"enable_controller": "enabled"}
 """Names that properties had in early releases; OpenSim brings them up to date in no file."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import MAX_TIME_S
@@ -107,8 +108,8 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
                 )
 
 
-_LAST_TABS = re.compile(rb"\t+(?=\r?(\n|\Z))")
-_BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?:[ \t\r\n]*\n)?(?=[^\n]*\S)", re.MULTILINE)
+_LAST_TABS = compile_later(rb"\t+(?=\r?(\n|\Z))")
+_BLANK_LINES = compile_later(rb"^[ \t\r]*\n(?:[ \t\r\n]*\n)?(?=[^\n]*\S)", re.MULTILINE)
 
 
 def _remove_last_tabs(table: Table, width: int) -> Fix | None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from math import nan
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import find_nearest, format_count
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
@@ -12,7 +12,7 @@ from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
-_WHOLE = re.compile(r"\+?[0-9]+")
+_WHOLE = compile_later(r"\+?[0-9]+")
 _TO_THE_END = 1_000_000
 """As many characters as stand in no line."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from osimlite.base.patterns import compile_later
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.io.document.source import Source
 from osimlite.lint.fixes import rename_tag
@@ -13,23 +14,23 @@ from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
 # The line of seven "=" between the two sides is left out: it may occur in a comment.
-_CONFLICT = re.compile(r"^(<{7}|>{7})(?= |$)[^\n]*", re.MULTILINE)
+_CONFLICT = compile_later(r"^(<{7}|>{7})(?= |$)[^\n]*", re.MULTILINE)
 _OLDEST_FOR_OPENSIM = 10901
 """The oldest version that OpenSim 4.6 loads."""
 _SOCKETS = 30505
 """The version in which joints, points and forces got sockets."""
-_SOCKET = re.compile(r"<(socket_\w+)>")
+_SOCKET = compile_later(r"<(socket_\w+)>")
 _LATE: Final = (
-    (re.compile(r"\w+Joint"), ("socket_parent_frame", "socket_child_frame")),
-    (re.compile("Marker"), ("socket_parent_frame",)),
+    (compile_later(r"\w+Joint"), ("socket_parent_frame", "socket_child_frame")),
+    (compile_later("Marker"), ("socket_parent_frame",)),
     (
-        re.compile("(?:Conditional|Moving)PathPoint"),
+        compile_later("(?:Conditional|Moving)PathPoint"),
         ("socket_coordinate", *(f"socket_{x}_coordinate" for x in "xyz")),
     ),
-    (re.compile(r"Contact(?:HalfSpace|Sphere|Mesh)"), ("socket_frame",)),
-    (re.compile(r"\w*BushingForce|WeldConstraint"), ("socket_frame1", "socket_frame2")),
-    (re.compile("(?:Point|ConstantDistance)Constraint"), ("socket_body_1", "socket_body_2")),
-    (re.compile("PointOnLineConstraint"), ("socket_line_body", "socket_follower_body")),
+    (compile_later(r"Contact(?:HalfSpace|Sphere|Mesh)"), ("socket_frame",)),
+    (compile_later(r"\w*BushingForce|WeldConstraint"), ("socket_frame1", "socket_frame2")),
+    (compile_later("(?:Point|ConstantDistance)Constraint"), ("socket_body_1", "socket_body_2")),
+    (compile_later("PointOnLineConstraint"), ("socket_line_body", "socket_follower_body")),
 )
 """Sockets that OpenSim does not take in an older document, by class; those of other classes it does."""
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
-
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import find_nearest, format_count
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, REFUSES, FindingCollector, rule
@@ -149,7 +148,7 @@ class _InputFault(NamedTuple):
 
 # The path of a component, a bar, an output, a channel of it and another name for it; the last two
 # may be left out.
-_INPUT = re.compile(
+_INPUT = compile_later(
     r"(?:(?P<path>.*)\|)?(?P<output>[^|:(]*)(?::(?P<channel>[^(]*))?(?:\((?P<alias>.*)\))?"
 )
 

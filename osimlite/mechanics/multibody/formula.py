@@ -20,6 +20,7 @@ import re
 from collections.abc import Sequence
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.base.records import dataclass
 from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import ModelError
@@ -75,7 +76,7 @@ SIGN = 2
 OPEN = -1
 """Precedence of a parenthesis, which only its end closes."""
 
-_TOKEN = re.compile(
+_TOKEN = compile_later(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[^-+*/^(),\d.][^-+*/^(),]*)|(?P<sign>.)"
 )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.records import dataclass
 from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import OsimliteError
@@ -12,7 +13,7 @@ from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.batches import BatchEngine
 from osimlite.simulation.elements.contact import HuntCrossley
 
-_FOOT_WORDS = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
+_FOOT_WORDS = compile_later(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
 """Words in names of contacts and spheres that mean a part of the foot."""
 
 

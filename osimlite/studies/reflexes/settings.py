@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.files import read_file
+from osimlite.base.patterns import compile_later
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import join_words, suggest_name
 from osimlite.base.writing import find_shared_folders
@@ -25,7 +25,7 @@ from osimlite.errors import DocumentError, MissingFileError
 from osimlite.io.document.data import SUFFIXES, parse_yaml
 from osimlite.mechanics.multibody.spatial import Array
 
-_TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
+_TOKEN = compile_later(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
 """Tokens of SCONE files; white space and comments match too, but have no group `token`."""
 FLAGS = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 """Spellings of true and false that scenarios may use."""

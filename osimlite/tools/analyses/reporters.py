@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import join_words, suggest_name
 from osimlite.io.tables.old_storage import DEGREES, UNITS
 from osimlite.mechanics.multibody.spatial import Array
@@ -27,7 +26,7 @@ from osimlite.tools.reaction_forces import compute_constraint_records
 
 OUTPUT_FILES = {"double": "Outputs", "Vec3": "OutputsVec3", "SpatialVec": "OutputsSpatialVec"}
 """Suffix of the file by type of the outputs."""
-OUTPUT_PATTERN = re.compile(
+OUTPUT_PATTERN = compile_later(
     r"(?P<path>[^|:(]*)\|(?P<output>[^|:(]+)(:(?P<channel>[^(]*))?(\((?P<alias>.*)\))?"
 )
 """Syntax of a requested output: ``path|output:channel(alias)``."""

@@ -7,12 +7,12 @@ or the frames.
 
 from __future__ import annotations
 
-import re
 from functools import lru_cache
 
 from lxml import etree
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.patterns import compile_later
 from osimlite.io.document.names import decode_name
 from osimlite.io.document.upgrade.draft import Element
 
@@ -32,10 +32,10 @@ class NewerContent(NamedTuple):
 
 
 _MARKS = (
-    (re.compile("Body"), {"inertia": 30500, "attached_geometry": 30502}),
-    (re.compile("Model"), {"JointSet": 30501, "Ground": 30501}),
+    (compile_later("Body"), {"inertia": 30500, "attached_geometry": 30502}),
+    (compile_later("Model"), {"JointSet": 30501, "Ground": 30501}),
     (
-        re.compile(r"\w+Joint"),
+        compile_later(r"\w+Joint"),
         {
             "frames": 30505,
             "coordinates": 30507,
@@ -43,14 +43,14 @@ _MARKS = (
             "socket_child_frame": 30505,
         },
     ),
-    (re.compile(r"\w*PathPoint|Marker|Station"), {"socket_parent_frame": 30505}),
-    (re.compile(r"PhysicalOffsetFrame"), {"socket_parent": 30505}),
-    (re.compile(r"Contact\w+"), {"socket_frame": 30505}),
+    (compile_later(r"\w*PathPoint|Marker|Station"), {"socket_parent_frame": 30505}),
+    (compile_later(r"PhysicalOffsetFrame"), {"socket_parent": 30505}),
+    (compile_later(r"Contact\w+"), {"socket_frame": 30505}),
     (
-        re.compile(r"\w+(?:Force|Muscle|Actuator|Spring|Ligament|Muscle_Deprecated)"),
+        compile_later(r"\w+(?:Force|Muscle|Actuator|Spring|Ligament|Muscle_Deprecated)"),
         {"appliesForce": 30509},
     ),
-    (re.compile(r"\w+Constraint"), {"isEnforced": 30509}),
+    (compile_later(r"\w+Constraint"), {"isEnforced": 30509}),
 )
 """Properties of some classes, with the version that introduced each."""
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from math import isfinite, isinf
 
+from osimlite.base.patterns import compile_later
 from osimlite.io.document.lexical import UncleanText, parse_real, split_words
 from osimlite.io.document.upgrade.draft import Draft, Element, get_text, list_elements
 
@@ -192,7 +193,7 @@ def _is_vector(size: int) -> Callable[[str], bool]:
     return reads
 
 
-_is_real = re.compile(_NUMBER).fullmatch
+_is_real = compile_later(_NUMBER).fullmatch
 """Match of a number without spaces, or None."""
 
 

@@ -7,6 +7,7 @@ from typing import cast
 
 from lxml import etree
 
+from osimlite.base.patterns import compile_later
 from osimlite.base.text import make_unique_name
 from osimlite.io.document.upgrade.draft import (
     Draft,
@@ -20,7 +21,7 @@ from osimlite.io.document.upgrade.draft import (
     parse_reals,
 )
 
-_SUFFIX = re.compile(r"((?:socket|input)_.*)_connectee_names?")
+_SUFFIX = compile_later(r"((?:socket|input)_.*)_connectee_names?")
 
 
 def convert_connectors(draft: Draft) -> None:
