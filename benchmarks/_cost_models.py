@@ -19,13 +19,14 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, SpatialTransform, TransformAxis
 from osimlite.schema.fields import Vec3
 from osimlite.schema.frames import Body, PhysicalFrame
-from osimlite.schema.functions import LinearFunction, SimmSpline
+from osimlite.schema.functions import LinearFunction
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.markers import Marker
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.paths import GeometryPath, PathPoint, PathPointSet, PathWrap, PathWrapSet
-from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid
+from osimlite.schema.splines import SimmSpline
+from osimlite.schema.wrap_types import WrapCylinder, WrapEllipsoid
 
 WALKER = Path(__file__).resolve().parents[1] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 AXES: tuple[Vec3, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

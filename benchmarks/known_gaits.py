@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from osimlite.mechanics.kernels.record import ENDING
-from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import Body

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,12 +21,10 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.schema.tools.inverse_kinematics import (
-    IKCoordinateTask,
-    IKMarkerTask,
-    IKTask,
-    InverseKinematicsTool,
-)
+from osimlite.schema.tools.ik_tasks import IKCoordinateTask, IKMarkerTask, IKTask
+
+if TYPE_CHECKING:
+    from osimlite.schema.tools.inverse_kinematics import InverseKinematicsTool
 
 NO_FILE = ("", "Unassigned")
 """Values of a file property that name no file."""

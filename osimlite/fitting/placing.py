@@ -20,7 +20,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
-from osimlite.schema.tools.inverse_kinematics import IKTask
+from osimlite.schema.tools.ik_tasks import IKTask
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.states import StateLayout, sort_by_component
 

@@ -24,7 +24,7 @@ from osimlite.schema.base import Object
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet
 from osimlite.schema.model import Model
-from osimlite.schema.tools.inverse_kinematics import IKTask
+from osimlite.schema.tools.ik_tasks import IKTask
 from osimlite.schema.tools.scale import (
     BodyScale,
     BodyScaleSet,

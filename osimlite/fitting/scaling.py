@@ -18,7 +18,6 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.spatial import Array, rotation_xyz
 from osimlite.schema.base import Component
-from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import SpatialTransform
 from osimlite.schema.facts import ACROSS, ALONG, AXES, HOLDER, MEAN, OWN, PATH, Facts
@@ -26,6 +25,7 @@ from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.functions import Function, LinearFunction, MultiplierFunction
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
+from osimlite.schema.resolution import is_a
 from osimlite.schema.wrapping import WrapObject
 
 Factors = Mapping[str, Sequence[float]]
@@ -218,7 +218,7 @@ class _Scaler:
             frame_source, _, factor_choice = rule.partition(" ")
             if frame_source == PATH:
                 continue
-            if isinstance(component, CoordinateCouplerConstraint):
+            if is_a(component, "CoordinateCouplerConstraint"):
                 factors = self._get_coupler_factors(component, frame_source)
             elif frame_source == OWN:
                 assert isinstance(component, PhysicalFrame)
@@ -247,7 +247,7 @@ class _Scaler:
         assert ancestor is not None
         return ancestor
 
-    def _get_coupler_factors(self, coupler: CoordinateCouplerConstraint, name: str) -> Array | None:
+    def _get_coupler_factors(self, coupler: Component, name: str) -> Array | None:
         """Return the factors for a coupler that determines a translation; None for a rotation.
 
         They are those of the parent of the joint that the translation belongs to.

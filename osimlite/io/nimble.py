@@ -15,15 +15,13 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction
-from osimlite.schema.joints import (
+from osimlite.schema.joint_types import (
     ConstantCurvatureJoint,
     EllipsoidJoint,
-    Joint,
-    PinJoint,
     ScapulothoracicJoint,
     UniversalJoint,
-    WeldJoint,
 )
+from osimlite.schema.joints import Joint, PinJoint, WeldJoint
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
 

@@ -43,13 +43,14 @@ from osimlite.mechanics.laws.vectors import (
 )
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
-from osimlite.schema.functions import Constant, GCVSpline, PiecewiseLinearFunction, SimmSpline
-from osimlite.schema.joints import EllipsoidJoint, GimbalJoint, Joint
+from osimlite.schema.functions import Constant
+from osimlite.schema.joints import Joint
 from osimlite.schema.tree import is_a
 
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.functions import SmoothFunction
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
+    from osimlite.schema.joint_types import EllipsoidJoint
 
 
 class FramePose(NamedTuple):
@@ -247,7 +248,9 @@ def _make_function(axis: TransformAxis, rough: bool) -> SmoothFunction | None:
     from osimlite.mechanics.multibody.schema_functions import convert_function
 
     function: Any = axis.function
-    if isinstance(function, GCVSpline):
+    if function is not None and is_a(function, "GCVSpline"):
+        from osimlite.schema.splines import PiecewiseLinearFunction
+
         function = (
             PiecewiseLinearFunction.build({"x": function.x, "y": function.y}, set())
             if rough
@@ -257,7 +260,9 @@ def _make_function(axis: TransformAxis, rough: bool) -> SmoothFunction | None:
     # OpenSim's curves are functions of one argument, while polynomials and products may have more.
     try:
         # Of several coordinates, which should not be, a curve takes the first.
-        takes_one = isinstance(function, (SimmSpline, PiecewiseLinearFunction))
+        takes_one = function is not None and (
+            is_a(function, "SimmSpline") or is_a(function, "PiecewiseLinearFunction")
+        )
         return convert_function(function, min(count, 1) if takes_one else count, axis.name)
     except OsimliteError:
         return None
@@ -279,8 +284,8 @@ def _compute_joint_pose(
         elif amount:
             position = add_scaled(position, amount, motion.axis)
     # OpenSim places the child on the ellipsoid where the rotated z axis points.
-    if isinstance(joint, EllipsoidJoint):
-        position = multiply_elementwise(joint.radii_x_y_z, axes[2])
+    if is_a(joint, "EllipsoidJoint"):
+        position = multiply_elementwise(cast("EllipsoidJoint", joint).radii_x_y_z, axes[2])
     return FramePose(axes, position)
 
 
@@ -310,6 +315,4 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
         axes = multiply_rotations(
             axes, rotation_about_axis(motion.axis, *_sine_cosine(motion.amount(values)))
         )
-    return (
-        list(result.items()) if isinstance(joint, GimbalJoint) or is_a(joint, "CustomJoint") else []
-    )
+    return list(result.items()) if is_a(joint, "GimbalJoint") or is_a(joint, "CustomJoint") else []

@@ -6,11 +6,11 @@ from math import pi
 
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body
-from osimlite.schema.geometry import Cylinder
+from osimlite.schema.geometry_types import Cylinder
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 from osimlite.schema.paths import GeometryPath, PathPoint
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
 
 UPPER_ARM_LENGTH_M = 0.3
 """Length of the upper arm (m); the shoulder is 1 m above the origin of ground."""

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from math import radians
 
-from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
 from osimlite.schema.frames import Body
-from osimlite.schema.geometry import Appearance, Brick, Ellipsoid, Sphere
+from osimlite.schema.geometry import Appearance
+from osimlite.schema.geometry_types import Brick, Ellipsoid, Sphere
 from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 

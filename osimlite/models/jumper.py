@@ -17,17 +17,18 @@ from pathlib import Path
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.tables.table_stream import TableStream
-from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Vec3
 from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
 from osimlite.schema.frames import Body, PhysicalOffsetFrame
-from osimlite.schema.functions import Function, FunctionSet, PiecewiseLinearFunction
-from osimlite.schema.geometry import Ellipsoid, Geometry, Sphere
+from osimlite.schema.functions import Function, FunctionSet
+from osimlite.schema.geometry import Geometry
+from osimlite.schema.geometry_types import Ellipsoid, Sphere
 from osimlite.schema.joints import PinJoint, PlanarJoint
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.paths import (
     AbstractPathPoint,
     GeometryPath,
@@ -36,7 +37,8 @@ from osimlite.schema.paths import (
     PathWrap,
     PathWrapSet,
 )
-from osimlite.schema.wrapping import WrapCylinder
+from osimlite.schema.splines import PiecewiseLinearFunction
+from osimlite.schema.wrap_types import WrapCylinder
 
 CONTROLS_FILE = Path(__file__).with_name("jumper_controls.sto")
 """Table with the excitations of the jump; `docs/jumping.md` describes the optimization that found

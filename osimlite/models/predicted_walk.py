@@ -35,11 +35,11 @@ from osimlite.schema.moco.parts import (
 )
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoPhase, MocoProblem, MocoStudy
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 from osimlite.schema.probe_types import (
     Bhargava2004MuscleMetabolicsProbe,
     Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
 )
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
 from osimlite.schema.tools.processors import ModelProcessor
 
 NAME = "human-walks"

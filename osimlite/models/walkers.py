@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.contact import ContactSphere
+from osimlite.schema.contact_types import ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyForce
 from osimlite.schema.frames import Body
-from osimlite.schema.geometry import Brick
+from osimlite.schema.geometry_types import Brick
 from osimlite.schema.model import Model
 
 STEADY_START = {

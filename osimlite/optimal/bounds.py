@@ -10,12 +10,14 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import ActivationCoordinateActuator, ScalarActuator
+from osimlite.schema.actuators import ActivationCoordinateActuator
 from osimlite.schema.base import Component
+from osimlite.schema.forces import ScalarActuator
 from osimlite.schema.moco.parts import MocoVariableInfo
 from osimlite.schema.moco.studies import MocoPhase
-from osimlite.schema.muscles import DeGrooteFregly2016Muscle, Muscle
+from osimlite.schema.muscles import Muscle
 from osimlite.schema.patterns import Pattern
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
 
 Range = tuple[float, float]
 """Lower and upper bound."""

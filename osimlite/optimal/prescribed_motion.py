@@ -24,12 +24,8 @@ from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.point import Formula, PointSymbols, TimeFunction
 from osimlite.optimal.point_functions import cache_last
 from osimlite.optimal.tables import sample_function
-from osimlite.schema.actuators import (
-    ActivationCoordinateActuator,
-    Actuator,
-    CoordinateActuator,
-    ScalarActuator,
-)
+from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
+from osimlite.schema.forces import Actuator, ScalarActuator
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import SliderJoint
 from osimlite.schema.model import Model

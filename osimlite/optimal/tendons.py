@@ -19,7 +19,7 @@ from osimlite.mechanics.laws.smooth_muscles import (
     smooth_tendon_length,
 )
 from osimlite.optimal.point import Formula, PointSymbols
-from osimlite.schema.muscles import DeGrooteFregly2016Muscle
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem

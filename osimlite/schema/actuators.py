@@ -1,36 +1,16 @@
 """Actuators: forces that a control sets."""
 
-import math
 from typing import Annotated, ClassVar
 
 from osimlite.schema.facts import IDLE, STOPS, Facts
 from osimlite.schema.fields import Flag, Number, Vec3, real, vec3
-from osimlite.schema.forces import ForceProducer
+from osimlite.schema.forces import Actuator, ScalarActuator
 from osimlite.schema.references import (
     BodySocket,
     MaybeBodyName,
     MaybeCoordinateName,
     MaybeFrameName,
 )
-
-
-class Actuator(ForceProducer, abstract=True):
-    """A force with one or several controls."""
-
-    facts = Facts(outputs="power")
-
-    control_count: ClassVar[int] = 1
-
-
-class ScalarActuator(Actuator, abstract=True):
-    """A force with one control, kept between two limits."""
-
-    facts = Facts(outputs="actuation speed")
-
-    min_control: Number = -math.inf
-    """Least control that tools choose when they solve for controls; a simulation does not clip to it."""
-    max_control: Number = math.inf
-    """Greatest control that tools choose when they solve for controls; a simulation does not clip to it."""
 
 
 class CoordinateActuator(ScalarActuator):

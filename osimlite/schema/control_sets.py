@@ -3,8 +3,14 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, make_empty_list
-from osimlite.schema.fields import LegacyFlag, LegacyMany, LegacyNumber, real
-from osimlite.schema.sets import Set
+from osimlite.schema.fields import (
+    LegacyFlag,
+    LegacyMany,
+    LegacyNumber,
+    real,
+)
+from osimlite.schema.references import make_input_file
+from osimlite.schema.sets import Controller, Set
 
 
 class Control(Object, abstract=True):
@@ -61,3 +67,13 @@ class ControlSet(Set):
 
     objects: LegacyMany[Control] = make_empty_list()
     """The controls, each with the name of an actuator."""
+
+
+class ControlSetController(Controller):
+    """Controls read from a file of control curves."""
+
+    # If the file is missing, OpenSim writes a line to its log and simulates without controls.
+    controls_file: Annotated[str, make_input_file("ControlSet or table", legacy=True)] = (
+        "Unassigned"
+    )
+    """File of control curves (.xml) or of columns (.sto)."""

@@ -6,7 +6,7 @@ from osimlite.schema.base import ModelComponent, Object, make_default, make_empt
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Many, Single, Value, Vector, real
 from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import MaybeFileName, NumberInputs, make_input_file
+from osimlite.schema.references import MaybeFileName, NumberInputs
 from osimlite.schema.sets import Controller
 
 
@@ -19,16 +19,6 @@ class PrescribedController(Controller):
     """File of a column for each actuator, labelled with its name or path."""
     interpolation_method: Annotated[int | None, Value("int", "optional")] = None
     """What runs between the rows of the file: 0 steps, 1 lines (if left out), 3 cubic, 5 quintic splines."""
-
-
-class ControlSetController(Controller):
-    """Controls read from a file of control curves."""
-
-    # If the file is missing, OpenSim writes a line to its log and simulates without controls.
-    controls_file: Annotated[str, make_input_file("ControlSet or table", legacy=True)] = (
-        "Unassigned"
-    )
-    """File of control curves (.xml) or of columns (.sto)."""
 
 
 class TrackingController(Controller, abstract=True):

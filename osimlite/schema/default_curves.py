@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from osimlite.schema.functions import SimmSpline
+from osimlite.schema.splines import SimmSpline
 
 _TENDON = (
     (-10.0, -0.002, -0.001, 0.0, 0.00131, 0.00281, 0.00431, 0.00581, 0.00731, 0.00881, 0.0103, 0.0118, 0.0123, 9.2,

@@ -1,11 +1,15 @@
 """Forces: what all have in common, contact by the Hunt-Crossley law, and the limits of joints."""
 
+import math
 from typing import Annotated, ClassVar
 
 from osimlite.schema.base import ModelComponent, Object, make_default, make_empty_list
 from osimlite.schema.facts import NAN, REFUSED, TOUCHING, Facts
-from osimlite.schema.fields import Flag, LegacyMany, Single, real
-from osimlite.schema.references import ContactGeometryNames, CoordinateName
+from osimlite.schema.fields import Flag, LegacyMany, Number, Single, real
+from osimlite.schema.references import (
+    ContactGeometryNames,
+    CoordinateName,
+)
 from osimlite.schema.sets import ModelComponentSet, ObjectGroup, Set
 
 
@@ -111,3 +115,22 @@ class ForceSet(ModelComponentSet):
     """The forces; actuators and muscles are forces with controls."""
     groups: LegacyMany[ObjectGroup] = make_empty_list()
     """Named selections of the forces, which tools can leave out; the mechanics ignore them."""
+
+
+class Actuator(ForceProducer, abstract=True):
+    """A force with one or several controls."""
+
+    facts = Facts(outputs="power")
+
+    control_count: ClassVar[int] = 1
+
+
+class ScalarActuator(Actuator, abstract=True):
+    """A force with one control, kept between two limits."""
+
+    facts = Facts(outputs="actuation speed")
+
+    min_control: Number = -math.inf
+    """Least control that tools choose when they solve for controls; a simulation does not clip to it."""
+    max_control: Number = math.inf
+    """Greatest control that tools choose when they solve for controls; a simulation does not clip to it."""

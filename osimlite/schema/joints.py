@@ -4,18 +4,16 @@ The transform of M (child frame) in F (parent frame) is written X_FM; every clas
 coordinates are.
 """
 
-import math
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import ModelComponent, make_default, make_empty_list
+from osimlite.schema.base import ModelComponent, make_empty_list
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.facts import FLAT, NAN, Facts
-from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
+from osimlite.schema.facts import Facts
+from osimlite.schema.fields import LegacyMany, Many, ObjectList, Vec3
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
-from osimlite.schema.geometry import Appearance
 from osimlite.schema.references import PhysicalFrameSocket
 from osimlite.schema.sets import ModelComponentSet
 
@@ -105,7 +103,7 @@ class Joint(ModelComponent, abstract=True):
         return self
 
 
-def _make_coordinates_field(count: int) -> Any:
+def make_coordinates_field(count: int) -> Any:
     """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out.
 
     Returns:
@@ -129,7 +127,7 @@ class PinJoint(Joint):
 
     moves = "rz"
 
-    coordinates: Many[Coordinate] = _make_coordinates_field(1)
+    coordinates: Many[Coordinate] = make_coordinates_field(1)
 
 
 class SliderJoint(Joint):
@@ -137,7 +135,7 @@ class SliderJoint(Joint):
 
     moves = "tx"
 
-    coordinates: Many[Coordinate] = _make_coordinates_field(1)
+    coordinates: Many[Coordinate] = make_coordinates_field(1)
 
 
 class PlanarJoint(Joint):
@@ -145,107 +143,7 @@ class PlanarJoint(Joint):
 
     moves = "rz tx ty"
 
-    coordinates: Many[Coordinate] = _make_coordinates_field(3)
-
-
-class UniversalJoint(Joint):
-    """Body-fixed rotations about X, then Y; coordinates rx, ry."""
-
-    moves = "rx ry"
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(2)
-
-
-class GimbalJoint(Joint):
-    """Body-fixed rotations about X, Y, Z; the generalized speeds are the rates of the angles."""
-
-    moves = "rx ry rz"
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(3)
-
-
-class BallJoint(Joint):
-    """Body-fixed rotations about X, Y, Z; the generalized speeds are the angular velocity of M in F, along F."""
-
-    moves = "rx ry rz"
-    # An angular velocity stays finite at a second angle of 90 degrees, where the rates of
-    # body-fixed angles do not.
-    speeds_are_rates = False
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(3)
-
-
-class FreeJoint(Joint):
-    """Six degrees of freedom: rx, ry, rz as a BallJoint, then tx, ty, tz along the parent's axes."""
-
-    moves = "rx ry rz tx ty tz"
-    speeds_are_rates = False
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(6)
-
-
-class EllipsoidJoint(Joint):
-    """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
-
-    facts = Facts(
-        # OpenSim has no default for the radii and does not ask for them.
-        missing={NAN: "radii_x_y_z"},
-        doubts={"radii_x_y_z": FLAT},
-        scales={"radii_x_y_z": "socket_parent_frame"},
-    )
-
-    moves = "rx ry rz"
-    speeds_are_rates = False
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(3)
-    radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
-    """Half axes of the ellipsoid along the axes of the parent frame."""
-    appearance: Unnamed[Appearance] = make_default(Appearance)
-    """How the ellipsoid is drawn."""
-
-
-class ScapulothoracicJoint(Joint):
-    """A shoulder blade that glides on an ellipsoid: abduction, elevation, upward rotation, winging."""
-
-    facts = Facts(
-        missing={NAN: "thoracic_ellipsoid_radii_x_y_z"},
-        doubts={"thoracic_ellipsoid_radii_x_y_z": FLAT},
-        scales={
-            "thoracic_ellipsoid_radii_x_y_z": "socket_parent_frame",
-            "scapula_winging_axis_origin": "socket_child_frame",
-        },
-    )
-
-    moves = "r r r r"
-    speeds_are_rates = False
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(4)
-    thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (
-        math.nan,
-        math.nan,
-        math.nan,
-    )
-    """Half axes of the ellipsoid of the chest along the axes of the parent frame."""
-    scapula_winging_axis_origin: Annotated[tuple[float, float], reals("m", least=2, most=2)] = (
-        0.0,
-        0.0,
-    )
-    """x and y of a point on the axis of winging, in the plane of the shoulder blade."""
-    scapula_winging_axis_direction: Annotated[float, real("rad")] = 0.0
-    """Angle of the axis of winging in that plane, from Y towards -X."""
-
-
-class ConstantCurvatureJoint(Joint):
-    """A rod of fixed length that bends evenly, such as a spine; bends about X and Z, then twist about Y."""
-
-    facts = Facts(scales={"length": "socket_child_frame y"})
-    moves = "r r r"
-
-    coordinates: Many[Coordinate] = _make_coordinates_field(3)
-    neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
-    """Added to the coordinates: the shape of the rod where they are 0."""
-    length: Annotated[float, real("m", "> 0")] = 1.0
-    """Length of the rod along its middle line, however it is bent."""
+    coordinates: Many[Coordinate] = make_coordinates_field(3)
 
 
 class JointSet(ModelComponentSet):

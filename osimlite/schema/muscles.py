@@ -4,20 +4,10 @@ Forces are normalised by `max_isometric_force`, fiber lengths by `optimal_fiber_
 lengths by `tendon_slack_length`.
 """
 
-import math
 from collections.abc import Iterator
-from functools import partial
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field
-
-from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.base import ModelComponent, make_default
-from osimlite.schema.default_curves import (
-    make_active_force_length,
-    make_force_velocity,
-    make_passive_force_length,
-)
 from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
     IDLE,
@@ -25,23 +15,13 @@ from osimlite.schema.facts import (
     NAN,
     NO_EQUILIBRIUM,
     PATH,
-    STOPS,
-    STUCK,
     UP_TO_QUARTER_TURN,
     Contradiction,
     Facts,
 )
-from osimlite.schema.fields import Flag, Number, Single, Tag, Unnamed, real, word
-from osimlite.schema.functions import Function
+from osimlite.schema.fields import Flag, Number, Single, Tag, real
+from osimlite.schema.forces import ScalarActuator
 from osimlite.schema.geometry import Appearance
-from osimlite.schema.muscle_curves import (
-    ActiveForceLengthCurve,
-    FiberCompressiveForceCosPennationCurve,
-    FiberCompressiveForceLengthCurve,
-    FiberForceLengthCurve,
-    ForceVelocityCurve,
-    TendonForceLengthCurve,
-)
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 
 MAXIMUM_PENNATION = 1.4706289056333368
@@ -95,39 +75,6 @@ class PathActuator(ScalarActuator):
     """The line along which the actuator pulls."""
     optimal_force: Annotated[float, real("N")] = 1.0
     """Tension at a control of 1; classes with a law of their own do without it."""
-
-
-class ClutchedPathSpring(PathActuator):
-    """A spring along a path that its control engages, with the length it has then as rest length."""
-
-    facts = Facts(
-        states="stretch",
-        domains={"initial_stretch": ">= 0"},
-        refused="stiffness dissipation relaxation_time_constant initial_stretch",
-        zero={STOPS: "relaxation_time_constant"},
-    )
-
-    min_control: Number = 0.0
-    max_control: Number = 1.0
-    stiffness: Annotated[float, real("N/m", ">= 0")] = math.nan
-    """Tension per stretch at a control of 1; less control pulls proportionally less."""
-    dissipation: Annotated[float, real("s/m", ">= 0")] = math.nan
-    """The c of 1 + c v, by which the lengthening speed v raises the tension."""
-    relaxation_time_constant: Annotated[float, real("s", "> 0")] = 0.001
-    """Time constant with which the stretch fades while the control is 0."""
-    initial_stretch: Annotated[float, real("m")] = 0.0
-    """Stretch at the start of a simulation."""
-
-
-class McKibbenActuator(PathActuator):
-    """A pneumatic muscle: a tube in a braid, whose control is the pressure in it."""
-
-    number_of_turns: Annotated[float, real(domain="> 0")] = 1.5
-    """Turns of a thread around the tube, from end to end."""
-    thread_length: Annotated[float, real(domain="> 0")] = 200.0
-    """Length of one thread of the braid, unwound."""
-    cord_length: Annotated[float, real(domain=">= 0")] = 0.0
-    """Length of the path that is cord and does not shorten; the tube is the rest."""
 
 
 class Muscle(PathActuator, abstract=True):
@@ -264,304 +211,14 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
                 "fv_linear_extrap_threshold",
                 f"its fv_linear_extrap_threshold is not above 1/Flen, {min_threshold:.4g}",
             )
-        yield from _check_minimum_activation(self.minimum_activation)
+        yield from check_minimum_activation(self.minimum_activation)
 
 
-_MODEL_MINIMUM = "_model_minimum"
+MODEL_MINIMUM = "_model_minimum"
 """Key in the state of a muscle for the minimum of its activation model, which no file holds."""
 
 
-# OpenSim's equilibrium at the start ignores the speed of the path: fibers begin at rest.
-class Millard2012EquilibriumMuscle(Muscle):
-    """The muscle of Millard et al. (2013), tendon and fiber in equilibrium, with curves one can replace."""
-
-    facts = Facts(
-        states="activation?!ignore_activation_dynamics fiber_length?!ignore_tendon_compliance",
-        outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
-        "passive_fiber_elastic_force_along_tendon",
-        domains={
-            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
-            "maximum_pennation_angle": UP_TO_QUARTER_TURN,
-            "activation_time_constant": LEAST_TIME_CONSTANT,
-            "deactivation_time_constant": LEAST_TIME_CONSTANT,
-        },
-        refused="optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
-        "deactivation_time_constant minimum_activation maximum_pennation_angle",
-        zero={STUCK: "tendon_slack_length"},
-        doubts={"tendon_slack_length": NO_EQUILIBRIUM},
-    )
-
-    internal = (
-        ("penMdl", MuscleFixedWidthPennationModel),
-        ("actMdl", MuscleFirstOrderActivationDynamicModel),
-    )
-
-    min_control: Number = 0.01
-    fiber_damping: Annotated[float, real(domain=">= 0")] = 0.1
-    """Damping force of the fiber over `max_isometric_force`, per normalised velocity; none below 0.001."""
-    default_activation: Annotated[float, real(domain="0 to 1")] = 0.05
-    """Activation at the start of a simulation."""
-    default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
-    activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
-    """Time constant of rising activation; high activation slows it down."""
-    deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
-    """Time constant of falling activation; high activation speeds it up."""
-    minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
-    """Activation below which the muscle does not go; below 0.01 only with fiber damping or a rigid tendon."""
-    maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibers do not go beyond; it bounds their length from below."""
-    active_force_length_curve: Unnamed[ActiveForceLengthCurve] = make_default(
-        ActiveForceLengthCurve, name="ActiveForceLengthCurve"
-    )
-    """Active force over fiber length."""
-    force_velocity_curve: Unnamed[ForceVelocityCurve] = make_default(
-        ForceVelocityCurve, name="ForceVelocityCurve"
-    )
-    """Factor of the active force over fiber velocity."""
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = make_default(
-        FiberForceLengthCurve, name="FiberForceLengthCurve"
-    )
-    """Passive force of the fiber over its length."""
-    tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = make_default(
-        TendonForceLengthCurve, name="TendonForceLengthCurve"
-    )
-    """Force of the tendon over its length."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        had_dynamics = not self.ignore_activation_dynamics
-        super().__setattr__(name, value)
-        if had_dynamics and self.ignore_activation_dynamics:
-            self.__dict__[_MODEL_MINIMUM] = self.minimum_activation
-
-    @property
-    def least_activation(self) -> float:
-        """Activation below which OpenSim computes no force.
-
-        It belongs to the activation model inside the muscle, to which OpenSim passes
-        `minimum_activation` on only while the muscle has activation dynamics. Hence a muscle that is
-        read without dynamics has the model's default of 0.01, and one that loses them later, by
-        ModOpIgnoreActivationDynamics for example, keeps its value until it is written to a file.
-        """
-        if not self.ignore_activation_dynamics:
-            return self.minimum_activation
-        value: float | None = self.__dict__.get(_MODEL_MINIMUM)
-        return (
-            MuscleFirstOrderActivationDynamicModel().minimum_activation if value is None else value
-        )
-
-    @property
-    def is_classic(self) -> bool:
-        """True if the tendon is elastic and fibers have no damping, so that the equations are singular without active force."""
-        # OpenSim counts a damping below 0.001 as none (measured with 4.6).
-        return not self.ignore_tendon_compliance and self.fiber_damping < 0.001
-
-    @property
-    def overwritten(self) -> dict[str, float]:
-        """Properties of the curves that OpenSim overrides, depending on whether equations can be singular.
-
-        Returns:
-            Values that OpenSim uses instead, by the name of the property.
-        """
-        if self.is_classic:
-            # The fiber velocity is then the inverse force-velocity curve of force / (activation x
-            # active force), so that the active force must not reach 0.
-            return {"minimum_value": max(self.active_force_length_curve.minimum_value, 0.1)}
-        # With damping or a rigid tendon nothing is divided by the active force, and OpenSim sets
-        # these numbers to 0 even if the file has others.
-        return dict.fromkeys(
-            ("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0
-        )
-
-    def find_contradictions(self) -> Iterator[Contradiction]:
-        """Yield combinations that OpenSim rejects: too little activation without damping, a curve without inverse."""
-        # The same quotient is infinite at an activation of 0.
-        if self.is_classic and self.minimum_activation < 0.01:
-            yield (
-                "minimum_activation",
-                f"its minimum_activation, {self.minimum_activation:.6g}, is below 0.01, which an elastic tendon "
-                "without fiber damping needs",
-            )
-        if self.force_velocity_curve.concentric_slope_near_vmax == 1:
-            yield (
-                None,
-                "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1",
-            )
-        yield from _check_minimum_activation(self.minimum_activation)
-
-
-def _check_minimum_activation(minimum_activation: float) -> Iterator[Contradiction]:
+def check_minimum_activation(minimum_activation: float) -> Iterator[Contradiction]:
+    """Yield the contradiction of a muscle whose activation cannot be less than 1."""
     if minimum_activation == 1:
         yield "minimum_activation", "its minimum_activation is not less than 1"
-
-
-class Millard2012AccelerationMuscle(Muscle):
-    """Muscle of Millard et al. (2013) with a mass between fiber and tendon, whose position and speed are states."""
-
-    facts = Facts(
-        states="activation fiber_length fiber_velocity",
-        mujoco={
-            "rise": "muscle_first_order_activation_dynamic_model.activation_time_constant",
-            "fall": "muscle_first_order_activation_dynamic_model.deactivation_time_constant",
-        },
-    )
-
-    default_activation: Annotated[float, real(domain="0 to 1")] = 0.0
-    """Activation at the start of a simulation."""
-    default_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
-    default_fiber_velocity: Number = 0.0
-    """Fiber velocity at the start of a simulation; lengthening is positive."""
-    # No least activation: the equation of motion of a mass never divides by the activation.
-    muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = (
-        make_default(
-            MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
-        )
-    )
-    """How activation follows the control."""
-    active_force_length_curve: Unnamed[ActiveForceLengthCurve] = make_default(
-        ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
-    )
-    """Active force over fiber length."""
-    force_velocity_curve: Unnamed[ForceVelocityCurve] = make_default(
-        ForceVelocityCurve, name="ForceVelocityCurve"
-    )
-    """Factor of the active force over fiber velocity."""
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = make_default(
-        FiberForceLengthCurve, name="FiberForceLengthCurve"
-    )
-    """Passive force of the fiber over its length."""
-    tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = make_default(
-        TendonForceLengthCurve, name="TendonForceLengthCurve"
-    )
-    """Force of the tendon over its length."""
-    fiber_compressive_force_length_curve: Unnamed[FiberCompressiveForceLengthCurve] = make_default(
-        FiberCompressiveForceLengthCurve, name="default_FiberCompressiveForceLengthCurve"
-    )
-    """Force along the fiber that keeps it from becoming too short."""
-    fiber_compressive_force_cos_pennation_curve: Unnamed[FiberCompressiveForceCosPennationCurve] = (
-        make_default(
-            FiberCompressiveForceCosPennationCurve,
-            name="default_FiberCompressiveForceCosPennationCurve",
-        )
-    )
-    """Force along the tendon that keeps fibers from standing across it."""
-    tendon_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.1
-    """The c of 1 + c v, by which the normalised velocity v raises the tendon's force."""
-    fiber_compressive_force_length_damping: Annotated[float, real(domain=">= 0")] = 1.0
-    """The c of 1 - c v, by which shortening raises the force against short fibers."""
-    fiber_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.01
-    """The c of 1 + c v, by which the normalised velocity v raises the passive force."""
-    fiber_compressive_force_cos_pennation_damping: Annotated[float, real(domain=">= 0")] = 1.0
-    """The c of 1 - c v, by which shortening raises the force against steep fibers."""
-    fiber_damping: Annotated[float, real(domain=">= 0")] = 0.01
-    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
-    mass: Annotated[float, real(domain="> 0")] = 0.1
-    """Mass that moves between fiber and tendon."""
-
-
-class DeGrooteFregly2016Muscle(Muscle):
-    """The muscle of De Groote et al. (2016), smooth everywhere, made for direct collocation."""
-
-    facts = Facts(
-        states="activation?!ignore_activation_dynamics normalized_tendon_force?!ignore_tendon_compliance",
-        outputs="implicitenabled_normalized_tendon_force:bool implicitresidual_normalized_tendon_force "
-        "passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
-        "passive_fiber_elastic_force_along_tendon statebounds_normalized_tendon_force:Vec2",
-        domains={
-            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
-            "default_activation": "> 0",
-            # OpenSim searches the equilibrium of this muscle by bisection in this range only.
-            "default_normalized_tendon_force": "0 to 5",
-        },
-        refused="pennation_angle_at_optimal activation_time_constant deactivation_time_constant default_activation "
-        "default_normalized_tendon_force fiber_damping passive_fiber_strain_at_one_norm_force "
-        "tendon_strain_at_one_norm_force activation_dynamics_smoothing active_force_width_scale",
-        zero={
-            NAN: "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity"
-        },
-    )
-
-    # OpenSim 4.6 keeps these time constants and the smoothing in C++ statics: the first muscle of
-    # this class in a process decides for all others, of all models.
-    activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
-    """Time constant of rising activation; high activation slows it down."""
-    deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.06
-    """Time constant of falling activation; high activation speeds it up."""
-    default_activation: Annotated[float, real(domain="0 to 1")] = 0.5
-    """Activation at the start of a simulation."""
-    default_normalized_tendon_force: Annotated[float, real(domain=">= 0")] = 0.5
-    """Tendon force over `max_isometric_force` at the start, at most 5; it is the state."""
-    active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
-    """Factor of the width of the active force over fiber length."""
-    # With an elastic tendon in explicit mode, damping changes the reported forces of this class,
-    # but not the motion.
-    fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
-    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
-    passive_fiber_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.6
-    """Strain at which the passive fiber bears `max_isometric_force`."""
-    tendon_strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
-    """Strain at which the tendon bears `max_isometric_force`."""
-    ignore_passive_fiber_force: Flag = False
-    """Whether passive fibers bear no force."""
-    tendon_compliance_dynamics_mode: Annotated[str, word("explicit", "implicit")] = "explicit"
-    """Form of the equilibrium of fiber and tendon; implicit is for direct collocation only."""
-    activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
-    """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
-
-    def find_contradictions(self) -> Iterator[Contradiction]:
-        """Yield `optimal_force` if it is set: OpenSim accepts only `max_isometric_force`."""
-        if "optimal_force" in self.model_fields_set:
-            yield "optimal_force", "optimal_force may not be given, only max_isometric_force"
-
-
-class MeyerFregly2016Muscle(Muscle):
-    """A rigid-tendon muscle with the curves of Meyer et al. (2016)."""
-
-    facts = Facts(
-        states="activation?!ignore_activation_dynamics",
-        outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
-        "passive_fiber_elastic_force_along_tendon",
-        domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN},
-        refused="pennation_angle_at_optimal",
-    )
-
-    activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
-    """Time constant of rising activation; high activation slows it down."""
-    deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.06
-    """Time constant of falling activation; high activation speeds it up."""
-    default_activation: Annotated[float, real(domain="0 to 1")] = 0.5
-    """Activation at the start of a simulation."""
-    active_force_width_scale: Annotated[float, real(domain=">= 1")] = 1.0
-    """Factor of the width of the active force over fiber length."""
-    fiber_damping: Annotated[float, real(domain=">= 0")] = 0.0
-    """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
-    ignore_passive_fiber_force: Flag = False
-    """Whether passive fibers bear no force."""
-    activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
-    """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
-
-    find_contradictions = DeGrooteFregly2016Muscle.find_contradictions
-
-
-# OpenSim takes the lengthening speed of the path as fiber velocity, whatever the pennation.
-class RigidTendonMuscle(Muscle):
-    """A muscle whose tendon keeps its slack length, with splines as curves."""
-
-    facts = Facts(
-        zero={NAN: "optimal_fiber_length max_contraction_velocity"},
-        scales={"optimal_fiber_length": "", "tendon_slack_length": ""},
-    )
-
-    active_force_length_curve: Single[Function] = Field(
-        default_factory=partial(make_active_force_length, "active_force_length_curve")
-    )
-    """Active force over fiber length, both normalised."""
-    passive_force_length_curve: Single[Function] = Field(
-        default_factory=partial(make_passive_force_length, "passive_force_length_curve")
-    )
-    """Passive force over fiber length, both normalised; kept between 0 and 10."""
-    force_velocity_curve: Single[Function] = Field(
-        default_factory=partial(make_force_velocity, "force_velocity_curve")
-    )
-    """Factor of the active force over fiber velocity, normalised."""

@@ -8,11 +8,17 @@ from pydantic import Field
 
 from osimlite.schema.base import make_default
 from osimlite.schema.default_curves import make_passive_force_length
-from osimlite.schema.facts import NAN, PATH, Facts
-from osimlite.schema.fields import Flag, Single, Tag, Text, real
+from osimlite.schema.facts import (
+    NAN,
+    PATH,
+    STOPS,
+    Facts,
+)
+from osimlite.schema.fields import Flag, Number, Single, Tag, Text, real
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.functions import Function
 from osimlite.schema.geometry import Appearance
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 
 
@@ -106,3 +112,36 @@ class Blankevoort1991Ligament(ForceProducer):
     """Tension per rate of strain, only while the ligament is taut and lengthens."""
     slack_length: Annotated[float, real("m", ">= 0")] = 0.0
     """Length of the path up to which there is no tension; strain counts from it."""
+
+
+class ClutchedPathSpring(PathActuator):
+    """A spring along a path that its control engages, with the length it has then as rest length."""
+
+    facts = Facts(
+        states="stretch",
+        domains={"initial_stretch": ">= 0"},
+        refused="stiffness dissipation relaxation_time_constant initial_stretch",
+        zero={STOPS: "relaxation_time_constant"},
+    )
+
+    min_control: Number = 0.0
+    max_control: Number = 1.0
+    stiffness: Annotated[float, real("N/m", ">= 0")] = math.nan
+    """Tension per stretch at a control of 1; less control pulls proportionally less."""
+    dissipation: Annotated[float, real("s/m", ">= 0")] = math.nan
+    """The c of 1 + c v, by which the lengthening speed v raises the tension."""
+    relaxation_time_constant: Annotated[float, real("s", "> 0")] = 0.001
+    """Time constant with which the stretch fades while the control is 0."""
+    initial_stretch: Annotated[float, real("m")] = 0.0
+    """Stretch at the start of a simulation."""
+
+
+class McKibbenActuator(PathActuator):
+    """A pneumatic muscle: a tube in a braid, whose control is the pressure in it."""
+
+    number_of_turns: Annotated[float, real(domain="> 0")] = 1.5
+    """Turns of a thread around the tube, from end to end."""
+    thread_length: Annotated[float, real(domain="> 0")] = 200.0
+    """Length of one thread of the braid, unwound."""
+    cord_length: Annotated[float, real(domain=">= 0")] = 0.0
+    """Length of the path that is cord and does not shorten; the tube is the rest."""

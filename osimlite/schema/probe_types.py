@@ -21,9 +21,9 @@ from osimlite.schema.fields import (
     maybe,
     real,
 )
-from osimlite.schema.functions import PiecewiseLinearFunction
 from osimlite.schema.references import ActuatorNames, JointNames, MuscleSocket
 from osimlite.schema.sets import Probe, Set
+from osimlite.schema.splines import PiecewiseLinearFunction
 
 _NAME_OF_MUSCLE = Reference("muscle-name", "Muscle")
 

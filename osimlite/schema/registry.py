@@ -18,49 +18,43 @@ T = TypeVar("T")
 
 _AREAS = {
     "actuators": (
-        "ActivationCoordinateActuator Actuator BodyActuator CoordinateActuator PointActuator PointToPointActuator "
-        "ScalarActuator TorqueActuator"
+        "ActivationCoordinateActuator BodyActuator CoordinateActuator PointActuator PointToPointActuator "
+        "TorqueActuator"
     ),
     "base": "Component ModelComponent Object Unknown",
     "constraint_types": (
         "ConstantDistanceConstraint CoordinateCouplerConstraint PointConstraint PointOnLineConstraint "
         "RollingOnSurfaceConstraint UnilateralConstraint WeldConstraint"
     ),
-    "contact": (
-        "ContactCylinder ContactEllipsoid ContactGeometry ContactGeometrySet ContactHalfSpace ContactMesh "
-        "ContactSphere ContactTorus"
-    ),
+    "contact": "ContactGeometry ContactGeometrySet",
     "contact_forces": (
         "ElasticFoundationContactParameters ElasticFoundationContactParametersSet ElasticFoundationForce "
         "ExponentialContactForce MeyerFregly2016Force SmoothSphereHalfSpaceForce"
     ),
-    "control_sets": "Control ControlConstant ControlLinear ControlLinearNode ControlSet",
+    "contact_types": "ContactCylinder ContactEllipsoid ContactHalfSpace ContactMesh ContactSphere ContactTorus",
+    "control_sets": "Control ControlConstant ControlLinear ControlLinearNode ControlSet ControlSetController",
     "controller_types": (
-        "CMC ControlDistributor ControlSetController CorrectionController InputController PrescribedController "
-        "SynergyController SynergyVector TrackingController"
+        "CMC ControlDistributor CorrectionController InputController PrescribedController SynergyController "
+        "SynergyVector TrackingController"
     ),
     "coordinates": "Coordinate CoordinateSet",
     "custom_joint": "CustomJoint SpatialTransform TransformAxis",
     "examples": "HopperDevice ToyPropMyoController ToyReflexController",
     "forces": (
-        "CoordinateLimitForce Force ForceProducer ForceSet HuntCrossleyContactParameters "
-        "HuntCrossleyContactParametersSet HuntCrossleyForce"
+        "Actuator CoordinateLimitForce Force ForceProducer ForceSet HuntCrossleyContactParameters "
+        "HuntCrossleyContactParametersSet HuntCrossleyForce ScalarActuator"
     ),
     "frames": "Body BodySet Frame Ground PhysicalFrame PhysicalOffsetFrame StationDefinedFrame TwoFrameLinker",
-    "functions": (
-        "Constant ExpressionBasedFunction Function FunctionSet GCVSpline GCVSplineSet LinearFunction "
-        "MultiplierFunction MultivariatePolynomialFunction PiecewiseConstantFunction PiecewiseLinearFunction "
-        "PolynomialFunction SimmSpline Sine StepFunction"
+    "function_types": "ExpressionBasedFunction MultivariatePolynomialFunction PolynomialFunction Sine StepFunction",
+    "functions": "Constant Function FunctionSet LinearFunction MultiplierFunction",
+    "geometry": "Appearance FrameGeometry Geometry Mesh ModelDisplayHints ModelVisualPreferences SurfaceProperties",
+    "geometry_types": "AnalyticGeometry Arrow Brick Cone Cylinder Ellipsoid LineGeometry Sphere Torus",
+    "joint_types": (
+        "BallJoint ConstantCurvatureJoint EllipsoidJoint FreeJoint GimbalJoint ScapulothoracicJoint UniversalJoint"
     ),
-    "geometry": (
-        "AnalyticGeometry Appearance Arrow Brick Cone Cylinder Ellipsoid FrameGeometry Geometry LineGeometry Mesh "
-        "ModelDisplayHints ModelVisualPreferences Sphere SurfaceProperties Torus"
-    ),
-    "joints": (
-        "BallJoint ConstantCurvatureJoint EllipsoidJoint FreeJoint GimbalJoint Joint JointSet PinJoint PlanarJoint "
-        "ScapulothoracicJoint SliderJoint UniversalJoint WeldJoint"
-    ),
+    "joints": "Joint JointSet PinJoint PlanarJoint SliderJoint WeldJoint",
     "markers": "IMU Marker MarkerSet Point Station",
+    "millard_muscles": "Millard2012AccelerationMuscle Millard2012EquilibriumMuscle RigidTendonMuscle",
     "moco.goals": (
         "MocoAverageSpeedGoal MocoControlGoal MocoExpressionBasedParameterGoal MocoFinalOutputGoal MocoFinalTimeGoal "
         "MocoGoal MocoInitialActivationGoal MocoInitialForceEquilibriumDGFGoal MocoInitialOutputGoal "
@@ -77,8 +71,8 @@ _AREAS = {
         "MocoOutputBoundConstraint MocoPathConstraint MocoStateBoundConstraint"
     ),
     "moco.studies": (
-        "MocoCasADiSolver MocoDirectCollocationSolver MocoInverse MocoPhase MocoProblem MocoSolver MocoStudy MocoTool "
-        "MocoTrack"
+        "MocoCasADiSolver MocoDirectCollocationSolver MocoInverse MocoPhase MocoProblem MocoSolver MocoStudy "
+        "MocoTool MocoTrack"
     ),
     "moco.tracking": (
         "MocoAccelerationTrackingGoal MocoAngularVelocityTrackingGoal MocoContactImpulseTrackingGoal "
@@ -93,16 +87,16 @@ _AREAS = {
         "FiberForceLengthCurve ForceVelocityCurve ForceVelocityInverseCurve TendonForceLengthCurve"
     ),
     "muscles": (
-        "ActivationFiberLengthMuscle ClutchedPathSpring DeGrooteFregly2016Muscle McKibbenActuator "
-        "MeyerFregly2016Muscle Millard2012AccelerationMuscle Millard2012EquilibriumMuscle Muscle "
-        "MuscleFirstOrderActivationDynamicModel MuscleFixedWidthPennationModel PathActuator RigidTendonMuscle "
-        "Thelen2003Muscle"
+        "ActivationFiberLengthMuscle Muscle MuscleFirstOrderActivationDynamicModel MuscleFixedWidthPennationModel "
+        "PathActuator Thelen2003Muscle"
     ),
     "old_muscles": (
         "ActivationFiberLengthMuscle_Deprecated Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated "
         "Thelen2003Muscle_Deprecated"
     ),
-    "path_forces": "Blankevoort1991Ligament ExpressionBasedPathForce Ligament PathSpring",
+    "path_forces": (
+        "Blankevoort1991Ligament ClutchedPathSpring ExpressionBasedPathForce Ligament McKibbenActuator PathSpring"
+    ),
     "paths": (
         "AbstractGeometryPath AbstractPathPoint ConditionalPathPoint FunctionBasedPath GeometryPath MovingPathPoint "
         "PathPoint PathPointSet PathWrap PathWrapPoint PathWrapSet"
@@ -129,21 +123,23 @@ _AREAS = {
         "ComponentSet Constraint ConstraintSet Controller ControllerSet ModelComponentSet ObjectGroup Probe ProbeSet "
         "Set"
     ),
+    "smooth_muscles": "DeGrooteFregly2016Muscle MeyerFregly2016Muscle",
+    "splines": "GCVSpline GCVSplineSet PiecewiseConstantFunction PiecewiseLinearFunction SimmSpline",
     "springs": (
         "BushingForce CoordinateLinearStopForce ExponentialCoordinateLimitForce ExpressionBasedBushingForce "
-        "ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce FunctionBasedBushingForce PointToPointSpring "
-        "SpringGeneralizedForce"
+        "ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce FunctionBasedBushingForce "
+        "PointToPointSpring SpringGeneralizedForce"
     ),
     "tools.analyses": (
-        "Actuation Analysis AnalysisSet BodyKinematics ForceReporter IMUDataReporter InducedAccelerations "
-        "JointReaction Kinematics MuscleAnalysis OutputReporter PointKinematics ProbeReporter StatesReporter "
-        "StaticOptimization"
+        "Actuation BodyKinematics ForceReporter IMUDataReporter InducedAccelerations JointReaction Kinematics "
+        "MuscleAnalysis OutputReporter PointKinematics ProbeReporter StatesReporter StaticOptimization"
     ),
+    "tools.base": "Analysis AnalysisSet Tool",
     "tools.dynamics": "AbstractTool AnalyzeTool DynamicsTool ForwardTool InverseDynamicsTool",
+    "tools.ik_tasks": "IKCoordinateTask IKMarkerTask IKTask IKTaskSet",
     "tools.inverse_kinematics": (
-        "IKCoordinateTask IKMarkerTask IKTask IKTaskSet IMUInverseKinematicsTool InverseKinematicsTool "
-        "InverseKinematicsToolBase MarkerWeight MarkerWeightSet MarkersReference OrientationWeight "
-        "OrientationWeightSet Tool"
+        "IMUInverseKinematicsTool InverseKinematicsTool InverseKinematicsToolBase MarkerWeight MarkerWeightSet "
+        "MarkersReference OrientationWeight OrientationWeightSet"
     ),
     "tools.path_fitting": "PolynomialPathFitter PolynomialPathFitterBounds",
     "tools.processors": (
@@ -160,10 +156,11 @@ _AREAS = {
     ),
     "tools.sensors": "APDMDataReaderSettings ExperimentalSensor IMUPlacer XsensDataReaderSettings",
     "tools.tracking": (
-        "CMCTool CMC_Joint CMC_Point CMC_Task CMC_TaskSet MuscleStateTrackingTask RRATool SMC_Joint StateTrackingTask "
-        "TrackingTask"
+        "CMCTool CMC_Joint CMC_Point CMC_Task CMC_TaskSet MuscleStateTrackingTask RRATool SMC_Joint "
+        "StateTrackingTask TrackingTask"
     ),
-    "wrapping": "WrapCylinder WrapEllipsoid WrapObject WrapObjectSet WrapSphere WrapTorus",
+    "wrap_types": "WrapCylinder WrapEllipsoid WrapSphere WrapTorus",
+    "wrapping": "WrapObject WrapObjectSet",
 }
 
 _TAGS = {

@@ -6,18 +6,16 @@ because their forces enter the equations of motion linearly.
 
 from __future__ import annotations
 
+from typing import cast
+
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.schema.actuators import (
-    ActivationCoordinateActuator,
-    Actuator,
-    CoordinateActuator,
-    PointActuator,
-    PointToPointActuator,
-    ScalarActuator,
-    TorqueActuator,
-)
+from osimlite.schema.forces import Actuator, ScalarActuator
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle, PathActuator
+from osimlite.schema.resolution import is_a
+
+_IDEAL_CLASSES = ("CoordinateActuator", "PointActuator", "PointToPointActuator", "TorqueActuator")
+"""Names of the classes whose force is the control times a constant."""
 
 
 def make_ideal_actuator(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | None:
@@ -33,11 +31,12 @@ def make_ideal_actuator(actuator: ScalarActuator, optimal_force: float) -> Scala
     if isinstance(actuator, PathActuator):
         path = actuator.geometry_path.copy_deep()
         result: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
-    elif isinstance(actuator, ActivationCoordinateActuator):
-        result = CoordinateActuator(name=actuator.name, coordinate=actuator.coordinate)
-    elif isinstance(
-        actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator
-    ):
+    elif is_a(actuator, "ActivationCoordinateActuator"):
+        from osimlite.schema.actuators import CoordinateActuator
+
+        coordinate = cast("CoordinateActuator", actuator).coordinate
+        result = CoordinateActuator(name=actuator.name, coordinate=coordinate)
+    elif any(is_a(actuator, name) for name in _IDEAL_CLASSES):
         result = actuator.copy_deep()
     else:
         return None

@@ -9,9 +9,9 @@ from typing import Protocol, TypeVar
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import SettingError
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value
+from osimlite.schema.forces import Actuator
 from osimlite.schema.model import Model
 
 

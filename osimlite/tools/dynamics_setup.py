@@ -14,10 +14,11 @@ from osimlite.base.text import join_words
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
-from osimlite.schema.controller_types import CorrectionController, PrescribedController
+from osimlite.schema.forces import Actuator
 from osimlite.schema.model import Model
+from osimlite.schema.resolution import is_a
+from osimlite.schema.sets import Controller
 from osimlite.schema.specs import get_file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
 from osimlite.simulation.initial_state import match_state_columns, resolve_initial_values
@@ -118,14 +119,14 @@ def build_model(job: Job) -> Model:
         # only.
         functions = (
             controller_copy.ControlFunctions.objects
-            if isinstance(controller_copy, PrescribedController)
+            if is_a(controller_copy, "PrescribedController")
             else []
         )
         if functions and not controller_copy.socket_actuators and len(functions) == len(actuators):
             controller_copy.socket_actuators = tuple(actuators)
         model.controller_set.objects.append(controller_copy)
-    for controller in model.components(CorrectionController):
-        if controller.enabled:
+    for controller in model.components(Controller):
+        if is_a(controller, "CorrectionController") and controller.enabled:
             raise job.create_unsupported_error(
                 f"osimlite cannot compute the CorrectionController '{controller.name}' yet; set "
                 "<enabled>false</enabled>"

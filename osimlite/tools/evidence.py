@@ -17,8 +17,6 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.schema.prescribed import ExternalLoads
-from osimlite.simulation.elements.external_loads import read_loads_table
 
 STANCE_FORCE_N = 20.0
 """Vertical force above which a foot stands on the ground, N."""
@@ -101,6 +99,10 @@ def find_steps(loads: Path, up_axis: int) -> dict[str, Steps]:
     Raises:
         OsimliteError: osimlite cannot read the file or its data.
     """
+    # Most tools run without measured loads.
+    from osimlite.schema.prescribed import ExternalLoads
+    from osimlite.simulation.elements.external_loads import read_loads_table
+
     document = read_object(loads, ExternalLoads)
     table = read_loads_table(document, loads.parent, str(loads))
     result: dict[str, Array] = {}

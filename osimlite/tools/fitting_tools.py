@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,15 +21,17 @@ from osimlite.io.document.printer import to_text
 from osimlite.io.tables.old_storage import UNITS
 from osimlite.io.tables.storage import StoTable, expect_time_range, read_sto
 from osimlite.schema.frames import PhysicalFrame
-from osimlite.schema.tools.inverse_kinematics import (
-    IKMarkerTask,
-    IMUInverseKinematicsTool,
-    InverseKinematicsTool,
-)
-from osimlite.schema.tools.sensors import IMUPlacer
+from osimlite.schema.resolution import is_a
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import NO_FILE, Job
 from osimlite.tools.outcome import Outcome
+
+if TYPE_CHECKING:
+    from osimlite.schema.tools.inverse_kinematics import (
+        IMUInverseKinematicsTool,
+        InverseKinematicsTool,
+    )
+    from osimlite.schema.tools.sensors import IMUPlacer
 
 
 def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
@@ -82,9 +85,7 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     for message in describe_fit(motion):
         outcome.add_message("markers", message)
     requested = [
-        task.name
-        for task in setup.ik_task_set.objects
-        if task.apply and isinstance(task, IKMarkerTask)
+        task.name for task in setup.ik_task_set.objects if task.apply and is_a(task, "IKMarkerTask")
     ]
     for key, category, names in (
         (

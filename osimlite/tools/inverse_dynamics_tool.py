@@ -17,7 +17,8 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.joints import Joint, ScapulothoracicJoint
+from osimlite.schema.joint_types import ScapulothoracicJoint
+from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements

@@ -8,19 +8,17 @@ from typing import Any
 import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.muscles import (
-    DeGrooteFregly2016Muscle,
-    MeyerFregly2016Muscle,
+from osimlite.schema.millard_muscles import (
     Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
-    Muscle,
     RigidTendonMuscle,
-    Thelen2003Muscle,
 )
+from osimlite.schema.muscles import Muscle, Thelen2003Muscle
 from osimlite.schema.old_muscles import (
     Schutte1993Muscle_Deprecated,
     Thelen2003Muscle_Deprecated,
 )
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle, MeyerFregly2016Muscle
 from osimlite.simulation.elements.muscle import SPRING
 
 LAW_RECORDS = (

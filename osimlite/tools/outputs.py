@@ -14,15 +14,15 @@ import numpy as np
 
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.base import Component
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.forces import Force
+from osimlite.schema.forces import Force, ScalarActuator
 from osimlite.schema.frames import Body, Frame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
+from osimlite.schema.millard_muscles import Millard2012AccelerationMuscle
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle, PathActuator
+from osimlite.schema.muscles import Muscle, PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements.muscle import SPRING
 from osimlite.tools.motion import Motion

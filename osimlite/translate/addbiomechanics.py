@@ -20,7 +20,8 @@ from osimlite.io.tables.writers import write_trc
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
-from osimlite.schema.tools.analyses import AnalysisSet, BodyKinematics, Kinematics
+from osimlite.schema.tools.analyses import BodyKinematics, Kinematics
+from osimlite.schema.tools.base import AnalysisSet
 from osimlite.schema.tools.dynamics import AnalyzeTool, InverseDynamicsTool
 from osimlite.simulation.robot.names import UniqueNames
 from osimlite.translate.fidelity import LEFT_OUT, Error, Fidelity

@@ -8,9 +8,9 @@ from osimlite.errors import ModelError
 from osimlite.io.meshes.unit_shapes import make_ball
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_offset
-from osimlite.schema.contact import (
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import (
     ContactEllipsoid,
-    ContactGeometry,
     ContactHalfSpace,
     ContactMesh,
     ContactSphere,

@@ -32,16 +32,12 @@ from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 from osimlite.schema.frames import PhysicalOffsetFrame
-from osimlite.schema.functions import (
-    Constant,
-    Function,
-    LinearFunction,
-    MultiplierFunction,
-    SimmSpline,
-)
-from osimlite.schema.joints import ConstantCurvatureJoint, EllipsoidJoint, Joint
+from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction
+from osimlite.schema.joint_types import ConstantCurvatureJoint, EllipsoidJoint
+from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Constraint
+from osimlite.schema.splines import SimmSpline
 from osimlite.schema.tree import Tree
 
 UNIT_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

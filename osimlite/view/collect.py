@@ -18,7 +18,17 @@ from osimlite.io.meshes.surface import Surface
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_offset, make_transform, rotation_about
-from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
+from osimlite.schema import (
+    actuators,
+    contact,
+    contact_forces,
+    contact_types,
+    geometry,
+    geometry_types,
+    springs,
+    wrap_types,
+    wrapping,
+)
 from osimlite.schema.base import Component
 from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame, TwoFrameLinker
@@ -195,7 +205,7 @@ class _SceneCollector:
         # 0 is OpenSim's number for hidden shapes.
         visible = appearance.visible and appearance.surface_properties.representation != 0
         body, frame_in_body = self.mechanism.frames[frame]
-        if isinstance(shape, geometry.LineGeometry):
+        if isinstance(shape, geometry_types.LineGeometry):
             ends = np.array((shape.start_point, shape.end_point), dtype=float) * scale
             self._add_line(path, "geometry", body, frame_in_body, ends, appearance.color, visible)
             return
@@ -218,7 +228,7 @@ class _SceneCollector:
         appearance = surface.appearance
         opacity = CONTACT_OPACITY * appearance.opacity
         visible = appearance.visible and appearance.surface_properties.representation != 0
-        if isinstance(surface, contact.ContactHalfSpace):
+        if isinstance(surface, contact_types.ContactHalfSpace):
             self.half_spaces.append(len(self.items))
             opacity = HALF_SPACE_OPACITY * appearance.opacity
         surface_index, size = self._make_shape(surface)
@@ -264,39 +274,39 @@ class _SceneCollector:
     def _make_shape(self, shape: Component) -> tuple[Surface, Array]:
         """Return a unit shape, and the matrix (4, 4) that turns it into the shape."""
         match shape:
-            case geometry.Brick():
+            case geometry_types.Brick():
                 return unit_shapes.make_cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
-            case geometry.Sphere() | contact.ContactSphere() | wrapping.WrapSphere():
+            case geometry_types.Sphere() | contact_types.ContactSphere() | wrap_types.WrapSphere():
                 return unit_shapes.make_ball(), _make_stretch((shape.radius,) * 3)
-            case geometry.Ellipsoid() | contact.ContactEllipsoid():
+            case geometry_types.Ellipsoid() | contact_types.ContactEllipsoid():
                 return unit_shapes.make_ball(), _make_stretch(shape.radii)
-            case wrapping.WrapEllipsoid():
+            case wrap_types.WrapEllipsoid():
                 return unit_shapes.make_ball(), _make_stretch(shape.dimensions)
-            case geometry.Cylinder():
+            case geometry_types.Cylinder():
                 return unit_shapes.make_cylinder(), _TO_Z @ _make_stretch(
                     (shape.radius, shape.radius, 2.0 * shape.half_height)
                 )
-            case contact.ContactCylinder() | wrapping.WrapCylinder():
+            case contact_types.ContactCylinder() | wrap_types.WrapCylinder():
                 length = getattr(shape, "length", _ENDLESS)
                 return unit_shapes.make_cylinder(), _make_stretch(
                     (shape.radius, shape.radius, length)
                 )
-            case contact.ContactTorus() if shape.torus_radius > 0.0:
+            case contact_types.ContactTorus() if shape.torus_radius > 0.0:
                 # A unit torus has the major radius 1, and is scaled by it.
                 return unit_shapes.make_torus(
                     shape.tube_radius / shape.torus_radius
                 ), _make_stretch((shape.torus_radius,) * 3)
-            case wrapping.WrapTorus() if shape.outer_radius > 0.0:
+            case wrap_types.WrapTorus() if shape.outer_radius > 0.0:
                 # In spite of their names: the radius of the tube, and that of the circle in its
                 # middle.
                 return unit_shapes.make_torus(
                     shape.inner_radius / shape.outer_radius
                 ), _make_stretch((shape.outer_radius,) * 3)
-            case geometry.Mesh() | contact.ContactMesh():
+            case geometry.Mesh() | contact_types.ContactMesh():
                 return self._read_mesh(
                     shape.mesh_file if isinstance(shape, geometry.Mesh) else shape.filename
                 ), np.eye(4)
-            case contact.ContactHalfSpace():
+            case contact_types.ContactHalfSpace():
                 return unit_shapes.make_square(), np.eye(4)
         raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
 
@@ -384,7 +394,7 @@ class _SceneCollector:
         self, element: str, path: str, surface: Component | None, label: str | None
     ) -> None:
         if not isinstance(surface, contact.ContactGeometry) or isinstance(
-            surface, contact.ContactHalfSpace
+            surface, contact_types.ContactHalfSpace
         ):
             return
         frame = self.tree.target(surface, "socket_frame", surface.socket_frame)

@@ -16,12 +16,8 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import (
-    Actuator,
-    CoordinateActuator,
-    ScalarActuator,
-    TorqueActuator,
-)
+from osimlite.schema.actuators import CoordinateActuator, TorqueActuator
+from osimlite.schema.forces import Actuator, ScalarActuator
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath

@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.mechanics.laws import millard2012_equilibrium
 from osimlite.mechanics.multibody import Mechanism
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
-from osimlite.schema.muscles import ClutchedPathSpring
+from osimlite.schema.path_forces import ClutchedPathSpring
 from osimlite.schema.probe_types import (
     ActuatorForceProbe,
     ActuatorPowerProbe,

@@ -11,7 +11,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.source import make_model
 from osimlite.models.walkers import FURTHEST_START, furthest_walker
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.geometry import Brick
+from osimlite.schema.geometry_types import Brick
 from osimlite.simulation import Simulation
 
 

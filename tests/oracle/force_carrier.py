@@ -10,7 +10,8 @@ from osimlite import Body, Model
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import PhysicalOffsetFrame
-from osimlite.schema.functions import Constant, Sine
+from osimlite.schema.function_types import Sine
+from osimlite.schema.functions import Constant
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements import force_elements
 from tests.oracle.opensim_runs import put

@@ -8,7 +8,8 @@ import numpy as np
 
 import osimlite
 from osimlite import Body, Coordinate, CoordinateLimitForce, Model
-from osimlite.schema.functions import Constant, LinearFunction, PolynomialFunction, Sine
+from osimlite.schema.function_types import PolynomialFunction, Sine
+from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGeneralizedForce
 
 COORDINATES = {

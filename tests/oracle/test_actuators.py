@@ -11,9 +11,12 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.functions import Constant, LinearFunction, SimmSpline, Sine
-from osimlite.schema.muscles import McKibbenActuator, PathActuator
+from osimlite.schema.function_types import Sine
+from osimlite.schema.functions import Constant, LinearFunction
+from osimlite.schema.muscles import PathActuator
+from osimlite.schema.path_forces import McKibbenActuator
 from osimlite.schema.prescribed import PrescribedForce
+from osimlite.schema.splines import SimmSpline
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -10,8 +10,8 @@ import pytest
 
 import osimlite
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.schema.functions import SimmSpline
 from osimlite.schema.registry import find_class
+from osimlite.schema.splines import SimmSpline
 from osimlite.simulation import read_sto
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine

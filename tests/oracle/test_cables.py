@@ -11,7 +11,7 @@ import osimlite
 from osimlite import Body, ContactSphere, Coordinate, Model
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
+from osimlite.schema.contact_types import ContactCylinder, ContactEllipsoid, ContactTorus
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import PathPoint

@@ -9,15 +9,12 @@ import osimlite
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
-from osimlite.schema.controller_types import (
-    ControlSetController,
-    PrescribedController,
-    SynergyController,
-    SynergyVector,
-)
+from osimlite.schema.control_sets import ControlSetController
+from osimlite.schema.controller_types import PrescribedController, SynergyController, SynergyVector
 from osimlite.schema.examples import ToyReflexController
-from osimlite.schema.functions import Constant, Sine
-from osimlite.schema.muscles import RigidTendonMuscle
+from osimlite.schema.function_types import Sine
+from osimlite.schema.functions import Constant
+from osimlite.schema.millard_muscles import RigidTendonMuscle
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements

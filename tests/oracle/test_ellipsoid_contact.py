@@ -10,7 +10,7 @@ from osimlite.mechanics.laws.ellipsoid_contact import ellipsoid_ellipsoid
 from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_force
 from osimlite.mechanics.laws.vectors import ZERO
 from osimlite.mechanics.multibody.spatial import rotation_xyz
-from osimlite.schema.contact import ContactEllipsoid
+from osimlite.schema.contact_types import ContactEllipsoid
 from tests.suite import choose
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -11,7 +11,8 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.actuators import CoordinateActuator, TorqueActuator
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.functions import Constant, FunctionSet, Sine
+from osimlite.schema.function_types import Sine
+from osimlite.schema.functions import Constant, FunctionSet
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.schema.prescribed import PrescribedForce

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.schema.functions import (
+from osimlite.schema.function_types import (
     ExpressionBasedFunction,
-    LinearFunction,
-    MultiplierFunction,
     MultivariatePolynomialFunction,
-    PiecewiseLinearFunction,
     PolynomialFunction,
-    SimmSpline,
     Sine,
     StepFunction,
 )
+from osimlite.schema.functions import LinearFunction, MultiplierFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import FunctionBasedPath
+from osimlite.schema.splines import PiecewiseLinearFunction, SimmSpline
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -11,9 +11,9 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.models.jumper import jumper
-from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.constraint_types import RollingOnSurfaceConstraint
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import ScalarActuator
 from osimlite.schema.model import Model
 from tests.oracle.support import both, compare, real
 

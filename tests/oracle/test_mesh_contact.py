@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from osimlite import ContactHalfSpace, ContactMesh, ContactSphere
-from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.contact_forces import ElasticFoundationForce
+from osimlite.schema.contact_types import ContactEllipsoid
 from tests.simulation.meshes import WRITERS, ball, block
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

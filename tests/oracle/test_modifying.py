@@ -11,7 +11,7 @@ import osimlite
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.fitting.modifying.path_fitting import fit_paths
 from osimlite.schema.difference import find_differences
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.tools import processors as p
 from tests.scripts import run_script
 from tests.simulation.elements.muscle_rows import hung, line

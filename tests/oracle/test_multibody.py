@@ -14,7 +14,7 @@ from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.functions import Constant, LinearFunction
-from osimlite.schema.joints import ConstantCurvatureJoint
+from osimlite.schema.joint_types import ConstantCurvatureJoint
 from tests.oracle.support import build_printed
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

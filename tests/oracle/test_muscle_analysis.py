@@ -12,16 +12,14 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import read_sto
-from osimlite.schema.muscles import (
-    DeGrooteFregly2016Muscle,
-    MeyerFregly2016Muscle,
+from osimlite.schema.millard_muscles import (
     Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
-    Muscle,
     RigidTendonMuscle,
-    Thelen2003Muscle,
 )
+from osimlite.schema.muscles import Muscle, Thelen2003Muscle
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated, Thelen2003Muscle_Deprecated
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle, MeyerFregly2016Muscle
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

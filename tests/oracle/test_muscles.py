@@ -8,6 +8,10 @@ import pytest
 import osimlite
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody import build_mechanism
+from osimlite.schema.millard_muscles import (
+    Millard2012AccelerationMuscle,
+    Millard2012EquilibriumMuscle,
+)
 from osimlite.schema.muscle_curves import (
     ActiveForceLengthCurve,
     FiberCompressiveForceCosPennationCurve,
@@ -16,12 +20,7 @@ from osimlite.schema.muscle_curves import (
     ForceVelocityCurve,
     TendonForceLengthCurve,
 )
-from osimlite.schema.muscles import (
-    Millard2012AccelerationMuscle,
-    Millard2012EquilibriumMuscle,
-    MuscleFirstOrderActivationDynamicModel,
-    Thelen2003Muscle,
-)
+from osimlite.schema.muscles import MuscleFirstOrderActivationDynamicModel, Thelen2003Muscle
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine

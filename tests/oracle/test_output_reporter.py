@@ -12,8 +12,8 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto
 from osimlite.models.jumper import jumper
+from osimlite.schema.millard_muscles import Millard2012AccelerationMuscle
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Millard2012AccelerationMuscle
 from osimlite.schema.states import list_outputs
 from osimlite.tools.job import NotRunnable
 from osimlite.tools.outputs import LAW_OUTPUTS

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite import Body, Coordinate, Model, WrapCylinder, WrapEllipsoid, WrapSphere, WrapTorus
-from osimlite.schema.functions import LinearFunction, MultiplierFunction, SimmSpline, Sine
+from osimlite.schema.function_types import Sine
+from osimlite.schema.functions import LinearFunction, MultiplierFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import (
     ConditionalPathPoint,
@@ -17,6 +18,7 @@ from osimlite.schema.paths import (
     PathPoint,
     PathWrap,
 )
+from osimlite.schema.splines import SimmSpline
 from tests.suite import choose
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

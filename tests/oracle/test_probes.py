@@ -10,12 +10,9 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import (
     CoordinateActuator,
 )
-from osimlite.schema.functions import PiecewiseLinearFunction, Sine
-from osimlite.schema.muscles import (
-    DeGrooteFregly2016Muscle,
-    RigidTendonMuscle,
-    Thelen2003Muscle,
-)
+from osimlite.schema.function_types import Sine
+from osimlite.schema.millard_muscles import RigidTendonMuscle
+from osimlite.schema.muscles import Thelen2003Muscle
 from osimlite.schema.probe_types import (
     ActuatorForceProbe,
     ActuatorPowerProbe,
@@ -28,6 +25,8 @@ from osimlite.schema.probe_types import (
     Umberger2010MuscleMetabolicsProbe,
     Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
 )
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
+from osimlite.schema.splines import PiecewiseLinearFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.protocol import EngineSettings

@@ -14,7 +14,7 @@ import osimlite
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.joints import ScapulothoracicJoint
+from osimlite.schema.joint_types import ScapulothoracicJoint
 from osimlite.schema.muscles import Muscle
 from tests.oracle.support import both, compare, real
 from tests.scripts import run_script

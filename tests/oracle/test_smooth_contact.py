@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from osimlite import ContactHalfSpace, ContactSphere, HuntCrossleyForce
-from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.contact_forces import MeyerFregly2016Force, SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_types import ContactEllipsoid
 from osimlite.schema.markers import Station
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -8,13 +8,15 @@ from osimlite import Body, Coordinate
 from osimlite.schema.actuators import (
     CoordinateActuator,
 )
-from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline
+from osimlite.schema.function_types import PolynomialFunction
+from osimlite.schema.functions import LinearFunction
 from osimlite.schema.path_forces import (
     Blankevoort1991Ligament,
     ExpressionBasedPathForce,
     Ligament,
     PathSpring,
 )
+from osimlite.schema.splines import SimmSpline
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedBushingForce,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.errors import MissingNameError, ModelError
-from osimlite.schema.contact import ContactSphere
+from osimlite.schema.contact_types import ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Reference
 from osimlite.schema.forces import CoordinateLimitForce

@@ -23,27 +23,24 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
 from osimlite.schema.contact_forces import MeyerFregly2016Force, SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_types import ContactCylinder, ContactEllipsoid, ContactTorus
 from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.functions import (
-    Constant,
+from osimlite.schema.function_types import (
     ExpressionBasedFunction,
-    LinearFunction,
-    MultiplierFunction,
     MultivariatePolynomialFunction,
-    PiecewiseLinearFunction,
     PolynomialFunction,
-    SimmSpline,
     Sine,
     StepFunction,
 )
+from osimlite.schema.functions import Constant, LinearFunction, MultiplierFunction
 from osimlite.schema.markers import Station
-from osimlite.schema.muscles import McKibbenActuator, PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import (
     Blankevoort1991Ligament,
     ExpressionBasedPathForce,
     Ligament,
+    McKibbenActuator,
     PathSpring,
 )
 from osimlite.schema.paths import (
@@ -60,6 +57,7 @@ from osimlite.schema.scholz_paths import (
     Scholz2015GeometryPathObstacle,
     Scholz2015GeometryPathPoint,
 )
+from osimlite.schema.splines import PiecewiseLinearFunction, SimmSpline
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedBushingForce,
@@ -69,7 +67,7 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
-from osimlite.schema.wrapping import WrapCylinder, WrapSphere
+from osimlite.schema.wrap_types import WrapCylinder, WrapSphere
 
 
 def chain() -> Model:

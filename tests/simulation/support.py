@@ -24,12 +24,13 @@ from osimlite import (
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.joints import (
-    MOTIONS,
+    PLAIN_JOINTS,
     JointAxis,
     Mobilizer,
     constant_curvature,
     make_custom_motions,
     make_ellipsoid_motions,
+    make_plain_motions,
     make_scapulothoracic_motions,
 )
 from osimlite.mechanics.multibody.mechanism import (
@@ -45,11 +46,8 @@ from osimlite.schema.contact_forces import (
     ElasticFoundationForce,
 )
 from osimlite.schema.custom_joint import CustomJoint
-from osimlite.schema.functions import (
-    LinearFunction,
-    PolynomialFunction,
-    SimmSpline,
-)
+from osimlite.schema.function_types import PolynomialFunction
+from osimlite.schema.functions import LinearFunction
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import (
@@ -61,12 +59,15 @@ from osimlite.schema.scholz_paths import (
     Scholz2015GeometryPathObstacle,
     Scholz2015GeometryPathPoint,
 )
-from osimlite.schema.wrapping import WrapSphere
+from osimlite.schema.splines import SimmSpline
+from osimlite.schema.wrap_types import WrapSphere
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.geometries.paths.geometry_path import LAWS
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.conftest import ROOT
 from tests.simulation.meshes import ball, block, write_obj
+
+MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_JOINTS}
 
 
 def cable(*elements, surface=None, slides=0.0):
@@ -411,7 +412,7 @@ def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
     return model
 
 
-SIZES = {kind.__name__.removeprefix("Wrap"): names for kind, (*_, names) in LAWS.items()}
+SIZES = {kind.removeprefix("Wrap"): names for kind, (*_, names) in LAWS.items()}
 
 
 with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:

@@ -8,7 +8,7 @@ import pytest
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.layout import MODEL, RUN
 from osimlite.models.jumper import jumper
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.run import Simulation
 
 

@@ -9,7 +9,12 @@ import pytest
 import osimlite
 from osimlite import ContactHalfSpace, ContactSphere
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactMesh, ContactTorus
+from osimlite.schema.contact_types import (
+    ContactCylinder,
+    ContactEllipsoid,
+    ContactMesh,
+    ContactTorus,
+)
 from osimlite.simulation.stepper import IntegrationError
 from tests.simulation.support import LEFT, RIGHT, cable, over, point
 

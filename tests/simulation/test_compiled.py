@@ -30,7 +30,7 @@ from osimlite import (
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.schema.functions import PiecewiseConstantFunction
+from osimlite.schema.splines import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine

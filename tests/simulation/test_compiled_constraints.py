@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.constraints import Coupler, PrescribedCoordinate
 from osimlite.schema.forces import CoordinateLimitForce
-from osimlite.schema.functions import Sine
+from osimlite.schema.function_types import Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.batches import ENDINGS, Watch, run_many
 from osimlite.simulation.elements import Forces

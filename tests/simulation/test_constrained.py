@@ -19,7 +19,7 @@ from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema import constraint_types as kinds
 from osimlite.schema.forces import Force
-from osimlite.schema.functions import Sine
+from osimlite.schema.function_types import Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.protocol import EngineSettings

@@ -10,7 +10,7 @@ import pytest
 from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.functions import Constant, FunctionSet
-from osimlite.schema.joints import FreeJoint
+from osimlite.schema.joint_types import FreeJoint
 from osimlite.schema.prescribed import ExternalForce, PrescribedForce
 from osimlite.simulation import simulate, write_sto
 from osimlite.simulation.elements.external_loads import read_external_loads

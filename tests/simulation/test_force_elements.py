@@ -21,17 +21,11 @@ from osimlite import (
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
-from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.contact_forces import ExponentialContactForce
+from osimlite.schema.contact_types import ContactEllipsoid
 from osimlite.schema.controller_types import CMC, PrescribedController
-from osimlite.schema.functions import (
-    Constant,
-    Function,
-    LinearFunction,
-    PolynomialFunction,
-    SimmSpline,
-    Sine,
-)
+from osimlite.schema.function_types import PolynomialFunction, Sine
+from osimlite.schema.functions import Constant, Function, LinearFunction
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.schema.paths import (
     ConditionalPathPoint,
@@ -40,6 +34,7 @@ from osimlite.schema.paths import (
     PathPoint,
     PathWrap,
 )
+from osimlite.schema.splines import SimmSpline
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedCoordinateForce,

@@ -7,14 +7,13 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.schema.base import Unknown
-from osimlite.schema.functions import (
-    Constant,
+from osimlite.schema.function_types import (
     ExpressionBasedFunction,
-    MultiplierFunction,
     MultivariatePolynomialFunction,
     PolynomialFunction,
     Sine,
 )
+from osimlite.schema.functions import Constant, MultiplierFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import FunctionBasedPath
 from tests.simulation.force_cases import with_force

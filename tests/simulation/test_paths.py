@@ -11,7 +11,8 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.spatial import invert_transform
-from osimlite.schema.functions import Constant, Sine
+from osimlite.schema.function_types import Sine
+from osimlite.schema.functions import Constant
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import MovingPathPoint, PathPoint
 from tests.simulation.elements.muscle_rows import hung, line

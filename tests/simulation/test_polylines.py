@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.schema.contact import ContactEllipsoid, ContactSphere
+from osimlite.schema.contact_types import ContactEllipsoid, ContactSphere
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 from tests.simulation.checked import Checked

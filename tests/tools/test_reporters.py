@@ -14,7 +14,8 @@ import numpy as np
 import osimlite
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
-from osimlite.schema.muscles import Muscle, RigidTendonMuscle
+from osimlite.schema.millard_muscles import RigidTendonMuscle
+from osimlite.schema.muscles import Muscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.schema.probe_types import ActuatorPowerProbe
 from osimlite.tools.job import NotRunnable

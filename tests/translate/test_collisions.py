@@ -12,10 +12,10 @@ from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
-from osimlite.schema.contact import (
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import (
     ContactCylinder,
     ContactEllipsoid,
-    ContactGeometry,
     ContactHalfSpace,
     ContactMesh,
     ContactSphere,

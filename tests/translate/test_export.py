@@ -19,17 +19,9 @@ from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import PhysicalOffsetFrame
-from osimlite.schema.geometry import (
-    Appearance,
-    Brick,
-    Cone,
-    Cylinder,
-    Ellipsoid,
-    Mesh,
-    Sphere,
-    SurfaceProperties,
-)
-from osimlite.schema.joints import BallJoint, FreeJoint
+from osimlite.schema.geometry import Appearance, Mesh, SurfaceProperties
+from osimlite.schema.geometry_types import Brick, Cone, Cylinder, Ellipsoid, Sphere
+from osimlite.schema.joint_types import BallJoint, FreeJoint
 from osimlite.schema.markers import Marker
 from osimlite.translate import to_urdf
 from tests.simulation.robot.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses

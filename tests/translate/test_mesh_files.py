@@ -11,7 +11,7 @@ import pytest
 
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.stl import format_binary_stl
-from osimlite.schema.contact import ContactMesh
+from osimlite.schema.contact_types import ContactMesh
 from osimlite.schema.geometry import Appearance, Mesh
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf

@@ -31,15 +31,12 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, SpatialTransform
 from osimlite.schema.custom_joint import TransformAxis as SchemaAxis
 from osimlite.schema.frames import Body
+from osimlite.schema.function_types import PolynomialFunction
 from osimlite.schema.functions import Function as SchemaFunction
-from osimlite.schema.functions import (
-    LinearFunction,
-    MultiplierFunction,
-    PolynomialFunction,
-    SimmSpline,
-)
+from osimlite.schema.functions import LinearFunction, MultiplierFunction
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
+from osimlite.schema.splines import SimmSpline
 from osimlite.simulation.robot.build import build_robot
 from osimlite.simulation.robot.couplings import find_mimics
 from osimlite.simulation.robot.merge_fixed import merge_fixed

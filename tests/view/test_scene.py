@@ -11,8 +11,9 @@ from osimlite.io.meshes import unit_shapes
 from osimlite.io.meshes.folders import MeshFolders, read_surface
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus
-from osimlite.schema.wrapping import WrapTorus
+from osimlite.schema.geometry import Mesh
+from osimlite.schema.geometry_types import Brick, Cylinder, LineGeometry, Sphere, Torus
+from osimlite.schema.wrap_types import WrapTorus
 from osimlite.view.collect import build_scene
 
 

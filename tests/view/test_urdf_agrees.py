@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.geometry import Brick, Cylinder, Mesh
+from osimlite.schema.geometry import Mesh
+from osimlite.schema.geometry_types import Brick, Cylinder
 from osimlite.translate.export import to_urdf
 from osimlite.view import Shown
 

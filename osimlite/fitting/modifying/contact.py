@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from osimlite.errors import UnsupportedError
-from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.model import Model
 

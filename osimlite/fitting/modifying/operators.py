@@ -21,15 +21,11 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Ground, PhysicalOffsetFrame
 from osimlite.schema.joints import Joint, WeldJoint
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import (
-    DeGrooteFregly2016Muscle,
-    Millard2012EquilibriumMuscle,
-    Muscle,
-    PathActuator,
-    Thelen2003Muscle,
-)
+from osimlite.schema.muscles import Muscle, PathActuator, Thelen2003Muscle
 from osimlite.schema.prescribed import ExternalLoads
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
 from osimlite.schema.tools import processors as p
 from osimlite.schema.tools.processors import ModelOperator, ModelProcessor
 

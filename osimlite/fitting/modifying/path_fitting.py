@@ -17,7 +17,7 @@ from osimlite.mechanics.kernels.paths import PATH_WORK
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.functions import MultivariatePolynomialFunction
+from osimlite.schema.function_types import MultivariatePolynomialFunction
 from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.simulation.paths import Paths, paths

@@ -15,7 +15,7 @@ from osimlite.lint.rules.functions import is_unused
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.functions import ExpressionBasedFunction
+from osimlite.schema.function_types import ExpressionBasedFunction
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.registry import get_plugin_classes
 

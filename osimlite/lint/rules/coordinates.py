@@ -20,17 +20,15 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Object
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.functions import (
-    Constant,
+from osimlite.schema.function_types import PolynomialFunction
+from osimlite.schema.functions import Constant, LinearFunction, MultiplierFunction
+from osimlite.schema.joints import Joint
+from osimlite.schema.splines import (
     GCVSpline,
-    LinearFunction,
-    MultiplierFunction,
     PiecewiseConstantFunction,
     PiecewiseLinearFunction,
-    PolynomialFunction,
     SimmSpline,
 )
-from osimlite.schema.joints import Joint
 
 ANGLE = Threshold(
     "largest-angle",

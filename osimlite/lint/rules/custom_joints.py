@@ -13,16 +13,12 @@ from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import cross, norm
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.functions import (
-    Constant,
-    Function,
+from osimlite.schema.function_types import MultivariatePolynomialFunction, PolynomialFunction
+from osimlite.schema.functions import Constant, Function, LinearFunction, MultiplierFunction
+from osimlite.schema.splines import (
     GCVSpline,
-    LinearFunction,
-    MultiplierFunction,
-    MultivariatePolynomialFunction,
     PiecewiseConstantFunction,
     PiecewiseLinearFunction,
-    PolynomialFunction,
     SimmSpline,
 )
 from osimlite.schema.tree import is_a

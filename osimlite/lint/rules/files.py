@@ -12,8 +12,8 @@ from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingC
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
-from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Mesh
+from osimlite.schema.resolution import is_a
 
 
 @rule("OSIM701", "missing-mesh", severity=WARNING, consequences=(REFUSES,))
@@ -39,7 +39,7 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
         (mesh, "mesh_file", mesh.mesh_file) for mesh in subject.find_instances(Mesh)
     ]
     mesh_files += [
-        (mesh, "filename", mesh.filename) for mesh in subject.find_instances(ContactMesh)
+        (mesh, "filename", mesh.filename) for mesh in subject.find_by_class("ContactMesh")
     ]
     folder = subject.folder if mesh_files else None
     if folder is None:
@@ -60,7 +60,7 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
     remedy = f"name its folder {MESH_FOLDER_HINT}"
     folders = _FolderListings()
     for item, tag, name in mesh_files:
-        severity = ERROR if isinstance(item, ContactMesh) else None
+        severity = ERROR if is_a(item, "ContactMesh") else None
         if not name:
             consequence = "" if severity is None else ": OpenSim rejects the model"
             report(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import comb
-from typing import Final, cast
+from typing import TYPE_CHECKING, Final, cast
 
 from osimlite.base.text import format_count
 from osimlite.lint.axes import list_axes
@@ -15,23 +15,26 @@ from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Component, Object
 from osimlite.schema.forces import Force
 from osimlite.schema.functions import (
+    UNIVARIATE_FUNCTIONS,
     Function,
     FunctionSet,
-    GCVSpline,
     LinearFunction,
     MultiplierFunction,
-    MultivariatePolynomialFunction,
-    PiecewiseConstantFunction,
-    PiecewiseLinearFunction,
-    PolynomialFunction,
-    SimmSpline,
-    Sine,
-    StepFunction,
 )
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.schema.sets import Controller
+from osimlite.schema.tree import is_a
 
-Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
+if TYPE_CHECKING:
+    from osimlite.schema.function_types import MultivariatePolynomialFunction
+    from osimlite.schema.splines import (
+        GCVSpline,
+        PiecewiseConstantFunction,
+        PiecewiseLinearFunction,
+        SimmSpline,
+    )
+
+    Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 
 
 @rule("OSIM601", "unsorted-abscissae", severity=ERROR, consequences=(REFUSES, FAILS, RUNS))
@@ -59,11 +62,11 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
     for function in _find_tabulated(subject):
         # Splines divide by the difference of neighbours; piecewise functions may have two equal
         # abscissae at a step.
-        strictly = isinstance(function, (SimmSpline, GCVSpline))
+        strictly = is_a(function, "SimmSpline") or is_a(function, "GCVSpline")
         for index in range(1, len(function.x)):
             previous_x, current_x = function.x[index - 1], function.x[index]
             if current_x < previous_x or (strictly and current_x == previous_x):
-                rejected = isinstance(function, GCVSpline)
+                rejected = is_a(function, "GCVSpline")
                 is_disabled = is_unused(subject, function)
                 # Where both values repeat, the slope of 0/0 is never used: SimmSpline gives the
                 # constant.
@@ -122,7 +125,7 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
         is_disabled = is_unused(subject, function)
         description, consequence = (
             _describe_refusal(subject, function)
-            if is_disabled or (ys < xs and isinstance(function, GCVSpline))
+            if is_disabled or (ys < xs and is_a(function, "GCVSpline"))
             else ("OpenSim reads beyond the end of the list", None)
             if ys < xs
             else ("the extra values are ignored", RUNS)
@@ -156,16 +159,14 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     for function in _find_tabulated(subject):
         min_count, is_disabled = 1, is_unused(subject, function)
         severity = WARNING if is_disabled else None
-        if isinstance(function, SimmSpline):
+        if is_a(function, "SimmSpline"):
             min_count = 2
-        elif isinstance(function, GCVSpline):
+        elif is_a(function, "GCVSpline"):
             # A GCVSpline of order 2 m needs 2 m points (Woltring's GCVSPL).
-            min_count = 2 * function.half_order
-        if isinstance(function, GCVSpline) and function.half_order < 1:
+            min_count = 2 * cast("GCVSpline", function).half_order
+        if is_a(function, "GCVSpline") and min_count < 2:
             given_text = (
-                str(function.half_order)
-                if "half_order" in function.model_fields_set
-                else "not given"
+                str(min_count // 2) if "half_order" in function.model_fields_set else "not given"
             )
             description, consequence = _describe_refusal(subject, function)
             report(
@@ -178,9 +179,9 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
             )
         elif len(function.x) < min_count:
             description, consequence = "it has no value", None
-            if is_disabled or isinstance(function, GCVSpline):
+            if is_disabled or is_a(function, "GCVSpline"):
                 description, consequence = _describe_refusal(subject, function)
-            elif isinstance(function, SimmSpline):
+            elif is_a(function, "SimmSpline"):
                 consequence = NAN
             given_text = format_count(len(function.x), "point")
             report(
@@ -226,7 +227,10 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
                 tag="coefficients",
                 severity=WARNING if is_disabled else ERROR,
             )
-    for polynomial in subject.find_instances(MultivariatePolynomialFunction):
+    polynomials: Iterator[MultivariatePolynomialFunction] = subject.find_by_class(
+        "MultivariatePolynomialFunction"
+    )
+    for polynomial in polynomials:
         dimension, order, coefficient_count = (
             polynomial.dimension,
             polynomial.order,
@@ -303,14 +307,12 @@ def report_function_of_several(subject: Subject, report: FindingCollector) -> No
         while isinstance(function, MultiplierFunction):
             function = function.function
         # Linear functions take any number, which the rule OSIM604 compares.
-        dimension = (
-            function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
-        )
-        if (
-            not isinstance(function, (*_ONE_VARIABLE, MultivariatePolynomialFunction))
-            or coordinate_count == dimension
-            or not coordinate_count
-        ):
+        dimension = None
+        if function is not None and is_a(function, "MultivariatePolynomialFunction"):
+            dimension = cast("MultivariatePolynomialFunction", function).dimension
+        elif function is not None and any(is_a(function, name) for name in UNIVARIATE_FUNCTIONS):
+            dimension = 1
+        if function is None or dimension in (None, coordinate_count) or not coordinate_count:
             continue
         report(
             f"the {type(function).tag} of {describe_object(owner)} takes "
@@ -395,17 +397,6 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
                 consequence=FAILS,
                 severity=WARNING if is_disabled else None,
             )
-
-
-_ONE_VARIABLE: Final = (
-    SimmSpline,
-    GCVSpline,
-    PiecewiseLinearFunction,
-    PiecewiseConstantFunction,
-    PolynomialFunction,
-    Sine,
-    StepFunction,
-)
 
 
 def _find_functions_of_coordinates(
@@ -496,8 +487,8 @@ def _describe_refusal(subject: Subject, function: Object) -> tuple[str, Conseque
 
 def _find_tabulated(subject: Subject) -> Iterator[Tabulated]:
     """Yield the functions given by points, without those that the reader has added."""
-    for cls in (SimmSpline, GCVSpline, PiecewiseLinearFunction, PiecewiseConstantFunction):
-        for function in subject.find_instances(cls):
+    for name in ("SimmSpline", "GCVSpline", "PiecewiseLinearFunction", "PiecewiseConstantFunction"):
+        for function in subject.find_by_class(name):
             # Functions that the reader adds by default have no element in the text.
             if function._index is not None or subject.source is None:
                 yield cast("Tabulated", function)

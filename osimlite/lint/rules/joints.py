@@ -12,7 +12,8 @@ from osimlite.lint.words import add_article, describe_object
 from osimlite.mechanics.laws.vectors import dot
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
-from osimlite.schema.joints import EllipsoidJoint, Joint
+from osimlite.schema.joint_types import EllipsoidJoint
+from osimlite.schema.joints import Joint
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR, consequences=(REFUSES,))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from osimlite.base.text import format_count
 from osimlite.lint.registry import ERROR, REFUSES, WARNING, FindingCollector, rule
@@ -22,18 +22,10 @@ from osimlite.mechanics.laws.muscle_curves import (
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED, Contradiction
 from osimlite.schema.functions import (
+    UNIVARIATE_FUNCTIONS,
     Constant,
-    ExpressionBasedFunction,
-    GCVSpline,
     LinearFunction,
     MultiplierFunction,
-    MultivariatePolynomialFunction,
-    PiecewiseConstantFunction,
-    PiecewiseLinearFunction,
-    PolynomialFunction,
-    SimmSpline,
-    Sine,
-    StepFunction,
 )
 from osimlite.schema.tree import is_a
 
@@ -162,26 +154,16 @@ def _count_arguments(function: Any) -> int | None:
     """Return the number of arguments of a function according to OpenSim; None if it is unknown."""
     if isinstance(function, MultiplierFunction):
         return _count_arguments(function.function)
-    if isinstance(function, MultivariatePolynomialFunction):
-        return function.dimension
     if isinstance(function, LinearFunction):
         return len(function.coefficients) - 1
-    if isinstance(function, ExpressionBasedFunction):
+    if isinstance(function, Constant):
+        return 0
+    if is_a(function, "MultivariatePolynomialFunction"):
+        return cast("int", function.dimension)
+    if is_a(function, "ExpressionBasedFunction"):
         return len(function.variables)
-    return (
-        0 if isinstance(function, Constant) else 1 if isinstance(function, _ONE_VARIABLE) else None
-    )
+    return 1 if any(is_a(function, name) for name in UNIVARIATE_FUNCTIONS) else None
 
-
-_ONE_VARIABLE = (
-    PiecewiseConstantFunction,
-    PiecewiseLinearFunction,
-    PolynomialFunction,
-    SimmSpline,
-    GCVSpline,
-    Sine,
-    StepFunction,
-)
 
 _RELATIONS: Final[dict[str, _Relation]] = {
     "ActiveForceLengthCurve": _make_curve_relation(active_force_length),

@@ -23,7 +23,8 @@ from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Component, Object
-from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.joints import Joint

@@ -20,7 +20,8 @@ from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Object
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body
-from osimlite.schema.joints import FreeJoint, Joint, WeldJoint
+from osimlite.schema.joint_types import FreeJoint
+from osimlite.schema.joints import Joint, WeldJoint
 
 
 @rule("OSIM401", "unconnected-body", severity=ERROR, consequences=(REFUSES,))

@@ -12,7 +12,8 @@ from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.base import Component
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint, PathWrap
-from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
+from osimlite.schema.wrap_types import WrapCylinder, WrapEllipsoid, WrapSphere
+from osimlite.schema.wrapping import WrapObject
 
 
 def _list_wraps(path: GeometryPath) -> list[PathWrap]:

@@ -12,7 +12,7 @@ from osimlite.mechanics.multibody.body_constraints import RollingConstraint, Wel
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.functions import SmoothFunction
-from osimlite.mechanics.multibody.joints import MOTIONS, Mobilizer, motion_types
+from osimlite.mechanics.multibody.joints import Mobilizer, make_plain_motions, motion_types
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.motions import JointMotion, SphericalMotion
 from osimlite.mechanics.multibody.parts import (
@@ -313,8 +313,11 @@ class _Builder:
             body: path of the body.
             ground: path of ground.
         """
+        # Few models have such a body; the others need not import the class.
+        from osimlite.schema.joint_types import FreeJoint
+
         name = f"free_{_get_last_name(body)}"
-        motions = MOTIONS["FreeJoint"]
+        motions = make_plain_motions(FreeJoint)
         path = f"{self.placements.path(self.model.joint_set)}/{name}"
         first = len(self.coordinates)
         for index, motion_type in enumerate(motion_types(motions, 6)):

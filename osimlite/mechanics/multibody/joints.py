@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
@@ -38,21 +38,11 @@ from osimlite.mechanics.multibody.spatial import (
     make_transform,
     rotation_about,
 )
-from osimlite.schema.joints import (
-    BallJoint,
-    FreeJoint,
-    GimbalJoint,
-    Joint,
-    MotionType,
-    PinJoint,
-    PlanarJoint,
-    SliderJoint,
-    UniversalJoint,
-    WeldJoint,
-)
+from osimlite.schema.joints import Joint, MotionType
 
 
-def _make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
+@cache
+def make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
     """Return the motions of a joint type without properties, as its schema declares them.
 
     Translations come first, then rotations; those of a ball joint are one motion.
@@ -69,20 +59,17 @@ def _make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
     )
 
 
-MOTIONS: dict[str, tuple[JointMotion, ...]] = {
-    kind.__name__: _make_plain_motions(kind)
-    for kind in (
-        WeldJoint,
-        PinJoint,
-        SliderJoint,
-        PlanarJoint,
-        UniversalJoint,
-        GimbalJoint,
-        BallJoint,
-        FreeJoint,
-    )
-}
-"""Factors of X_FM of the joint types that have no properties of their own."""
+PLAIN_JOINTS = (
+    "WeldJoint",
+    "PinJoint",
+    "SliderJoint",
+    "PlanarJoint",
+    "UniversalJoint",
+    "GimbalJoint",
+    "BallJoint",
+    "FreeJoint",
+)
+"""Joint classes without properties of their own; as names, so that only those of a model are imported."""
 
 
 def make_ellipsoid_motions(radii: ArrayLike) -> tuple[JointMotion, ...]:

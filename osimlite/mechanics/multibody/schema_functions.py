@@ -6,13 +6,22 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from itertools import pairwise
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import functions as f
 from osimlite.schema import functions as schema
 from osimlite.schema.base import Object, Unknown
+from osimlite.schema.resolution import is_a
+
+if TYPE_CHECKING:
+    from osimlite.schema.function_types import MultivariatePolynomialFunction, StepFunction
+    from osimlite.schema.splines import (
+        GCVSpline,
+        PiecewiseConstantFunction,
+        PiecewiseLinearFunction,
+    )
 
 
 def convert_function(
@@ -34,42 +43,43 @@ def convert_function(
     """
     if function is None:
         raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")
-    function_class = type(function)
+    class_name = type(function).__name__
     try:
         if isinstance(function, schema.MultiplierFunction):
             inner = convert_function(
                 function.function, arguments, where, opensim_derivatives=opensim_derivatives
             )
             return f.ScaledFunction(function.scale, inner)
-        if isinstance(function, schema.MultivariatePolynomialFunction):
-            _require_argument_count(function, function.dimension, arguments)
+        if is_a(function, "MultivariatePolynomialFunction"):
+            polynomial = cast("MultivariatePolynomialFunction", function)
+            _require_argument_count(polynomial, polynomial.dimension, arguments)
             return f.MultivariatePolynomial.complete(
-                function.coefficients,
-                function.dimension,
-                function.order,
+                polynomial.coefficients,
+                polynomial.dimension,
+                polynomial.order,
                 opensim_derivatives=opensim_derivatives,
             )
         if isinstance(function, schema.LinearFunction):
             return _convert_linear(function, arguments)
         if isinstance(function, schema.Constant):
             return f.ConstantValue(function.value)
-        if function_class not in _UNIVARIATE:
-            name = function.class_name if isinstance(function, Unknown) else function_class.__name__
+        if class_name not in _UNIVARIATE:
+            name = function.class_name if isinstance(function, Unknown) else class_name
             supported = [
                 "Constant",
                 "LinearFunction",
                 "MultiplierFunction",
                 "MultivariatePolynomialFunction",
             ]
-            supported += [item.__name__ for item in _UNIVARIATE]
+            supported += _UNIVARIATE
             raise UnsupportedError(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
                 f"the functions it can are {join_words(supported, max_count=len(supported))}"
             )
         _require_argument_count(function, 1, arguments)
-        return _UNIVARIATE[function_class](function)
+        return _UNIVARIATE[class_name](function)
     except _Impossible as problem:
-        raise ModelError(f"{where} ({function_class.__name__}): {problem}") from None
+        raise ModelError(f"{where} ({class_name}): {problem}") from None
 
 
 class _Impossible(Exception):
@@ -127,7 +137,7 @@ def _read_points(
     return x, y
 
 
-def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.SmoothFunction:
+def _piecewise_linear(function: PiecewiseLinearFunction) -> f.SmoothFunction:
     """Return straight lines through points; one point is a constant."""
     x, y = _read_points(function, 1)
     if len(x) == 1:
@@ -138,13 +148,13 @@ def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.SmoothFunct
     return f.PiecewiseLinear(x, y)
 
 
-def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.SmoothFunction:
+def _piecewise_constant(function: PiecewiseConstantFunction) -> f.SmoothFunction:
     """Return steps through points; one point is a constant."""
     x, y = _read_points(function, 1)
     return f.PiecewiseConstant(x, y) if len(x) > 1 else f.ConstantValue(y[0])
 
 
-def _convert_gcv_spline(function: schema.GCVSpline) -> f.SmoothFunction:
+def _convert_gcv_spline(function: GCVSpline) -> f.SmoothFunction:
     """Return the smoothing spline of a GCVSpline, after checks."""
     half_order = function.half_order
     if half_order < 1:
@@ -156,7 +166,7 @@ def _convert_gcv_spline(function: schema.GCVSpline) -> f.SmoothFunction:
     return spline
 
 
-def _convert_step(function: schema.StepFunction) -> f.SmoothFunction:
+def _convert_step(function: StepFunction) -> f.SmoothFunction:
     """Return a smooth step, with ascending arguments."""
     start, end = function.transition_start_time, function.transition_end_time
     if start > end:
@@ -173,12 +183,13 @@ def _read_floats(values: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-_UNIVARIATE: dict[type[Object], Callable[[Any], f.SmoothFunction]] = {
-    schema.PolynomialFunction: lambda item: f.Polynomial(_read_floats(item.coefficients)),
-    schema.Sine: lambda item: f.SineWave(item.amplitude, item.omega, item.phase, item.offset),
-    schema.StepFunction: _convert_step,
-    schema.PiecewiseConstantFunction: _piecewise_constant,
-    schema.PiecewiseLinearFunction: _piecewise_linear,
-    schema.SimmSpline: lambda item: f.SimmCubicSpline(*_read_points(item, 2)),
-    schema.GCVSpline: _convert_gcv_spline,
+_UNIVARIATE: dict[str, Callable[[Any], f.SmoothFunction]] = {
+    "PolynomialFunction": lambda item: f.Polynomial(_read_floats(item.coefficients)),
+    "Sine": lambda item: f.SineWave(item.amplitude, item.omega, item.phase, item.offset),
+    "StepFunction": _convert_step,
+    "PiecewiseConstantFunction": _piecewise_constant,
+    "PiecewiseLinearFunction": _piecewise_linear,
+    "SimmSpline": lambda item: f.SimmCubicSpline(*_read_points(item, 2)),
+    "GCVSpline": _convert_gcv_spline,
 }
+"""Conversions by class; as names, so that classes which a model does not use are not imported."""

@@ -3,32 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.joints import (
-    MOTIONS,
+    PLAIN_JOINTS,
     JointAxis,
     constant_curvature,
     make_custom_motions,
     make_ellipsoid_motions,
+    make_plain_motions,
     make_scapulothoracic_motions,
 )
 from osimlite.mechanics.multibody.motions import JointMotion
 from osimlite.mechanics.multibody.schema_functions import convert_function
-from osimlite.schema import custom_joint as schema
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.joints import (
-    ConstantCurvatureJoint,
-    EllipsoidJoint,
-    Joint,
-    ScapulothoracicJoint,
-)
+from osimlite.schema.joints import Joint
+from osimlite.schema.resolution import is_a
+
+if TYPE_CHECKING:
+    from osimlite.schema.custom_joint import CustomJoint
+    from osimlite.schema.joint_types import (
+        ConstantCurvatureJoint,
+        EllipsoidJoint,
+        ScapulothoracicJoint,
+    )
 
 JOINT_TYPES = (
-    *MOTIONS,
+    *PLAIN_JOINTS,
     "EllipsoidJoint",
     "ScapulothoracicJoint",
     "ConstantCurvatureJoint",
@@ -57,24 +62,28 @@ def joint_motions(
     """
     class_name = type(joint).__name__
     coordinates = list(joint.coordinates)
-    if isinstance(joint, schema.CustomJoint):
-        return _build_custom_motions(joint, path, opensim_derivatives)
-    if isinstance(joint, EllipsoidJoint):
-        motions = make_ellipsoid_motions(_read_radii(joint.radii_x_y_z, path))
-    elif isinstance(joint, ScapulothoracicJoint):
+    # Classes are compared by name, so that those of other joints are not imported.
+    if is_a(joint, "CustomJoint"):
+        return _build_custom_motions(cast("CustomJoint", joint), path, opensim_derivatives)
+    if is_a(joint, "EllipsoidJoint"):
+        ellipsoid = cast("EllipsoidJoint", joint)
+        motions = make_ellipsoid_motions(_read_radii(ellipsoid.radii_x_y_z, path))
+    elif is_a(joint, "ScapulothoracicJoint"):
+        scapula = cast("ScapulothoracicJoint", joint)
         motions = make_scapulothoracic_motions(
-            _read_radii(joint.thoracic_ellipsoid_radii_x_y_z, path),
-            joint.scapula_winging_axis_origin,
-            joint.scapula_winging_axis_direction,
+            _read_radii(scapula.thoracic_ellipsoid_radii_x_y_z, path),
+            scapula.scapula_winging_axis_origin,
+            scapula.scapula_winging_axis_direction,
         )
-    elif isinstance(joint, ConstantCurvatureJoint):
-        if not 0.0 < joint.length < np.inf:
+    elif is_a(joint, "ConstantCurvatureJoint"):
+        rod = cast("ConstantCurvatureJoint", joint)
+        if not 0.0 < rod.length < np.inf:
             raise ModelError(
-                f"the rod of '{path}' has the length {joint.length:g}; give a positive length in m"
+                f"the rod of '{path}' has the length {rod.length:g}; give a positive length in m"
             )
-        motions = constant_curvature(joint.length, joint.neutral_angle_x_z_y)
-    elif class_name in MOTIONS:
-        motions = MOTIONS[class_name]
+        motions = constant_curvature(rod.length, rod.neutral_angle_x_z_y)
+    elif class_name in PLAIN_JOINTS:
+        motions = make_plain_motions(type(joint))
     else:
         raise unknown_joint(path, class_name)
     needed = 1 + max((index for motion in motions for index in motion.coordinates), default=-1)
@@ -99,7 +108,7 @@ def unknown_joint(path: str, class_name: str) -> UnsupportedError:
 
 
 def _build_custom_motions(
-    joint: schema.CustomJoint, path: str, opensim_derivatives: bool
+    joint: CustomJoint, path: str, opensim_derivatives: bool
 ) -> tuple[tuple[JointMotion, ...], Sequence[Coordinate]]:
     """Return the motions of a CustomJoint, and its coordinates in the order of the motions.
 

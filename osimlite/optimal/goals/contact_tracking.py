@@ -21,8 +21,8 @@ from osimlite.optimal.point import (
 )
 from osimlite.optimal.study_context import StudyContext
 from osimlite.optimal.tables import fit_splines
-from osimlite.schema.contact import ContactSphere
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_types import ContactSphere
 from osimlite.schema.moco.goals import MocoGoal
 from osimlite.schema.moco.tracking import MocoContactImpulseTrackingGoal, MocoContactTrackingGoal
 from osimlite.schema.prescribed import ExternalLoads

@@ -2,12 +2,11 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, make_default, make_empty_list
+from osimlite.schema.base import make_default
 from osimlite.schema.fields import (
     Flag,
     LegacyFlag,
     LegacyInteger,
-    LegacyMany,
     LegacyNumber,
     LegacyText,
     LegacyUnnamed,
@@ -25,31 +24,8 @@ from osimlite.schema.references import (
     Names,
     make_name_list,
 )
-from osimlite.schema.sets import ConstraintSet, Set
-
-
-class Analysis(Object, abstract=True):
-    """Something that is computed along a motion."""
-
-    on: LegacyFlag = True
-    """Whether the analysis is done."""
-    # OpenSim's tools ignore both times: analyses run over the range of the tool.
-    start_time: Annotated[float, real("s", legacy=True)] = float("-inf")
-    """Where it begins."""
-    end_time: Annotated[float, real("s", legacy=True)] = float("inf")
-    """Where it ends."""
-    # OpenSim takes 0 and negative numbers as 1.
-    step_interval: LegacyInteger = 1
-    """Every how many steps of the integrator, or rows of the motion, something is written."""
-    in_degrees: LegacyFlag = True
-    """Whether angles are written in degrees."""
-
-
-class AnalysisSet(Set):
-    """The analyses of a run."""
-
-    objects: LegacyMany[Analysis] = make_empty_list()
-    """The analyses."""
+from osimlite.schema.sets import ConstraintSet
+from osimlite.schema.tools.base import Analysis
 
 
 class Actuation(Analysis):

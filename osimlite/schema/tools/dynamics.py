@@ -27,8 +27,7 @@ from osimlite.schema.references import (
     make_output_file,
 )
 from osimlite.schema.sets import ControllerSet
-from osimlite.schema.tools.analyses import AnalysisSet
-from osimlite.schema.tools.inverse_kinematics import Tool
+from osimlite.schema.tools.base import AnalysisSet, Tool
 
 
 class DynamicsTool(Tool, abstract=True):

@@ -26,7 +26,7 @@ from osimlite.schema.references import (
     make_output_file,
 )
 from osimlite.schema.sets import Set
-from osimlite.schema.tools.inverse_kinematics import IKTaskSet
+from osimlite.schema.tools.ik_tasks import IKTaskSet
 
 LegacyTimeRange = Annotated[Reals, reals("s", least=2, most=2, legacy=True)]
 

@@ -22,7 +22,7 @@ from osimlite.simulation.elements.registry import FORCE_TYPES
 
 if TYPE_CHECKING:
     from osimlite.io.meshes.folders import MeshFolders
-    from osimlite.schema.actuators import Actuator
+    from osimlite.schema.forces import Actuator
     from osimlite.simulation.elements.force_records import ForceElement
 
 C = TypeVar("C")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import combinations
 from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,15 +15,10 @@ from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_ene
 from osimlite.mechanics.laws.vectors import cross, minus, plus, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array, make_offset
-from osimlite.schema.contact import (
-    ContactEllipsoid,
-    ContactGeometry,
-    ContactHalfSpace,
-    ContactSphere,
-)
+from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
-from osimlite.schema.tree import Use
+from osimlite.schema.tree import Use, is_a
 from osimlite.simulation.elements.builder import ElementBuilder, Triple, get_class_name, to_triple
 from osimlite.simulation.elements.force_records import ForceRecord, Response
 from osimlite.simulation.elements.registry import register_force_type
@@ -432,7 +428,10 @@ def read_surface(
         ModelError: a radius of an ellipsoid is not positive.
         UnsupportedError: it is not a half space, sphere or ellipsoid, or is not fixed to a body.
     """
-    if not isinstance(geometry, ContactHalfSpace | ContactSphere | ContactEllipsoid):
+    # Classes are compared by name, so that a model without contact does not import them.
+    if not any(
+        map(partial(is_a, geometry), ("ContactHalfSpace", "ContactSphere", "ContactEllipsoid"))
+    ):
         raise builder.make_unsupported_error(
             force, f" on the {get_class_name(geometry)} '{builder.path(geometry)}'"
         )
@@ -441,7 +440,7 @@ def read_surface(
     axes = placed[:3, :3]
     # The half space is solid at x > 0 of the geometry's frame.
     normal = -axes[:, 0]
-    if isinstance(geometry, ContactEllipsoid):
+    if is_a(geometry, "ContactEllipsoid"):
         builder.check_finite(geometry, (*center, *axes.ravel(), *geometry.radii))
         if not min(geometry.radii) > 0.0:
             raise ModelError(
@@ -457,7 +456,7 @@ def read_surface(
         return ContactSurface(
             geometry.name, body, frame, place, longest, still, material, radii, rows
         )
-    radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
+    radius = geometry.radius if is_a(geometry, "ContactSphere") else inf
     builder.check_finite(geometry, (*center, *normal, 0.0 if radius == inf else radius))
     return ContactSurface(
         geometry.name, body, frame, to_triple(center), radius, to_triple(normal), material

@@ -21,8 +21,8 @@ from osimlite.schema.control_sets import (
     ControlLinear,
     ControlLinearNode,
     ControlSet,
+    ControlSetController,
 )
-from osimlite.schema.controller_types import ControlSetController
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.controls import Drive, find_actuators, map_actuators

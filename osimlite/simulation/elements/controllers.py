@@ -8,9 +8,9 @@ from typing import Any
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import find_named_file
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.examples import ToyPropMyoController, ToyReflexController
+from osimlite.schema.forces import Actuator
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.control_tables import make_column_function, read_controls

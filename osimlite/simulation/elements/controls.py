@@ -22,7 +22,7 @@ from osimlite.simulation.elements.integral import evaluate_function
 from osimlite.simulation.elements.registry import CONTROLLERS
 
 if TYPE_CHECKING:
-    from osimlite.schema.actuators import Actuator
+    from osimlite.schema.forces import Actuator
     from osimlite.simulation.elements.builder import ElementBuilder
 
 

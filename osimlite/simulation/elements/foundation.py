@@ -25,8 +25,8 @@ from osimlite.mechanics.laws.vectors import ZERO, Vector, minus, plus, times
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array, make_transform
-from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
+from osimlite.schema.contact_types import ContactMesh
 from osimlite.simulation.elements.builder import ElementBuilder, to_triple
 from osimlite.simulation.elements.contact import (
     ContactPair,

@@ -88,8 +88,9 @@ FORCE_TYPES = Registry(
         ".force_types.actuators": "ActivationCoordinateActuator BodyActuator CoordinateActuator McKibbenActuator"
         " PathActuator PointActuator PointToPointActuator TorqueActuator",
         ".force_types.bushings": "BushingForce ExpressionBasedBushingForce FunctionBasedBushingForce",
-        ".force_types.coordinate_forces": "CoordinateLimitForce CoordinateLinearStopForce"
-        " ExponentialCoordinateLimitForce ExpressionBasedCoordinateForce SpringGeneralizedForce",
+        ".force_types.coordinate_forces": "CoordinateLinearStopForce ExponentialCoordinateLimitForce"
+        " ExpressionBasedCoordinateForce SpringGeneralizedForce",
+        ".force_types.coordinate_limit": "CoordinateLimitForce",
         ".force_types.millard_muscles": "Millard2012AccelerationMuscle Millard2012EquilibriumMuscle",
         ".force_types.old_muscles": "Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated",
         ".force_types.old_thelen_muscle": "Thelen2003Muscle_Deprecated",

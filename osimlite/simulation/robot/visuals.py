@@ -13,15 +13,8 @@ from osimlite.io.meshes.unit_shapes import make_ball, make_cylinder
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 from osimlite.schema.frames import Frame
-from osimlite.schema.geometry import (
-    Brick,
-    Cylinder,
-    Ellipsoid,
-    FrameGeometry,
-    Geometry,
-    Mesh,
-    Sphere,
-)
+from osimlite.schema.geometry import FrameGeometry, Geometry, Mesh
+from osimlite.schema.geometry_types import Brick, Cylinder, Ellipsoid, Sphere
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
 from osimlite.simulation.robot.mesh_files import MeshFiles, MeshProblem

@@ -12,8 +12,8 @@ from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.models.arm import arm as arm_model
 from osimlite.models.jumper import jumper
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import Actuator
 from osimlite.schema.model import Model
 from osimlite.simulation.options import IntegrationOptions
 

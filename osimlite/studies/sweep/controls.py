@@ -24,18 +24,12 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import SettingError
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.functions import (
-    Constant,
-    Function,
-    GCVSpline,
-    MultiplierFunction,
-    PiecewiseConstantFunction,
-    PiecewiseLinearFunction,
-)
+from osimlite.schema.forces import Actuator
+from osimlite.schema.functions import Constant, Function, MultiplierFunction
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Controller
+from osimlite.schema.splines import GCVSpline, PiecewiseConstantFunction, PiecewiseLinearFunction
 
 OFFSET = "offset"
 """Kind of a control: a number that is added at all times."""

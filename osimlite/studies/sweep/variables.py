@@ -33,7 +33,7 @@ from osimlite.base.records import dataclass, replace
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.schema.actuators import Actuator
+from osimlite.schema.forces import Actuator
 from osimlite.schema.model import Model
 from osimlite.simulation.initial_state import describe_suspect_value
 from osimlite.simulation.properties import (

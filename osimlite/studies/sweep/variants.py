@@ -19,9 +19,8 @@ import numpy as np
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError, SettingError, SimulationError
-from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component
-from osimlite.schema.forces import Force
+from osimlite.schema.forces import Actuator, Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Controller

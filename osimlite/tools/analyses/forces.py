@@ -11,7 +11,7 @@ from osimlite.io.tables.old_storage import UNITS
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import Actuator, ScalarActuator
+from osimlite.schema.forces import Actuator, ScalarActuator
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator

@@ -20,7 +20,7 @@ from osimlite.io.tables.storage import expect_time_range
 from osimlite.lint.trial import Measurement
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.tools.inverse_kinematics import IKMarkerTask
+from osimlite.schema.tools.ik_tasks import IKMarkerTask
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.tools.evidence import find_root_coordinates
 from osimlite.tools.job import NO_FILE

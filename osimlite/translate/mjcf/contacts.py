@@ -9,14 +9,14 @@ import numpy as np
 
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.spatial import Array, make_offset
-from osimlite.schema.contact import (
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
+from osimlite.schema.contact_types import (
     ContactEllipsoid,
-    ContactGeometry,
     ContactHalfSpace,
     ContactMesh,
     ContactSphere,
 )
-from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
 from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.tree import Use
 from osimlite.simulation.robot.visuals import mesh_shape

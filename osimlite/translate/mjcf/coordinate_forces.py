@@ -16,7 +16,7 @@ from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateAc
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.springs import SpringGeneralizedForce
-from osimlite.simulation.elements.force_types.coordinate_forces import read_limit_constants
+from osimlite.simulation.elements.force_types.coordinate_limit import read_limit_constants
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Lead, MjcfDraft, Untranslatable, Value, add_element
 

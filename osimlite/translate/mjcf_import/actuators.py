@@ -12,9 +12,9 @@ from osimlite.schema.actuators import (
     ActivationCoordinateActuator,
     CoordinateActuator,
     PointActuator,
-    ScalarActuator,
     TorqueActuator,
 )
+from osimlite.schema.forces import ScalarActuator
 from osimlite.schema.functions import LinearFunction
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import ExpressionBasedPathForce, PathSpring

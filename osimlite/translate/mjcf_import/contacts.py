@@ -13,9 +13,9 @@ from itertools import product
 import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.contact import (
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import (
     ContactEllipsoid,
-    ContactGeometry,
     ContactHalfSpace,
     ContactMesh,
     ContactSphere,

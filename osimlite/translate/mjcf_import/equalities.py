@@ -15,7 +15,8 @@ from osimlite.schema.constraint_types import (
     WeldConstraint,
 )
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
-from osimlite.schema.functions import LinearFunction, PolynomialFunction
+from osimlite.schema.function_types import PolynomialFunction
+from osimlite.schema.functions import LinearFunction
 from osimlite.translate.mjcf_import.draft import (
     ConversionDraft,
     angles_of,

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.contact import ContactCylinder, ContactGeometry, ContactSphere
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import ContactCylinder, ContactSphere
 from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.model import Model
 from osimlite.schema.paths import PathPoint

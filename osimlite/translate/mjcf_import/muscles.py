@@ -6,8 +6,9 @@ import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.functions import ExpressionBasedFunction
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle, Muscle, RigidTendonMuscle
+from osimlite.schema.function_types import ExpressionBasedFunction
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle, RigidTendonMuscle
+from osimlite.schema.muscles import Muscle
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf_import.draft import ConversionDraft, TendonPath
 from osimlite.translate.mjcf_import.muscle_fits import FittedCurves, Shape, fit_curves

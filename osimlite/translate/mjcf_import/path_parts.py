@@ -17,7 +17,8 @@ from osimlite.schema.paths import (
     PathWrap,
     PathWrapSet,
 )
-from osimlite.schema.wrapping import WrapCylinder, WrapObject, WrapSphere
+from osimlite.schema.wrap_types import WrapCylinder, WrapSphere
+from osimlite.schema.wrapping import WrapObject
 from osimlite.translate.mjcf_import.draft import (
     ConversionDraft,
     angles_of,

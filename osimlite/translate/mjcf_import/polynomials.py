@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.functions import MultivariatePolynomialFunction
+from osimlite.schema.function_types import MultivariatePolynomialFunction
 
 MOST_TERMS = 330
 """Largest number of terms: order 4 of seven coordinates, order 6 of four."""

@@ -7,7 +7,8 @@ import numpy as np
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
-from osimlite.schema.geometry import Appearance, Brick, Cylinder, Ellipsoid, Geometry, Mesh, Sphere
+from osimlite.schema.geometry import Appearance, Geometry, Mesh
+from osimlite.schema.geometry_types import Brick, Cylinder, Ellipsoid, Sphere
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf_import.draft import ConversionDraft, quaternion_matrix
 

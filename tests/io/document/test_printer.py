@@ -14,7 +14,7 @@ from osimlite.errors import ModelError, OsimliteError
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
-from osimlite.schema.contact import ContactSphere
+from osimlite.schema.contact_types import ContactSphere
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model

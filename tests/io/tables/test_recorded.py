@@ -14,7 +14,8 @@ from osimlite.mechanics.multibody.spatial import rotation_xyz
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
-from osimlite.schema.joints import BallJoint, PinJoint
+from osimlite.schema.joint_types import BallJoint
+from osimlite.schema.joints import PinJoint
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Thelen2003Muscle

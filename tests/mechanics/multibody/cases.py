@@ -14,11 +14,12 @@ import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.joints import (
-    MOTIONS,
+    PLAIN_JOINTS,
     JointAxis,
     Mobilizer,
     make_custom_motions,
     make_ellipsoid_motions,
+    make_plain_motions,
     make_scapulothoracic_motions,
     motion_types,
 )
@@ -32,6 +33,9 @@ from osimlite.mechanics.multibody.motions import JointMotion
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema import functions as schema
+
+MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_JOINTS}
+
 
 FIXTURES = Path(__file__).parents[3] / "fixtures" / "kinematics"
 
@@ -54,7 +58,7 @@ def _component(spec: dict[str, Any]) -> schema.Function:
     fields = {
         name: tuple(value) if isinstance(value, list) else value for name, value in spec.items()
     }
-    kind = getattr(schema, str(fields.pop("type")))
+    kind = getattr(osimlite, str(fields.pop("type")))
     if "function" in fields:
         fields["function"] = _component(spec["function"])
     component: schema.Function = kind(**fields)

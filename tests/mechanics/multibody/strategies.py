@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
+import osimlite
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.constraints import (
@@ -15,12 +16,13 @@ from osimlite.mechanics.multibody.constraints import (
     PrescribedCoordinate,
 )
 from osimlite.mechanics.multibody.joints import (
-    MOTIONS,
+    PLAIN_JOINTS,
     JointAxis,
     Mobilizer,
     constant_curvature,
     make_custom_motions,
     make_ellipsoid_motions,
+    make_plain_motions,
     make_scapulothoracic_motions,
     motion_types,
 )
@@ -34,6 +36,9 @@ from osimlite.mechanics.multibody.mechanism import (
 )
 from osimlite.mechanics.multibody.motions import JointMotion
 from osimlite.mechanics.multibody.spatial import Array, make_offset
+
+MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_JOINTS}
+
 
 KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
 """Of constraints."""

@@ -14,8 +14,9 @@ from osimlite.mechanics.multibody.spatial import invert_transform, make_offset, 
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
-from osimlite.schema.functions import ExpressionBasedFunction
-from osimlite.schema.joints import BallJoint, FreeJoint, Joint, PinJoint, PlanarJoint, WeldJoint
+from osimlite.schema.function_types import ExpressionBasedFunction
+from osimlite.schema.joint_types import BallJoint, FreeJoint
+from osimlite.schema.joints import Joint, PinJoint, PlanarJoint, WeldJoint
 from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree

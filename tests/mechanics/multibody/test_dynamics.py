@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import osimlite
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.dynamics import Wrench
-from osimlite.mechanics.multibody.joints import MOTIONS, Mobilizer
+from osimlite.mechanics.multibody.joints import PLAIN_JOINTS, Mobilizer, make_plain_motions
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
     MassProperties,
@@ -19,6 +20,9 @@ from osimlite.mechanics.multibody.mechanism import (
 from osimlite.mechanics.multibody.spatial import skew_matrix
 from tests.mechanics.multibody.cases import load, mixed_tree
 from tests.mechanics.multibody.strategies import Case, cases
+
+MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_JOINTS}
+
 
 MIXED = load("mixed_joint_tree_cases.json")
 

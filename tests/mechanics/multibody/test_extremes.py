@@ -16,10 +16,12 @@ from osimlite.mechanics.multibody.extremes import any_numbers, find_extreme_numb
 from osimlite.mechanics.multibody.functions import PiecewiseLinear, SimmCubicSpline
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import StationDefinedFrame
-from osimlite.schema.functions import LinearFunction, PolynomialFunction
-from osimlite.schema.functions import SimmSpline as Spline
-from osimlite.schema.joints import EllipsoidJoint, PinJoint
+from osimlite.schema.function_types import PolynomialFunction
+from osimlite.schema.functions import LinearFunction
+from osimlite.schema.joint_types import EllipsoidJoint
+from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
+from osimlite.schema.splines import SimmSpline as Spline
 from tests.suite import choose
 
 EXTREMES = ("nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-1", "1e30")

@@ -5,22 +5,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import osimlite
 from osimlite.errors import ModelError, SimulationError
 from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.mechanics.multibody.joints import (
-    MOTIONS,
+    PLAIN_JOINTS,
     JointAxis,
     Mobilizer,
     constant_curvature,
     make_custom_motions,
+    make_plain_motions,
     motion_types,
 )
 from osimlite.mechanics.multibody.motions import AxisMotion, FixedTransform
 from osimlite.mechanics.multibody.spatial import invert_transform, make_transform, rotation_about
-from osimlite.schema import joints
 from tests.mechanics.multibody.cases import alone, load, mechanism_of
 from tests.mechanics.multibody.independent.motion import carrying
 from tests.mechanics.multibody.strategies import JOINT_TYPES, coordinates_of, motions_of
+
+MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_JOINTS}
+
 
 CASES = load("joint_kinematics_cases.json")["cases"]
 
@@ -110,7 +114,7 @@ def test_the_joints_of_urdf_chains_name_their_coordinate():
 
 @pytest.mark.parametrize("joint_type", MOTIONS)
 def test_motions_agree_with_what_the_schema_declares(joint_type):
-    declared = getattr(joints, joint_type).motion_types
+    declared = getattr(osimlite, joint_type).motion_types
     assert motion_types(MOTIONS[joint_type], len(declared)) == declared
 
 

@@ -6,14 +6,13 @@ import pytest
 
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.schema_functions import convert_function
-from osimlite.schema.functions import (
+from osimlite.schema.function_types import PolynomialFunction, StepFunction
+from osimlite.schema.functions import LinearFunction
+from osimlite.schema.splines import (
     GCVSpline,
-    LinearFunction,
     PiecewiseConstantFunction,
     PiecewiseLinearFunction,
-    PolynomialFunction,
     SimmSpline,
-    StepFunction,
 )
 
 PLACES = (-1.0, 0.0, 0.3, 0.5, 1.0, 2.0, 5.0)

@@ -11,9 +11,9 @@ from typing import Any
 
 from osimlite import Model
 from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.functions import PiecewiseLinearFunction
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.schema.registry import find_class
+from osimlite.schema.splines import PiecewiseLinearFunction
 from tests.simple_models import make_slide
 
 FOLDER = Path(__file__).resolve().parents[3] / "fixtures" / "muscles"

@@ -9,12 +9,8 @@ from osimlite import Model
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import CoordinateActuator
-from osimlite.schema.controller_types import (
-    ControlSetController,
-    PrescribedController,
-    SynergyController,
-    SynergyVector,
-)
+from osimlite.schema.control_sets import ControlSetController
+from osimlite.schema.controller_types import PrescribedController, SynergyController, SynergyVector
 from osimlite.schema.examples import ToyPropMyoController, ToyReflexController
 from osimlite.schema.functions import Constant
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_

@@ -10,9 +10,9 @@ from osimlite.errors import SettingError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.examples import ToyReflexController
-from osimlite.schema.functions import GCVSpline, PiecewiseConstantFunction
 from osimlite.schema.paths import PathWrap
-from osimlite.schema.wrapping import WrapEllipsoid
+from osimlite.schema.splines import GCVSpline, PiecewiseConstantFunction
+from osimlite.schema.wrap_types import WrapEllipsoid
 from osimlite.simulation import Simulation
 from osimlite.studies.sweep.controls import Control
 from osimlite.studies.sweep.plan import plan

@@ -33,8 +33,8 @@ from osimlite import (
     UniversalJoint,
 )
 from osimlite.errors import OsimliteError
-from osimlite.schema.geometry import Sphere
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.schema.geometry_types import Sphere
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.paths import (
     GeometryPath,
     MovingPathPoint,
@@ -43,7 +43,7 @@ from osimlite.schema.paths import (
     PathWrap,
     PathWrapSet,
 )
-from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid
+from osimlite.schema.wrap_types import WrapCylinder, WrapEllipsoid
 from tests.conftest import CorpusModel
 from tests.translate.mjcf.compiled import Compiled
 

@@ -14,7 +14,8 @@ import osimlite
 from osimlite import Body, Coordinate, Marker, Model, PinJoint, SliderJoint
 from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.geometry import Brick, Cylinder, Mesh, Sphere
+from osimlite.schema.geometry import Mesh
+from osimlite.schema.geometry_types import Brick, Cylinder, Sphere
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.export import Mjcf
 from tests.translate.mjcf.compiled import Compiled

@@ -12,7 +12,7 @@ from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
-from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapTorus
+from osimlite.schema.wrap_types import WrapCylinder, WrapEllipsoid, WrapTorus
 from osimlite.translate.mjcf.fits import fit_tendon
 from osimlite.translate.mjcf.moving import fit_composition
 from osimlite.translate.mjcf.poses import draw_poses

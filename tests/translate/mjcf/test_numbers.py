@@ -16,9 +16,10 @@ import osimlite
 from osimlite import CoordinateCouplerConstraint, CustomJoint, Model
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Object
-from osimlite.schema.functions import SimmSpline
-from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, Geometry, Sphere
-from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.schema.geometry import Geometry
+from osimlite.schema.geometry_types import Brick, Cylinder, Ellipsoid, Sphere
+from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
+from osimlite.schema.splines import SimmSpline
 from tests.simple_models import make_pendulum
 from tests.translate.mjcf.support import HOSTILE, hostile
 

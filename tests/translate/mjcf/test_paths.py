@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body
-from osimlite.schema.functions import Sine
+from osimlite.schema.function_types import Sine
 from osimlite.schema.joints import PinJoint, SliderJoint
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
@@ -23,7 +23,7 @@ from osimlite.schema.paths import (
     PathPoint,
     PathWrap,
 )
-from osimlite.schema.wrapping import WrapCylinder
+from osimlite.schema.wrap_types import WrapCylinder
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.poses import draw_values
 from tests.translate.mjcf.compiled import Compiled

@@ -9,7 +9,8 @@ from osimlite.schema.actuators import (
     PointToPointActuator,
     TorqueActuator,
 )
-from osimlite.schema.muscles import McKibbenActuator, PathActuator
+from osimlite.schema.muscles import PathActuator
+from osimlite.schema.path_forces import McKibbenActuator
 from osimlite.simulation.elements.force_type import ForceType, State
 from osimlite.simulation.elements.geometries.body import AXIS, BODY, POINT, POINTS
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE

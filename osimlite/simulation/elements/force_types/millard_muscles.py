@@ -42,7 +42,7 @@ from osimlite.mechanics.laws.muscle_curves import (
     tendon_force_length,
 )
 from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation_constants
-from osimlite.schema.muscles import (
+from osimlite.schema.millard_muscles import (
     Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
 )

@@ -12,9 +12,9 @@ from osimlite.mechanics.laws.springs import (
     path_spring_tension,
     path_stretch,
 )
-from osimlite.schema.muscles import ClutchedPathSpring
 from osimlite.schema.path_forces import (
     Blankevoort1991Ligament,
+    ClutchedPathSpring,
     ExpressionBasedPathForce,
     Ligament,
     PathSpring,

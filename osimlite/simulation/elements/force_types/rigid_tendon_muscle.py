@@ -6,7 +6,7 @@ from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.muscles import MuscleInputs
-from osimlite.schema.muscles import RigidTendonMuscle
+from osimlite.schema.millard_muscles import RigidTendonMuscle
 from osimlite.simulation.elements.muscle import compute_height, define_muscle
 from osimlite.simulation.elements.parameters import (
     Curve,

@@ -14,7 +14,7 @@ from osimlite.mechanics.laws.smooth_muscles import (
     meyer_rigid,
     tendon_growth,
 )
-from osimlite.schema.muscles import DeGrooteFregly2016Muscle, MeyerFregly2016Muscle
+from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle, MeyerFregly2016Muscle
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import State
 from osimlite.simulation.elements.muscle import PENNATION, SPRING, compute_height, define_muscle

@@ -20,7 +20,7 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 from osimlite.mechanics.multibody.links import Places
-from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.contact import ContactSurface, read_surface
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry

@@ -19,7 +19,8 @@ from osimlite.mechanics.multibody.functions import (
 )
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.schema_functions import convert_function
-from osimlite.schema.functions import Constant, ExpressionBasedFunction, MultiplierFunction
+from osimlite.schema.function_types import ExpressionBasedFunction
+from osimlite.schema.functions import Constant, MultiplierFunction
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceRecord

@@ -33,7 +33,7 @@ from osimlite.schema.paths import (
     MovingPathPoint,
     PathPoint,
 )
-from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
+from osimlite.schema.resolution import is_a
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.registry import register_path
@@ -270,7 +270,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     # In a pose without an active point in the range of a wrap, OpenSim ignores the following wraps.
     may_leave = False
     for wrap, surface in zip(wraps, result, strict=True):
-        if type(surface) not in LAWS:
+        if type(surface).__name__ not in LAWS:
             raise builder.make_unsupported_error(
                 owner, f" around the {get_class_name(surface)} '{surface.name}'"
             )
@@ -312,7 +312,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
 def _read_surface(
     builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int
 ) -> Surface:
-    law, curve, fields = LAWS[type(surface)]
+    law, curve, fields = LAWS[type(surface).__name__]
     sizes = [float(size) for name in fields for size in np.atleast_1d(getattr(surface, name))]
     builder.check_finite(surface, (*sizes, *surface.translation, *surface.xyz_body_rotation))
     side, method = SIDES.get(surface.quadrant.lower()), METHODS.get(wrap.method.lower())
@@ -325,7 +325,8 @@ def _read_surface(
         raise ModelError(
             f"the method of '{builder.path(wrap)}' is '{wrap.method}'; use hybrid, midpoint or axial"
         )
-    if min(sizes) < 0.0 or (min(sizes) == 0.0 and isinstance(surface, WrapEllipsoid | WrapTorus)):
+    may_be_zero = is_a(surface, "WrapCylinder") or is_a(surface, "WrapSphere")
+    if min(sizes) < 0.0 or (min(sizes) == 0.0 and not may_be_zero):
         raise ModelError(
             f"'{builder.path(surface)}' has a size that is not positive; give it a positive one"
         )
@@ -350,7 +351,7 @@ def _read_surface(
     return Surface(number, tangent, law, curve, numbers, first, last)
 
 
-def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
+def _list_geodesic_numbers(surface: Any) -> tuple[float, ...]:
     """Return the numbers of a surface for geodesics.
 
     Args:
@@ -360,7 +361,7 @@ def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
         Half its length (m, infinite for closed surfaces), and its numbers in
         :mod:`osimlite.mechanics.kernels.cable_surfaces`.
     """
-    if isinstance(surface, WrapCylinder):
+    if is_a(surface, "WrapCylinder"):
         return (
             surface.length / 2.0,
             SURFACE_TYPE.CYLINDER,
@@ -370,9 +371,9 @@ def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
             1.0,
             0.0,
         )
-    if isinstance(surface, WrapSphere):
+    if is_a(surface, "WrapSphere"):
         return inf, SURFACE_TYPE.SPHERE, surface.radius, surface.radius**2, 1.0, 1.0, 1.0
-    if isinstance(surface, WrapEllipsoid):
+    if is_a(surface, "WrapEllipsoid"):
         return (
             inf,
             SURFACE_TYPE.ELLIPSOID,
@@ -380,7 +381,6 @@ def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
             1.0,
             *(float(radius) ** -2 for radius in surface.dimensions),
         )
-    assert isinstance(surface, WrapTorus)
     return inf, SURFACE_TYPE.TORUS, surface.outer_radius, surface.inner_radius, 0.0, 0.0, 0.0
 
 
@@ -438,13 +438,13 @@ READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array
 }
 """Function that reads the points of each class."""
 
-LAWS: dict[type[WrapObject], tuple[str, str, tuple[str, ...]]] = {
-    WrapCylinder: ("wrap_cylinder", "trace_cylinder", ("radius", "length")),
-    WrapSphere: ("wrap_sphere", "trace_sphere", ("radius",)),
-    WrapEllipsoid: ("wrap_ellipsoid", "trace_ellipsoid", ("dimensions",)),
-    WrapTorus: ("wrap_torus", "trace_torus", ("inner_radius", "outer_radius")),
+LAWS: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "WrapCylinder": ("wrap_cylinder", "trace_cylinder", ("radius", "length")),
+    "WrapSphere": ("wrap_sphere", "trace_sphere", ("radius",)),
+    "WrapEllipsoid": ("wrap_ellipsoid", "trace_ellipsoid", ("dimensions",)),
+    "WrapTorus": ("wrap_torus", "trace_torus", ("inner_radius", "outer_radius")),
 }
-"""Kernel of each surface, kernel that traces a path on it, and properties that are its sizes."""
+"""By the class of a surface: its kernel, the kernel that traces a path on it, and properties that are its sizes."""
 
 SIGNS = {"": 1.0, "+": 1.0, "-": -1.0}
 """Sign of a quadrant by its text."""

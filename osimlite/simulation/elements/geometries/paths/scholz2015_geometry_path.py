@@ -33,10 +33,10 @@ from osimlite.mechanics.kernels.wrap_curves import MOST
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_offset
-from osimlite.schema.contact import (
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact_types import (
     ContactCylinder,
     ContactEllipsoid,
-    ContactGeometry,
     ContactHalfSpace,
     ContactSphere,
     ContactTorus,

@@ -1,0 +1,52 @@
+"""Shapes of contact."""
+
+from typing import Annotated
+
+from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.facts import Facts
+from osimlite.schema.fields import Vec3, real, vec3
+from osimlite.schema.references import FileName
+
+
+# It has no bottom: a sphere deep inside is still pushed out at the front.
+class ContactHalfSpace(ContactGeometry):
+    """Everything with x > 0 of its own frame; the outward normal is the negative X axis."""
+
+
+class ContactSphere(ContactGeometry):
+    """A ball."""
+
+    facts = Facts(doubts={"radius": "it touches nothing"})
+
+    radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Distance of the surface from the middle."""
+
+
+class ContactCylinder(ContactGeometry):
+    """An endless cylinder along its own Z axis, for paths to wrap around."""
+
+    radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Distance of the surface from the Z axis."""
+
+
+class ContactEllipsoid(ContactGeometry):
+    """An ellipsoid with half axes `radii`."""
+
+    radii: Annotated[Vec3, vec3("m", "> 0")] = (0.0, 0.0, 0.0)
+    """Half axes along X, Y and Z of the surface."""
+
+
+class ContactTorus(ContactGeometry):
+    """A ring about its own Z axis: a tube whose middle line is a circle."""
+
+    torus_radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Radius of the circle in the middle of the tube."""
+    tube_radius: Annotated[float, real("m", "> 0")] = 0.0
+    """Distance of the surface from that circle."""
+
+
+class ContactMesh(ContactGeometry):
+    """A closed surface read from a file."""
+
+    filename: FileName = ""
+    """File of a closed surface of triangles (.obj, .stl, .vtp)."""
