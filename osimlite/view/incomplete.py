@@ -110,11 +110,14 @@ def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]
     )
 
 
-def describe_left_out(parts: Sequence[tuple[str, str]]) -> Iterator[str]:
+def describe_left_out(
+    parts: Sequence[tuple[str, str]], *, with_meshes: bool = True
+) -> Iterator[str]:
     """Yield sentences about parts that are not shown.
 
     Args:
         parts: path of each, and why.
+        with_meshes: whether there is a sentence about missing mesh files.
     """
     # Parts with the same reason are one sentence: a model may have a hundred paths without points.
     groups: dict[str, list[tuple[str, str]]] = {}
@@ -132,7 +135,7 @@ def describe_left_out(parts: Sequence[tuple[str, str]]) -> Iterator[str]:
     hidden_count = sum(map(len, rows[MAX_REMARKS:]))
     if hidden_count:
         yield f"not shown: {format_count(hidden_count, 'more part')}"
-    if meshes:
+    if meshes and with_meshes:
         yield _describe_group(meshes)
 
 

@@ -24,6 +24,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.translate.sidecar import replace_non_finite
+from osimlite.view.incomplete import describe_left_out
 from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
 from osimlite.view.motion import ShownMotion, find_moving_bodies, get_values, read_activations
@@ -154,6 +155,8 @@ def page_data(
             "findings": finding_rows(findings),
             "pins": place_pins(model, scene, findings),
             "remarks": [list(remark) for remark in scene.remarks],
+            # Missing meshes are among the findings.
+            "notes": [*describe_left_out(scene.remarks, with_meshes=False)],
         }
     )
     return data

@@ -558,3 +558,20 @@ def test_the_label_of_gravity_is_below_the_buttons_of_a_small_frame(open_page, t
     tools = page.page.locator("#tools").bounding_box()
     assert label["y"] >= tools["y"] + tools["height"]
     assert page.run("v.stage.onPage(1, [0, 0, 0])[1]") > tools["height"]
+
+
+def test_a_path_without_points_is_said_before_anything_is_selected(open_page, tmp_path):
+    model = osimlite.Model(name="m")
+    bone = model.add(osimlite.Body(name="bone", mass=1.0))
+    joint = osimlite.PinJoint(name="j", coordinates=[osimlite.Coordinate(name="a")])
+    model.add(joint.between(model.ground, bone))
+    path = osimlite.FunctionBasedPath(
+        length_function=osimlite.LinearFunction(coefficients=(0.1, 0.3)),
+        coordinate_paths=["/jointset/j/a"],
+    )
+    model.add(osimlite.PathActuator(name="motor", path=path, optimal_force=1.0))
+    page = open_page(Shown.of(model).write_page(tmp_path / "page.html"))
+    text = page.run("document.querySelector('#details').textContent")
+    assert "not shown: /forceset/motor/" in text and "OpenSim does not draw it either" in text
+    page.run("v.select('/bodyset/bone')")
+    assert "not shown" not in page.run("document.querySelector('#details').textContent")

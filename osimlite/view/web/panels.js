@@ -142,6 +142,11 @@
     box.scrollTop = 0;
   };
 
+  // What cannot be drawn, until a component is selected.
+  const showNotes = (viewer) => {
+    $("#details > div").append(...viewer.data.notes.map((said) => make("p", { className: "hint" }, ...breakable(said))));
+  };
+
   const showFindings = (viewer) => {
     const found = viewer.data.findings;
     if (!found.length) return;
@@ -194,5 +199,5 @@
     }
   }
 
-  Object.assign(window.osimlite, { Tree, Sliders, showProperties, showFindings, make, $ });
+  Object.assign(window.osimlite, { Tree, Sliders, showProperties, showFindings, showNotes, make, $ });
 })();

@@ -1,7 +1,7 @@
 "use strict";
 // The page as a whole: what is selected, which pose is shown, and the motion that plays.
 (() => {
-  const { Curves, Mechanism, Stage, Tree, Sliders, showProperties, showFindings, make, $, bytes } = window.osimlite;
+  const { Curves, Mechanism, Stage, Tree, Sliders, showProperties, showFindings, showNotes, make, $, bytes } = window.osimlite;
 
   // Distance below which pins cover each other, pixels.
   const PIN = 14;
@@ -20,6 +20,7 @@
       this.layers();
       this.labels();
       showFindings(this);
+      showNotes(this);
       this.player();
       this.mouse();
       this.keys();
