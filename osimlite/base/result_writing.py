@@ -125,7 +125,8 @@ class ResultWriter:
         expect_regular_or_none(path)
         if self.overwrite or not os.path.lexists(path):
             return
-        existing, kind = read_at_most(path, BEGINNING_BYTES), describe_content(beginning)
+        existing = read_at_most(path, BEGINNING_BYTES)
+        kind = describe_content(beginning)
         if existing and not _are_alike(describe_content(existing), kind):
             raise WriteRefusedError(
                 f"a result would replace this file, which is not {kind or 'such a text'}; move it, "

@@ -176,7 +176,8 @@ class Command:
             # Annotations are texts (`from __future__ import annotations`) that are evaluated when a
             # command is read.
             annotation = eval(function.__annotations__[name], function.__globals__)
-            value_type, declared = annotation.__origin__, annotation.__metadata__[0]
+            value_type = annotation.__origin__
+            declared = annotation.__metadata__[0]
             result.append(_BoundParameter(name, value_type, declared, defaults.get(name, ...)))
         return result + [
             _BoundParameter(option.name, option.type, _make_spec(option), option.default)
@@ -259,7 +260,8 @@ class Command:
             if word == "-" or not word.startswith("-"):
                 if not arguments:
                     return None
-                parameter, flag = arguments[0], True
+                parameter = arguments[0]
+                flag = True
                 value_type, is_list = parameter.scalar()
                 if not is_list:
                     arguments.pop(0)

@@ -352,7 +352,8 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
             nonlocal current, advance
             if title != current:
                 bars.close()
-                current, advance = title, bars.enter_context(progress_bar(title, of))
+                current = title
+                advance = bars.enter_context(progress_bar(title, of))
             advance(done, of)
 
         yield tell

@@ -306,10 +306,12 @@ def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
         file = tour.folder / "human-walks" / "states.sto"
         table = walked.states
         write_sto(file, "states", table.times, table.columns, table.rows)
-        speed, steps = walked.report["speed"][0], int(walked.report["steps"][0])
+        speed = walked.report["speed"][0]
+        steps = int(walked.report["steps"][0])
         # The second half of the walk is steady; the first steps start from a guess.
         peak = float(walked.loads.rows[len(table.times) // 2 :].max())
-        mass, t = scenario.get_walkers(1).mass, walked.times[0]
+        mass = scenario.get_walkers(1).mass
+        t = walked.times[0]
         text = (
             f"A human model of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
             "muscles react to their lengths and forces, and those of the hips to the lean of the torso. The gains come "
@@ -374,10 +376,8 @@ def _describe_jump(motion: Trajectory) -> str:
         if ".foot_" in label and label.endswith(".force.Y")
     ]
     # The mass is in kg, so the quotient is in body weights.
-    peak_force, mass = (
-        np.sum(vertical_forces, axis=0)[motion.times < take_off].max(),
-        motion.mechanism.total_mass,
-    )
+    peak_force = np.sum(vertical_forces, axis=0)[motion.times < take_off].max()
+    mass = motion.mechanism.total_mass
     return (
         f"A human model of {mass:.0f} kg jumps with 16 muscles, whose excitations come from an optimization. The feet push with "
         f"{peak_force / (9.80665 * mass):.1f} times the body weight, the mass centre rises from {heights[0]:.2f} to "

@@ -47,7 +47,9 @@ def diff(
             raise OsimliteError(
                 "--git takes the seven arguments of git's external diff; see 'git help diff'"
             )
-        title, old_file, new_file = str(files[0]), files[1], files[4]
+        title = str(files[0])
+        old_file = files[1]
+        new_file = files[4]
     elif len(files) == 2:
         title, (old_file, new_file) = "", files
     else:

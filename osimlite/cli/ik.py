@@ -61,12 +61,11 @@ def ik(
     from osimlite.schema.markers import Marker
 
     require_plots(plot=plot)
-    weights, coordinate_weights = (
-        options.parse_named_numbers(weight, "--weight"),
-        options.parse_named_numbers(keep, "--keep"),
-    )
+    weights = options.parse_named_numbers(weight, "--weight")
+    coordinate_weights = options.parse_named_numbers(keep, "--keep")
     of_sensors = holds_orientations(trial)
-    model, data = read(file), None if of_sensors else MarkerData.from_source(trial)
+    model = read(file)
+    data = None if of_sensors else MarkerData.from_source(trial)
     with progress_bar("fitting the motion", None):
         motion = inverse_kinematics(
             model,

@@ -60,7 +60,8 @@ def inverse_dynamics(
             **option_values,
         )
     assert table.motion is not None
-    folder, tables = options.choose_output_folder(file, output), {"inverse_dynamics.sto": table}
+    folder = options.choose_output_folder(file, output)
+    tables = {"inverse_dynamics.sto": table}
     write_results(table.motion, tables, folder)
     if plot:
         loads = option_values.get("external_loads")

@@ -70,11 +70,13 @@ def simulate(
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
-    results, earlier = options.choose_output_folder(file, output), option_values["resume"]
+    results = options.choose_output_folder(file, output)
+    earlier = option_values["resume"]
     # The earlier simulation is read at the start and would be replaced at the end.
     if earlier is not None and results.resolve() == Path(earlier).resolve():
         raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
-    model, feedback = read(file), options.read_feedback(controller, par)
+    model = read(file)
+    feedback = options.read_feedback(controller, par)
     if controls:
         from osimlite.simulation.run_controls import parse_controls
     from osimlite.simulation.run import Simulation

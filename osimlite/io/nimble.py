@@ -197,7 +197,8 @@ def _list_tree_joints(
 ) -> list[Joint]:
     """Return the joints of a tree depth-first."""
     result: list[Joint] = []
-    waiting, visited = [root], set[str]()
+    waiting = [root]
+    visited = set[str]()
     while waiting:
         joint, child = waiting.pop()
         if child in visited:

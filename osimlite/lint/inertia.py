@@ -56,7 +56,8 @@ def compute_principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[
 
 def _project_onto_cone(moments: Sequence[float]) -> list[float]:
     """Return the point of the cone nearest to `moments`, by trying every face."""
-    best, least_distance = [0.0, 0.0, 0.0], math.inf
+    best = [0.0, 0.0, 0.0]
+    least_distance = math.inf
     faces = [face for count in range(4) for face in combinations(_EDGES, count)]
     for face in faces:
         weights = _solve_weights(face, moments)

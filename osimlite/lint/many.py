@@ -183,7 +183,8 @@ def check_job(job: CheckJob) -> Report:
     outside_paths = subject.list_outside_paths() if job.cache_folder is not None else None
     if job.cache_folder is not None and outside_paths is not None:
         # A file that changes during the check must not count as checked.
-        key, text = make_key(job.file, job.config), fingerprint_text(subject.data)
+        key = make_key(job.file, job.config)
+        text = fingerprint_text(subject.data)
         Cache(job.cache_folder).store(job.file, key, text, report, outside_paths, began)
     return report
 

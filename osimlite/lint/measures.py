@@ -306,11 +306,9 @@ def digest_parts(subject: Subject) -> TextParts | None:
                 spans.append((span.start, span.end, subject.path(item) if has_path else ""))
             elif has_path:
                 return None
-    rest_digest, paths, covered_end = (
-        blake2b(str(subject.version).encode(), digest_size=16),
-        dict[str, str](),
-        0,
-    )
+    rest_digest = blake2b(str(subject.version).encode(), digest_size=16)
+    paths = dict[str, str]()
+    covered_end = 0
     for start, end, path in sorted(spans):
         if start >= covered_end:
             # Space around an element says nothing, so that one more does not change what is around

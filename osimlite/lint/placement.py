@@ -113,11 +113,13 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
         subject: the check target.
         frame: the frame.
     """
-    pose, depth = FramePose(), 0
+    pose = FramePose()
+    depth = 0
     # The bound ends a chain of frames that forms a loop.
     while isinstance(frame, PhysicalOffsetFrame) and depth < 100:
         pose = make_offset(frame.orientation, frame.translation).compose(pose)
-        frame, depth = subject.target_of(frame, "socket_parent"), depth + 1
+        frame = subject.target_of(frame, "socket_parent")
+        depth = depth + 1
     return (frame, pose) if isinstance(frame, (Body, Ground)) else None
 
 
@@ -154,11 +156,9 @@ def compute_poses(
     Returns:
         The poses by the identity of the body.
     """
-    bones, ends, motions = (
-        build_skeleton(subject),
-        _locate_joint_frames(subject),
-        _find_joint_motions(subject, values is not None),
-    )
+    bones = build_skeleton(subject)
+    ends = _locate_joint_frames(subject)
+    motions = _find_joint_motions(subject, values is not None)
     poses: dict[int, FramePose] = {id(bones.ground): FramePose()}
     pending: list[Component] = [bones.ground]
     # Breadth first from ground, as in the assembly of the tree of joints.
@@ -212,7 +212,8 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
     """Return the motions of the joints with known functions, by identity; later axes are rotated by earlier ones."""
     result: dict[int, list[_JointMotion]] = {}
     for link in build_skeleton(subject).links:
-        joint, names = link.joint, [item.name for item in link.joint.coordinates]
+        joint = link.joint
+        names = [item.name for item in link.joint.coordinates]
         # The first three of the six axes of a CustomJoint rotate, the others translate.
         if is_a(joint, "CustomJoint"):
             axes = [*enumerate(list_axes(cast("CustomJoint", joint)))]
@@ -276,7 +277,8 @@ def _compute_joint_pose(
         item.name: (values_by_name or {}).get(item.name, item.default_value)
         for item in joint.coordinates
     }
-    axes, position = (X, Y, Z), ZERO
+    axes = (X, Y, Z)
+    position = ZERO
     for motion in motions:
         amount = motion.amount(values)
         if motion.turns and amount:

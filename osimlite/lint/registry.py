@@ -94,7 +94,8 @@ class FindingCollector:
             fix: the fix.
             **where: more arguments of :meth:`Subject.position`.
         """
-        rule, subject = self.rules.get(fault), self.subject
+        rule = self.rules.get(fault)
+        subject = self.subject
         if rule is None:
             return
         # Severities in the settings do not change what OpenSim does.

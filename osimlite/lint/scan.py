@@ -360,7 +360,8 @@ class RowScanner:
             words = _WORD.finditer(text)
             cells = [(match.start(), match[0]) for match in islice(words, self.cells + 1)]
             return cells, len(cells) + sum(1 for _ in words)
-        cells, start = [], 0
+        cells = []
+        start = 0
         for cell in text.split(b"\t", self.cells + 1)[: self.cells + 1]:
             cells.append((start + len(cell) - len(cell.lstrip()), cell.strip()))
             start += len(cell) + 1

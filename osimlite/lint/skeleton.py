@@ -95,10 +95,8 @@ class TreeGrowth(NamedTuple):
 def grow_tree(subject: Subject) -> TreeGrowth:
     """Return how OpenSim builds a tree from a skeleton."""
     bones = build_skeleton(subject)
-    ground, masses = (
-        subject.path(bones.ground),
-        {subject.path(body): body.mass for body in bones.bodies},
-    )
+    ground = subject.path(bones.ground)
+    masses = {subject.path(body): body.mass for body in bones.bodies}
     edges = [
         # OpenSim asks an empty joint of the class how many coordinates it has.
         _SkeletonEdge(

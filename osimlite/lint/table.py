@@ -69,7 +69,8 @@ class Table(CheckTarget):
     @cached_property
     def rows(self) -> TableRows:
         """Rows of the table with their faults, scanned on first access."""
-        header, cells = self.header, len(self.labels)
+        header = self.header
+        cells = len(self.labels)
         # Where labels are missing or too many, the first row says how many cells a row has.
         first_row = _ROW.search(self.data, header.rows)
         if isinstance(header, MarkerHeader):
@@ -91,8 +92,10 @@ class Table(CheckTarget):
 
     def iterate_rows(self, time: float) -> Iterator[list[bytes]]:
         """Yield the cells of the rows from a time on; the first is found by bisection."""
-        data, time_column = self.data, int(self.is_markers)
-        low, high = self.header.rows, len(data)
+        data = self.data
+        time_column = int(self.is_markers)
+        low = self.header.rows
+        high = len(data)
         # The rest is some rows, which are read one by one as fast.
         while high - low > 2000:
             middle = data.find(b"\n", (low + high) // 2, high) + 1
@@ -172,10 +175,8 @@ class Table(CheckTarget):
             letters = line.decode()
         except UnicodeDecodeError:
             return None
-        before, old = (
-            letters[: position.column - 1],
-            letters[position.column - 1 :][: position.length],
-        )
+        before = letters[: position.column - 1]
+        old = letters[position.column - 1 :][: position.length]
         # Columns count letters, edits count bytes.
         start += len(before.encode())
         safe = certain or text.lower() == old.lower()

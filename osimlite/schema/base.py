@@ -497,7 +497,8 @@ def _copy_object(
     """
     if id(item) in memo:
         return cast("T", memo[id(item)])
-    state, owned = item.__dict__.copy(), _list_owned_fields(type(item))
+    state = item.__dict__.copy()
+    owned = _list_owned_fields(type(item))
     for name, value in state.items():
         kind = type(value)
         if kind in _PLAIN or (kind is tuple and _PLAIN.issuperset(map(type, value))):

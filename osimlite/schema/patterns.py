@@ -109,7 +109,8 @@ class Pattern:
         cached_starts: dict[int, list[set[int]]],
     ) -> frozenset[int]:
         """Return some states and all that they lead to without a character, before a character of a name."""
-        waiting, reached = [*numbers], set[int]()
+        waiting = [*numbers]
+        reached = set[int]()
         while waiting:
             number = waiting.pop()
             if number in reached:
@@ -134,10 +135,8 @@ class Pattern:
             case "$":
                 return index == len(name)
             case "b" | "B":
-                is_word_before, is_word_after = (
-                    name[max(index - 1, 0) : index] in _WORD,
-                    name[index : index + 1] in _WORD,
-                )
+                is_word_before = name[max(index - 1, 0) : index] in _WORD
+                is_word_after = name[index : index + 1] in _WORD
                 return (is_word_before != is_word_after) == (state.anchor == "b")
         if number not in cached_starts:
             cached_starts[number] = self._find_matching_starts(state.inside[1], name, cached_starts)
@@ -374,7 +373,8 @@ class _Compiler:
         self, anchor: str, inner_part: tuple[int, int] = (0, 0)
     ) -> tuple[int, int]:
         """Return a part that reads nothing, and that leads on only where an assertion holds."""
-        state, end_state = self._add_state(anchor=anchor), self._add_state()
+        state = self._add_state(anchor=anchor)
+        end_state = self._add_state()
         self.states[state].inside = inner_part
         self._link_states(state, end_state)
         return state, end_state

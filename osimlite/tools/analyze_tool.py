@@ -60,18 +60,17 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
         else:
             state_rows = StateRows.read(job, states, simulation)
             state_rows.report_missing(outcome)
-            first_row, last_row = (
-                state_rows.find_row(setup.initial_time),
-                state_rows.find_row(setup.final_time),
-            )
-            table, record = (
-                state_rows.table,
-                lambda: (state_rows.table.times, state_rows.read_speeds(simulation)),
-            )
+            first_row = state_rows.find_row(setup.initial_time)
+            last_row = state_rows.find_row(setup.final_time)
+            table = state_rows.table
             rows = (
                 (float(table.times[k]), state_rows.create_state(simulation, k))
                 for k in range(first_row, last_row + 1)
             )
+
+            def record() -> tuple[Array, Array]:
+                return table.times, state_rows.read_speeds(simulation)
+
         moments = list(rows)
         if not moments:
             raise job.create_error(

@@ -198,7 +198,8 @@ class SubjectFolder:
         """Write the files of a trial, and return them with facts for the summary."""
         folder = make_folder(base / "trials" / name)
         trial_path = f"/trials/{name}"
-        times, arrays = trial.times, trial.read_arrays()
+        times = trial.times
+        arrays = trial.read_arrays()
         paths: list[Path] = []
 
         def put(file: str, table: StoTable, source: str, *, has_missing: bool = True) -> None:
@@ -302,7 +303,8 @@ class SubjectFolder:
         Nimble leaves out the patellae, whose coordinates follow the knees.
         """
         table = trial.read_coordinates(index)
-        columns, rows = list(table.columns), [*table.rows.T]
+        columns = list(table.columns)
+        rows = [*table.rows.T]
         for coupler in self.subject.read_model(index).components(CoordinateCouplerConstraint):
             name = _get_last_name(str(coupler.dependent_coordinate_name))
             arguments = [

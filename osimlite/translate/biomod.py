@@ -144,7 +144,9 @@ def _format_segments(robot: Robot) -> Iterator[str]:
     joints = {joint.child: joint for joint in robot.joints}
     for link in robot.links[1:]:
         joint = joints[link.name]
-        parent, origin, axis_letter = joint.parent, joint.origin, _find_axis(joint)
+        parent = joint.parent
+        origin = joint.origin
+        axis_letter = _find_axis(joint)
         if joint.kind != "fixed" and axis_letter is None:
             # A segment moves along its own axes only: turn to the axis before, and back after.
             axis_frame = np.eye(4)
@@ -155,7 +157,8 @@ def _format_segments(robot: Robot) -> Iterator[str]:
             )
             yield from ("\tmass 0", "endsegment", "")
             # The rotation back is the transpose.
-            parent, origin = f"{link.name}_axis", axis_frame.T
+            parent = f"{link.name}_axis"
+            origin = axis_frame.T
             yield from _format_segment(link.name, parent, origin, None, "", robot)
         else:
             moving_joint = joint if joint.kind != "fixed" else None

@@ -74,7 +74,8 @@ def to_bvh(
         raise SettingError(f"--scale takes a positive number, not {scale:g}")
     mechanism = build_mechanism(model)
     # Without a motion the file has one frame, the default pose.
-    times, values = np.zeros(1), np.asarray(mechanism.assemble({}), dtype=float)[None, :]
+    times = np.zeros(1)
+    values = np.asarray(mechanism.assemble({}), dtype=float)[None, :]
     if motion is not None:
         # Poses that violate constraints would tear the skeleton.
         assembled = RecordedMotion.read(mechanism, motion).assembled()

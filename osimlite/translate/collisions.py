@@ -42,7 +42,8 @@ def collect_collisions(
     Returns:
         Shapes, placed in the frame of their body, by the absolute path of the body (or "/ground").
     """
-    tree, result = model.tree(), dict[str, list[Visual]]()
+    tree = model.tree()
+    result = dict[str, list[Visual]]()
     for geometry in tree.components:
         if not isinstance(geometry, ContactGeometry):
             continue

@@ -255,7 +255,8 @@ class _Painter:
 
     def draw_frame(self, number: int) -> Any:
         """Frame `number` as a pillow image."""
-        film, pose = self.film, self.film.poses[number]
+        film = self.film
+        pose = self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)
         drawn_forces = film.pushes.locate_forces(number, pose)
         arrows = [

@@ -201,7 +201,8 @@ class _SceneCollector:
         frame = frame_of(self.tree, shape)
         if frame is None or frame not in self.mechanism.frames:
             raise UnsupportedError("is in a frame that is not fixed to a body")
-        appearance, scale = shape.appearance, np.array(shape.scale_factors, dtype=float)
+        appearance = shape.appearance
+        scale = np.array(shape.scale_factors, dtype=float)
         # 0 is OpenSim's number for hidden shapes.
         visible = appearance.visible and appearance.surface_properties.representation != 0
         body, frame_in_body = self.mechanism.frames[frame]

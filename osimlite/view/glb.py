@@ -43,7 +43,8 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         motion: how it moves, or None.
         path: the file to write.
     """
-    times, rows = np.zeros(1), q[None, :]
+    times = np.zeros(1)
+    rows = q[None, :]
     if motion is not None:
         recorded = np.asarray(motion.times, dtype=float)
         # More moments than a player shows would only make the file larger.

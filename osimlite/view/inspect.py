@@ -118,7 +118,8 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 
 def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
     """Return one pin for each component with findings and a position: body, point, codes and worst severity."""
-    tree, mechanism = model.tree(), scene.mechanism
+    tree = model.tree()
+    mechanism = scene.mechanism
     results: dict[str, list[Finding]] = {}
     for finding in findings:
         # Remarks have no pin: there may be hundreds.

@@ -35,10 +35,8 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
     """
     program, structure = paths.program, paths.structure
     constrained_record = structure[structure[MODEL.CONSTRAINED] :]
-    records, errors = (
-        structure[constrained_record[CONSTRAINED.CONSTRAINT_AT] :],
-        constrained_record[CONSTRAINED.WORK_ERRORS],
-    )
+    records = structure[constrained_record[CONSTRAINED.CONSTRAINT_AT] :]
+    errors = constrained_record[CONSTRAINED.WORK_ERRORS]
     # Of each its record, the degree of freedom that depends, and where its error is found.
     coupled = [
         (

@@ -109,10 +109,8 @@ def activity_color(activation: float) -> Color:
 
 def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
     """Return which bodies (b + 1,) move between poses; all but ground if none does."""
-    rotations, origins = (
-        np.array([p.rotations for p in poses]),
-        np.array([p.origins for p in poses]),
-    )
+    rotations = np.array([p.rotations for p in poses])
+    origins = np.array([p.origins for p in poses])
     # Rotations and origins that change by rounding do not count.
     changes = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
     result: Array = changes > 1e-9

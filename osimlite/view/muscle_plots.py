@@ -80,13 +80,15 @@ def _make_title(quantity: str) -> str:
         unit = QUANTITIES[quantity]
         title = _TITLES.get(quantity, quantity.replace("_", " ").capitalize())
     else:
-        unit, title = "m", f"Moment arm about {quantity.removeprefix('moment_arm_')}"
+        unit = "m"
+        title = f"Moment arm about {quantity.removeprefix('moment_arm_')}"
     return f"{title} ({unit})" if unit else title
 
 
 def _get_abscissa(curves: MuscleCurves, mechanism: Mechanism, index: int) -> tuple[str, Array]:
     """Return label and values of a coordinate, angles in degrees."""
-    name, values = curves.coordinates[index], curves.poses[:, index]
+    name = curves.coordinates[index]
+    values = curves.poses[:, index]
     coordinate = mechanism.coordinates[mechanism.coordinate_index(name)]
     is_angle = coordinate.motion_type == "rotational"
     label = f"{name.rpartition('/')[2]} ({'deg' if is_angle else 'm'})"
@@ -109,7 +111,8 @@ def _draw_lines(
     """Yield the pages of one quantity over a coordinate."""
     label, abscissa = _get_abscissa(curves, mechanism, 0)
     names = _get_names(curves)
-    sides, columns = split_sides(names), dict(zip(names, rows.T, strict=True))
+    sides = split_sides(names)
+    columns = dict(zip(names, rows.T, strict=True))
     other_columns = {} if other is None else dict(zip(names, other.T, strict=True))
     # A pair is one entry of a panel, whatever the number of its sides.
     groups: dict[str, dict[str, list[str]]] = {}

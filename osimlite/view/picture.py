@@ -197,10 +197,8 @@ def _fill_background(
         # An arrow shorter than its head would be a blot.
         if length < 2.0 * thickness:
             continue
-        tip, end = (
-            arrow.point + arrow.vector,
-            arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thickness / length),
-        )
+        tip = arrow.point + arrow.vector
+        end = arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thickness / length)
         triangles.add_surface(
             unit_shapes.make_cylinder(),
             _make_cylinder(arrow.point, end, thickness),
@@ -214,7 +212,8 @@ def _fill_background(
 
 def _lay_floor(triangles: _TriangleList, scene: Scene, height: float) -> None:
     """Add a square mesh at a height over ground's origin, its lines half a metre apart."""
-    up, half_size = scene.up, max(triangles.camera.half)
+    up = scene.up
+    half_size = max(triangles.camera.half)
     first_axis = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
     first_axis /= np.linalg.norm(first_axis)
     second_axis = np.cross(first_axis, up)
@@ -249,7 +248,8 @@ def _lay_floor(triangles: _TriangleList, scene: Scene, height: float) -> None:
 
 def _cut_half_space(triangles: _TriangleList, transform: Array) -> None:
     """Add a half space seen from its edge: its line, and what is below it, behind everything else."""
-    camera, inward = triangles.camera, transform[:3, 0] / np.linalg.norm(transform[:3, 0])
+    camera = triangles.camera
+    inward = transform[:3, 0] / np.linalg.norm(transform[:3, 0])
     # Seen from above or below, the square of the half space is enough.
     if abs(float(inward @ camera.towards)) > _FROM_THE_EDGE:
         return

@@ -36,7 +36,8 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     """
     # Rerun's types are too many to declare, hence Any.
     rr: Any = require("rerun", extra="rerun", purpose="a recording for Rerun")
-    times, rows = np.zeros(1), q[None, :]
+    times = np.zeros(1)
+    rows = q[None, :]
     if motion is not None:
         times = np.asarray(motion.times, dtype=float)
         rows = get_values(motion, scene.mechanism)
@@ -75,18 +76,14 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         for path in (*(body.path for body in scene.mechanism.bodies), "ground")
     ]
     for k, name in enumerate(bodies):
-        rotations, origins = (
-            [pose.rotations[k] for pose in poses],
-            [pose.origins[k] for pose in poses],
-        )
+        rotations = [pose.rotations[k] for pose in poses]
+        origins = [pose.origins[k] for pose in poses]
         log_columns(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
     for drawn_item in scene.iterate_visible_items():
         surface = scene.surfaces[drawn_item.surface]
-        points, corners, color = (
-            surface.points,
-            surface.triangles,
-            _make_colour(drawn_item.color, drawn_item.opacity),
-        )
+        points = surface.points
+        corners = surface.triangles
+        color = _make_colour(drawn_item.color, drawn_item.opacity)
         shape = rr.Mesh3D(vertex_positions=points, triangle_indices=corners, albedo_factor=color)
         transform = rr.Transform3D(
             translation=drawn_item.matrix[:3, 3], mat3x3=drawn_item.matrix[:3, :3]
@@ -96,10 +93,8 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     levels = {} if motion is None else read_activations(scene, motion)
     for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
-            name, strips = (
-                make_entity("model", line.layer, line.path),
-                [pose.lines[index] for pose in poses],
-            )
+            name = make_entity("model", line.layer, line.path)
+            strips = [pose.lines[index] for pose in poses]
             log_static(name, rr.LineStrips3D.from_fields(radii=line.radius))
             level = levels.get(line.path)
             colors = [line.color] * len(poses) if level is None else map(activity_color, level)

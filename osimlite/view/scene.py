@@ -275,10 +275,8 @@ class Scene:
     def find_floor_height(self, q: Array) -> float:
         """Height of the floor over ground's origin: 0, or under what is drawn if that reaches lower."""
         box_minimum, box_maximum = self.compute_box(q)
-        lowest, size = (
-            float((_box_corners(box_minimum, box_maximum) @ self.up).min()),
-            float(np.linalg.norm(box_maximum - box_minimum)),
-        )
+        lowest = float((_box_corners(box_minimum, box_maximum) @ self.up).min())
+        size = float(np.linalg.norm(box_maximum - box_minimum))
         # A floor slightly below 0 is an effect of shapes that sink in.
         return 0.0 if lowest >= -0.05 * size else lowest
 

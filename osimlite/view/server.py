@@ -110,9 +110,11 @@ def _make_handler(
 
         def do_POST(self) -> None:
             try:
-                status, result = HTTPStatus.OK, assemble_pose(mechanism, self._question())
+                status = HTTPStatus.OK
+                result = assemble_pose(mechanism, self._question())
             except _BadQuestion as problem:
-                status, result = problem.status, {"error": str(problem)}
+                status = problem.status
+                result = {"error": str(problem)}
                 # What is left of such a question is not the next one.
                 self.close_connection = True
             self._answer(status, json.dumps(result).encode(), "application/json")

@@ -277,7 +277,8 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
             column_name = f"{base_name} {match['end']}" if pattern in _VECTORS else base_name
             factor = 1.0
             if unit.startswith("rad"):
-                factor, unit = np.degrees(1.0), unit.replace("rad", "deg", 1)
+                factor = np.degrees(1.0)
+                unit = unit.replace("rad", "deg", 1)
             return Column(column_name, unit, factor * values, group)
     unit = LABEL_UNITS.get(label, TABLE_UNITS.get(table.name, ""))
     if table.name.startswith("MomentArm_"):
@@ -286,7 +287,8 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
         unit = MOMENT
     factor = 1.0
     if unit.startswith("rad"):
-        factor, unit = np.degrees(1.0), unit.replace("rad", "deg", 1)
+        factor = np.degrees(1.0)
+        unit = unit.replace("rad", "deg", 1)
     return Column(label, unit, factor * values, names.regions.get(label, ""))
 
 
@@ -388,7 +390,9 @@ def plot_tables(
         OsimliteError: the folder or a file cannot be written.
         SettingError: no panel has a band, or none is over the gait cycle.
     """
-    paths, titles, is_cyclic = [], list[str](), False
+    paths = []
+    titles = list[str]()
+    is_cyclic = False
     base = make_folder(Path(folder))
     for number, (name, table) in enumerate(tables.items(), 1):
         # A dot in the name of a tool is no ending.

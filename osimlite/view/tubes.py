@@ -132,7 +132,8 @@ def _place_rings(
     ring = _add_ring(rings, ring, vector(corners, 0), growth * thin, 0.0) if start > 0.0 else ring
     before = 0.0
     for k in range(1, corner_count):
-        here, there = vector(corners, 3 * k - 3), vector(corners, 3 * k)
+        here = vector(corners, 3 * k - 3)
+        there = vector(corners, 3 * k)
         segment = norm(minus(there, here))
         after = before + segment
         is_last = k == corner_count - 1
@@ -272,10 +273,8 @@ def build_tube(line: Line, corners: Array) -> tuple[Surface, NDArray[np.bool_]]:
 def _list_triangles(ring_count: int) -> Indices:
     """Return the triangles (t, 3) between neighbouring rings."""
     ring, corner = np.divmod(np.arange((ring_count - 1) * ROUND_CORNERS), ROUND_CORNERS)
-    here, beside = (
-        ring * ROUND_CORNERS + corner,
-        ring * ROUND_CORNERS + (corner + 1) % ROUND_CORNERS,
-    )
+    here = ring * ROUND_CORNERS + corner
+    beside = ring * ROUND_CORNERS + (corner + 1) % ROUND_CORNERS
     triangles: Indices = np.stack(
         (here, beside, here + ROUND_CORNERS, beside, beside + ROUND_CORNERS, here + ROUND_CORNERS),
         axis=1,

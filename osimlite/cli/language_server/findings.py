@@ -118,7 +118,8 @@ def _describe_fix(finding: Finding) -> str:
 
 def _convert_edits(analysis: DocumentAnalysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
     result = []
-    data, is_table = analysis.source.data, analysis.is_table and not analysis.text.content.isascii()
+    data = analysis.source.data
+    is_table = analysis.is_table and not analysis.text.content.isascii()
     byte_offset = characters = 0
     for edit in sorted(edits, key=lambda edit: edit.start):
         start, end = edit.start, edit.end

@@ -183,7 +183,8 @@ class Project:
             raise ModelError(
                 f"the text does not give '{target.path or target.file}' a name; nothing can be renamed"
             )
-        path, edits_by_uri = f"/{name}", {}
+        path = f"/{name}"
+        edits_by_uri = {}
         if defining.document is not None and defining.document.model is not None:
             path, edits = _compute_model_edits(defining, component, name)
         else:
@@ -217,9 +218,11 @@ def _compute_model_edits(
     # Renaming changes the model, so a second one is read from the same text.
     copied = DocumentAnalysis(analysis.text, analysis.file)
     assert copied.document is not None and copied.document.model is not None
-    target, model = copied.objects[component._index], copied.document.model
+    target = copied.objects[component._index]
+    model = copied.document.model
     assert isinstance(target, Component)
-    name_range, uses = copied.find_name_range(component._index), copied.uses
+    name_range = copied.find_name_range(component._index)
+    uses = copied.uses
     rename_component(model, target, name)
     edits = []
     for use, start, end in uses:

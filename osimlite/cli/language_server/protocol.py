@@ -33,7 +33,8 @@ class Protocol(LanguageServerProtocol):
             super().handle_message(message)
             return
         fields = message if isinstance(message, dict) else {}
-        number, method = fields.get("id", getattr(message, "id", None)), fields.get("method")
+        number = fields.get("id", getattr(message, "id", None))
+        method = fields.get("method")
         if fields.get("jsonrpc") == VERSION and isinstance(method, str):
             error: JsonRpcException = JsonRpcInvalidParams(
                 f"the parameters of {method} do not follow the protocol"

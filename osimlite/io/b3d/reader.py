@@ -83,7 +83,8 @@ def read_b3d(path: str | Path) -> B3dSubject:
 
 def _expect_version(data: memoryview, file: str) -> None:
     """Raise an error unless a header has the field numbers of version 4."""
-    versions, has_other_numbers = [], False
+    versions = []
+    has_other_numbers = False
     for message_field in split_message(data):
         if message_field.number == 10:
             # In versions 1 and 2 field 10 holds the names of the trials, and 13 the version.
@@ -97,7 +98,8 @@ def _expect_version(data: memoryview, file: str) -> None:
             and message_field.wire_type == VARINT
             and isinstance(message_field.value, int)
         ):
-            versions, has_other_numbers = [message_field.value], True
+            versions = [message_field.value]
+            has_other_numbers = True
     version = versions[-1] if versions else None
     if version == VERSION and not has_other_numbers:
         return

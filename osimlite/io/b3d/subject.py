@@ -306,7 +306,8 @@ class B3dTrial:
             processing_pass: as of :meth:`find_pass`.
         """
         wrenches = self.read_wrenches(processing_pass)
-        columns, labels = [], list[str]()
+        columns = []
+        labels = list[str]()
         for index, body in enumerate(self.subject.contact_bodies):
             torques, forces = np.split(wrenches[:, index], 2, axis=1)
             # ExternalLoads apply a force at a point: the centre of pressure.
@@ -332,7 +333,8 @@ class B3dTrial:
         """
         arrays = self.read_arrays()
         count = self.header["plate_count"]
-        columns, labels = [], list[str]()
+        columns = []
+        labels = list[str]()
         parts = {"force_v": "plate_forces", "force_p": "plate_points", "torque_": "plate_torques"}
         for plate in range(count):
             for part, name in parts.items():
@@ -491,7 +493,8 @@ class B3dSubject:
     def _field_sizes(self) -> dict[str, int]:
         """Number of numbers that a field has in each frame, by its name."""
         header = self.header
-        dofs, bodies = header["dof_count"], len(header["contact_bodies"])
+        dofs = header["dof_count"]
+        bodies = len(header["contact_bodies"])
         sizes = dict.fromkeys(("positions", "velocities", "accelerations", "moments"), dofs)
         sizes |= dict.fromkeys(("contact_points", "contact_torques", "contact_forces"), 3 * bodies)
         sizes |= {"contact_wrenches": 6 * bodies, "markers": 3 * len(header["marker_names"])}

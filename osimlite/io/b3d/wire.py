@@ -56,11 +56,13 @@ def split_message(data: memoryview) -> Iterator[WireField]:
     Raises:
         DamagedMessageError: the bytes are not a message.
     """
-    position, size = 0, len(data)
+    position = 0
+    size = len(data)
     while position < size:
         tag, position = _read_varint(data, position)
         # A tag has the number of the field and, in three bits, its type.
-        number, wire_type = tag >> 3, tag & 7
+        number = tag >> 3
+        wire_type = tag & 7
         # Field numbers begin at 1.
         if not number:
             raise DamagedMessageError("a field has the number 0")
@@ -171,7 +173,8 @@ def _decode_values(field: WireField, declared: Field) -> list[Any]:
             return [_convert_integer(value, kind)]
         # Packed: several varints in one field.
         if field.wire_type == BYTES and declared.repeated:
-            result, position = [], 0
+            result = []
+            position = 0
             while position < len(value):
                 number, position = _read_varint(value, position)
                 result.append(_convert_integer(number, kind))

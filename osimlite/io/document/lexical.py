@@ -237,7 +237,8 @@ def _parse_words(
     Raises:
         UncleanText: OpenSim cannot read a word at all.
     """
-    values, first = [], None
+    values = []
+    first = None
     for word in words:
         try:
             values.append(parse_word(word))

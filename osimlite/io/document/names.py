@@ -43,7 +43,8 @@ def decode_name(name: str) -> str:
 
 def replace_colons(data: bytes) -> bytes:
     """Replace colons in the names of a UTF-8 text; every character keeps its line and column."""
-    pieces, copied_end = [], 0
+    pieces = []
+    copied_end = 0
     hidden: list[tuple[int, int]] | None = None
     result = [match.span() for match in _COLONS.finditer(data)]
     if b"xmlns" in data:

@@ -328,7 +328,9 @@ class ObjectReader:
         file = element.get("file") if self.read_include is not None else None
         if not file or self.read_include is None:
             return self.read_object(element, cls, name)
-        result, number, note_count = self.read_include(str(file), cls), self.count, len(self.notes)
+        result = self.read_include(str(file), cls)
+        number = self.count
+        note_count = len(self.notes)
         # The reason why the file is not read is added to the note that the reader made.
         if isinstance(result, str):
             empty: Object = self.read_object(element, cls, name)

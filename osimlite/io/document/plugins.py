@@ -310,7 +310,9 @@ class _Declarations:
         Returns:
             Annotation of the attribute, type of the property, default.
         """
-        name, typed, shape = row["name"], str(row.get("type")), row.get("kind", "single")
+        name = row["name"]
+        typed = str(row.get("type"))
+        shape = row.get("kind", "single")
         if shape not in _KINDS:
             raise self.make_error(
                 f"there is no kind '{shape}'{suggest_or_list(str(shape), _KINDS)}",
@@ -341,7 +343,8 @@ class _Declarations:
             )
             annotation = str | Component
         else:
-            min_count, max_count = row.get("min") or 0, row.get("max")
+            min_count = row.get("min") or 0
+            max_count = row.get("max")
             for key, count in (("min", min_count), ("max", 0 if max_count is None else max_count)):
                 if (
                     isinstance(count, bool)

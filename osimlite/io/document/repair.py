@@ -128,7 +128,9 @@ def find_elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
         source: the text.
         offsets: character offsets in ascending order.
     """
-    spans, count, following = source.spans, len(source.spans), 0
+    spans = source.spans
+    count = len(source.spans)
+    following = 0
     around: list[int] = []
     for offset in offsets:
         while following < count and spans[following].start <= offset:

@@ -158,7 +158,8 @@ class Source:
         if number >= len(self.spans):
             # The text ends within the tag of the element.
             return
-        inner, end = number + 1, self.spans[number].end
+        inner = number + 1
+        end = self.spans[number].end
         while inner < len(self._starts) and self._starts[inner] < end:
             yield inner
             # Indices follow the order of start tags, so the next sibling is the first element that

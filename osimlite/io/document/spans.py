@@ -263,7 +263,9 @@ class PlainSpans(Sequence[Span]):
 
     def _find_span(self, number: int) -> Span:
         match = self._match_start_tag(number)
-        start, tag, tag_end = match.start(), match["open"], match.end()
+        start = match.start()
+        tag = match["open"]
+        tag_end = match.end()
         if match["empty"]:
             return Span(tag, start, tag_end, tag_end, tag_end)
         close = self.text.rfind(f"</{tag}") if number == 0 else -1

@@ -49,7 +49,8 @@ class Surface:
         """
         a, b, c = factors
         turned = a * b * c < 0.0
-        triangles, normals = self.triangles[:, ::-1] if turned else self.triangles, self.normals
+        triangles = self.triangles[:, ::-1] if turned else self.triangles
+        normals = self.normals
         if normals is not None:
             # Normals scale by 1/a, 1/b, 1/c. The products differ from these by the factor abc, and
             # also work if a factor is 0.

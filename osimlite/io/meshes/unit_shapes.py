@@ -105,7 +105,8 @@ def _revolve_profile(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     for strip in strips:
         for vectors, columns in ((points, strip[:, :2]), (normals, strip[:, 2:])):
             # Distance from the axis, and height along it.
-            radius, height = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
+            radius = columns[:, :1]
+            height = np.repeat(columns[:, 1:], slices, axis=1)
             vectors.append(
                 np.stack(
                     (radius * np.cos(around), radius * np.sin(around), height), axis=2
@@ -113,10 +114,8 @@ def _revolve_profile(strips: Sequence[Array], slices: int = SLICES) -> Surface:
             )
         row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
         # The last point of a row is followed by the first.
-        start_corners, end_corners = (
-            first_index + row * slices + k,
-            first_index + row * slices + (k + 1) % slices,
-        )
+        start_corners = first_index + row * slices + k
+        end_corners = first_index + row * slices + (k + 1) % slices
         # Points on the axis coincide; leave out the degenerate triangles there.
         is_off_axis = np.abs(strip[:, 0]) > 1e-12
         triangles.append(

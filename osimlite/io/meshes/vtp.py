@@ -121,10 +121,8 @@ class _File:
         self.appended = b""
         mark = content.find(b"<AppendedData")
         if mark >= 0:
-            data_start, data_end = (
-                content.find(b"_", content.find(b">", mark)) + 1,
-                content.rfind(b"</AppendedData"),
-            )
+            data_start = content.find(b"_", content.find(b">", mark)) + 1
+            data_end = content.rfind(b"</AppendedData")
             # The data begin after an underscore.
             if not 0 < data_start <= data_end:
                 raise _Unreadable("the file ends in the middle")
@@ -169,12 +167,12 @@ class _File:
         Returns:
             The polygons, and the normals at the points (n, 3); None if a piece has none.
         """
-        points, corners, normals = (
-            [np.zeros((0, 3))],
-            [np.zeros(0, dtype=np.int64)],
-            [np.zeros((0, 3))],
-        )
-        sizes, count, all_normals = [np.zeros(0, dtype=np.int64)], 0, True
+        points = [np.zeros((0, 3))]
+        corners = [np.zeros(0, dtype=np.int64)]
+        normals = [np.zeros((0, 3))]
+        sizes = [np.zeros(0, dtype=np.int64)]
+        count = 0
+        all_normals = True
         for piece in self.root.iterfind("PolyData/Piece"):
             piece_points = self._read_vectors(piece.find("Points/DataArray"))
             points.append(piece_points)
@@ -330,7 +328,8 @@ class _File:
         _, block_size, last_size, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
         # Check the declared size before decompressing anything; no block may be larger.
         self._count_bytes(weight * (block_size * (blocks - bool(last_size)) + last_size))
-        offset, contents = (3 + blocks) * width, []
+        offset = (3 + blocks) * width
+        contents = []
         for size in sizes:
             contents.append(
                 _DECOMPRESS[self.compressor](

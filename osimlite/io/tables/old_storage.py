@@ -97,7 +97,9 @@ def _split_decimals(fraction: Array, count: int) -> list[NDArray[np.int64]]:
     exact: each product comes with its rounding error (T. J. Dekker, Numer. Math. 18, 1971; 134217729 is
     2^27 + 1, which splits a double into halves).
     """
-    high, low, result = fraction, np.zeros_like(fraction), []
+    high = fraction
+    low = np.zeros_like(fraction)
+    result = []
     for number in range(count):
         product, split = 1e8 * high, 134217729.0 * high
         upper = split - (split - high)
@@ -127,7 +129,8 @@ def _make_digit_tables() -> tuple[Array, Array]:
         Text up to the point by sign and whole part (20000,), and four decimals (10000,), as integers
         of the same bytes.
     """
-    numbers, blank = np.arange(10000)[:, None], ord(" ")
+    numbers = np.arange(10000)[:, None]
+    blank = ord(" ")
     digits = (numbers // (1000, 100, 10, 1) % 10 + ord("0")).astype("u1")
     leading = numbers < (1000, 100, 10)
     text = np.full((2, 10000, 8), blank, "u1")

@@ -66,7 +66,8 @@ class StoTable(Tabular):
         Returns:
             The index, which is ``time`` (s), and the columns by label, each (n,).
         """
-        columns, label_counts = dict[str, Array](), Counter[str]()
+        columns = dict[str, Array]()
+        label_counts = Counter[str]()
         for label, column in zip(self.columns, self.rows.T, strict=True):
             columns[f"{label}.{label_counts[label]}" if label_counts[label] else label] = column
             # A label may occur several times.
@@ -178,7 +179,8 @@ def find_named_file(folder: Path, name: str) -> Path:
         folder: folder of the document.
         name: name of the file in the document.
     """
-    beside_document, in_current_folder = folder / name, Path(name)
+    beside_document = folder / name
+    in_current_folder = Path(name)
     # The folder of the document wins; if the file is in neither place, messages name that folder.
     return (
         beside_document

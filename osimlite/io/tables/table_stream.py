@@ -43,7 +43,8 @@ class TableStream:
         self.close()
 
     def __iter__(self) -> Iterator[tuple[float, list[float]]]:
-        time_column, size = self._time, len(self.columns) + 1
+        time_column = self._time
+        size = len(self.columns) + 1
         vectors = self.kind != "double"
         for number, data in enumerate(self._stream, start=self.line + 1):
             # A broken character belongs to a word that is reported, not to an error of decoding.

@@ -77,14 +77,16 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
     # Suspects are sorted by their excess, so a jump already found makes those with a smaller excess
     # unnecessary.
     for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
-        suspect, values_of = suspects[k], suspects[k].sweep.values
+        suspect = suspects[k]
+        values_of = suspects[k].sweep.values
         least_size = sizes[greatest[suspect.path]] if suspect.path in greatest else MIN_JUMP_M
         is_inside = values_of[0] + SIDE_OFFSET < values[k] < values_of[-1] - SIDE_OFFSET
         if is_inside and sizes[k] > least_size and not suspect.excess < least_size:
             greatest[suspect.path] = k
     names = [*paths.routes]
     for path, k in greatest.items():
-        sweep, name = suspects[k].sweep, names[path]
+        sweep = suspects[k].sweep
+        name = names[path]
         yield PathJump(
             name,
             sizes[k],
@@ -100,7 +102,8 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
     if len(changes) > 2:
         usual[1:-1] = 0.5 * changes[:-2] + 0.5 * changes[2:]
         usual[0], usual[-1] = 2.0 * changes[1] - changes[2], 2.0 * changes[-2] - changes[-3]
-    excess, values = np.abs(changes - usual), sweep.values
+    excess = np.abs(changes - usual)
+    values = sweep.values
     for path, route in enumerate(paths.routes.values()):
         if not isinstance(route, ThroughPoints):
             continue
@@ -118,7 +121,9 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
 def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[float]:
     """Return the value in each interval at which the length changes most beyond the usual change."""
     low, high = np.array([suspect.ends for suspect in suspects]).T
-    start, stop, active = low, high, high - low > SIDE_OFFSET
+    start = low
+    stop = high
+    active = high - low > SIDE_OFFSET
     begin, end = (
         np.array([suspect.sweep.poses[suspect.pose + k] for suspect in suspects]) for k in (0, 1)
     )
@@ -142,15 +147,11 @@ def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[floa
             high_lengths - middle_lengths - smooth
         )
         moves = active & is_before
-        high, high_lengths = (
-            np.where(moves, middle, high),
-            np.where(moves, middle_lengths, high_lengths),
-        )
+        high = np.where(moves, middle, high)
+        high_lengths = np.where(moves, middle_lengths, high_lengths)
         moves = active & ~is_before
-        low, low_lengths = (
-            np.where(moves, middle, low),
-            np.where(moves, middle_lengths, low_lengths),
-        )
+        low = np.where(moves, middle, low)
+        low_lengths = np.where(moves, middle_lengths, low_lengths)
         active = high - low > SIDE_OFFSET
     return np.where(
         [suspect.excess < inf for suspect in suspects], 0.5 * (low + high), low

@@ -172,7 +172,8 @@ def _find_length_extremes(
     looked_at: list[Sweep], default: Array
 ) -> Iterator[tuple[tuple[float, MeasuringPose], tuple[float, MeasuringPose]]]:
     """Yield where each path is shortest and longest: in the default pose, or in the middle of the ranges."""
-    poses, rows = [MeasuringPose()], [default[None]]
+    poses = [MeasuringPose()]
+    rows = [default[None]]
     for sweep in looked_at:
         low, high = sweep.info.range
         # Rounded, so that values at the bounds of the middle part belong to it.

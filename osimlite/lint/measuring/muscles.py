@@ -165,10 +165,8 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
     if not fibers.is_elastic:
         return None
     states = fibers.get_start_states()
-    at_start, at_equilibrium = (
-        fibers.evaluate_law(length, states),
-        fibers.evaluate_law(length, fibers.equilibrate(length, states)),
-    )
+    at_start = fibers.evaluate_law(length, states)
+    at_equilibrium = fibers.evaluate_law(length, fibers.equilibrate(length, states))
     lengths, tensions = (
         (at_start[name], at_equilibrium[name]) for name in ("fiber_length", "tension")
     )

@@ -78,7 +78,8 @@ class Sweep:
             values: values of the coordinate (k,), rad or m.
             indices: indices (k,) of the poses before the values.
         """
-        lower_poses, upper_poses = self.poses[indices], self.poses[indices + 1]
+        lower_poses = self.poses[indices]
+        upper_poses = self.poses[indices + 1]
         fraction = (values - lower_poses[:, self.place]) / (
             upper_poses[:, self.place] - lower_poses[:, self.place]
         )
@@ -100,7 +101,8 @@ def sweep_coordinates(
         start: default pose (n,).
         required_coordinates: indices of coordinates that change the length of a path which is not among these.
     """
-    are_tied, remaining_poses = find_tied_coordinates(paths, start), TIED_POSES
+    are_tied = find_tied_coordinates(paths, start)
+    remaining_poses = TIED_POSES
     result: list[tuple[int, Array, bool]] = []
     for index, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range

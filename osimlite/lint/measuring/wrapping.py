@@ -43,7 +43,8 @@ def compare_wrappings(
     )
     excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.measure_poses(poses)
     for geodesic_index, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
-        route, excess = paths.routes[name], excesses[:, geodesic_index]
+        route = paths.routes[name]
+        excess = excesses[:, geodesic_index]
         around = tuple(
             surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law
         )
@@ -65,7 +66,8 @@ def compare_wrappings(
                 if k <= len(sweep.poses):
                     return sweep.pose(sweep.values[k - 1]), sweep.poses[k - 1]
                 k -= len(sweep.poses)
-            q, indices = start.copy(), [sweep.place for sweep in moving_sweeps]
+            q = start.copy()
+            indices = [sweep.place for sweep in moving_sweeps]
             q[indices] = together[k - 1][indices]
             return MeasuringPose(tuple(sweep.value(q[sweep.place]) for sweep in moving_sweeps)), q
 

@@ -259,7 +259,8 @@ def render_full(
         folds = list(result)
         lines = _split_lines(report, file, max(fold.first.line or 0 for fold in folds))
         blocks += [_format_block(fold, lines, colour, width) for fold in folds]
-    closing, length = format_summary(report, colour), len(format_summary(report))
+    closing = format_summary(report, colour)
+    length = len(format_summary(report))
     for sentence in filter(
         None,
         (
@@ -271,10 +272,8 @@ def render_full(
     ):
         # A sentence that does not fit beside the summary gets its own line.
         fits = length + 1 + len(sentence) <= width
-        closing, length = (
-            f"{closing}{' ' if fits else chr(10)}{sentence}",
-            (length + 1 if fits else 0) + len(sentence),
-        )
+        closing = f"{closing}{' ' if fits else chr(10)}{sentence}"
+        length = (length + 1 if fits else 0) + len(sentence)
     return "\n\n".join([*blocks, closing]) + "\n"
 
 
@@ -361,7 +360,9 @@ def _format_snippet(finding: Finding, line: str, colour: bool, width: int) -> li
             display_line[start + length :],
         ),
     )
-    display_line, start, length = before + marked + after, len(before), max(1, len(marked))
+    display_line = before + marked + after
+    start = len(before)
+    length = max(1, len(marked))
     if len(display_line) > available_width:
         display_line, start, length = _cut_line(display_line, start, length, available_width)
     bar = paint("|", "dim", colour)

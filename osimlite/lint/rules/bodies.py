@@ -174,7 +174,8 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
     # Inside a chain the bodies beyond give inertia.
     if len(links) != 1 or links[0].child_base is not body:
         return False
-    joint, location = links[0].joint, locate_frame(subject, links[0].child)
+    joint = links[0].joint
+    location = locate_frame(subject, links[0].child)
     rotations = [motion for motion in joint.motion_types or () if motion == "rotational"]
     at_center = location is not None and location[1].position == body.mass_center
     return len(rotations) == 3 or bool(rotations and at_center)

@@ -276,7 +276,8 @@ class _FolderListings:
 
     def _list_names(self, root: str, name: str) -> tuple[dict[str, str], str]:
         """Return the names in the folder of a file by their lower case, and the name of the file."""
-        folder, file_name = root or ".", name
+        folder = root or "."
+        file_name = name
         if "/" in name or os.sep in name:
             parent, file_name = os.path.split(name)
             folder = os.path.join(root, parent)

@@ -64,7 +64,8 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
         # abscissae at a step.
         strictly = is_a(function, "SimmSpline") or is_a(function, "GCVSpline")
         for index in range(1, len(function.x)):
-            previous_x, current_x = function.x[index - 1], function.x[index]
+            previous_x = function.x[index - 1]
+            current_x = function.x[index]
             if current_x < previous_x or (strictly and current_x == previous_x):
                 rejected = is_a(function, "GCVSpline")
                 is_disabled = is_unused(subject, function)
@@ -157,7 +158,8 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for function in _find_tabulated(subject):
-        min_count, is_disabled = 1, is_unused(subject, function)
+        min_count = 1
+        is_disabled = is_unused(subject, function)
         severity = WARNING if is_disabled else None
         if is_a(function, "SimmSpline"):
             min_count = 2
@@ -231,11 +233,9 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
         "MultivariatePolynomialFunction"
     )
     for polynomial in polynomials:
-        dimension, order, coefficient_count = (
-            polynomial.dimension,
-            polynomial.order,
-            len(polynomial.coefficients),
-        )
+        dimension = polynomial.dimension
+        order = polynomial.order
+        coefficient_count = len(polynomial.coefficients)
         # The number of monomials of n variables up to order m is (n + m)! / (n! m!). Larger orders
         # would take very long to compute.
         expected_count = (
@@ -256,7 +256,8 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             )
     for owner, coordinate_count, function in _find_linear_functions(subject):
         # One weight per coordinate; the last coefficient is the constant.
-        coefficient_count, expected_count = len(function.coefficients), coordinate_count + 1
+        coefficient_count = len(function.coefficients)
+        expected_count = coordinate_count + 1
         if coefficient_count and coefficient_count != expected_count:
             # Measured: of ten runs with no coordinate, three computed NaN.
             is_broken = coefficient_count < expected_count or not coordinate_count

@@ -64,10 +64,8 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
     ```
     """
     for custom in subject.find_by_class("CustomJoint"):
-        names, declared_names = (
-            list_axis_names(custom),
-            [coordinate.name for coordinate in list_coordinates(custom)],
-        )
+        names = list_axis_names(custom)
+        declared_names = [coordinate.name for coordinate in list_coordinates(custom)]
         if refuses_axes(custom) and all(name in declared_names for name in names):
             # Names that axes use and the joint does not declare belong to other rules.
             unused_names = [f"'{name}'" for name in declared_names if name not in names]

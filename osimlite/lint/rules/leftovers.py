@@ -256,7 +256,8 @@ def report_force_outside_set(subject: Subject, report: FindingCollector) -> None
         if above is not None and subject.model is not None and above is not subject.model.force_set:
             forces_by_owner.setdefault(id(above), []).append(force)
     for forces in forces_by_owner.values():
-        first_force, other_count = forces[0], len(forces) - 1
+        first_force = forces[0]
+        other_count = len(forces) - 1
         others_text = f" and {other_count} more" if other_count else ""
         report(
             f"{describe_object(first_force)}{others_text} {'are' if other_count else 'is'} outside the ForceSet: "
@@ -323,7 +324,8 @@ def _describe_unreadable(source: Source, number: int, kind: str) -> str:
         number: index of the element in the text.
         kind: expected content: "text", "number" or "numbers".
     """
-    span, children = source.spans[number], source.children(number)
+    span = source.spans[number]
+    children = source.children(number)
     texts = [
         text_piece
         for text_piece in _COMMENT.split(source.text[span.tag_end : span.inner_end])

@@ -64,10 +64,8 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
     reported_owners = {item.owner for item in measures.on_surfaces}
     for wrapping in measures.wrappings:
         if abs(wrapping.worst) >= max_error and wrapping.owner not in reported_owners:
-            owner, surfaces = (
-                subject.tree.find(wrapping.owner),
-                join_words([f"'{name}'" for name in wrapping.surfaces]),
-            )
+            owner = subject.tree.find(wrapping.owner)
+            surfaces = join_words([f"'{name}'" for name in wrapping.surfaces])
             # The default pose is mentioned only if it is not the worst pose itself.
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
             default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
@@ -224,7 +222,8 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
                 key=lambda candidate: (candidate.moved >= made_up, candidate.moved, candidate.rate),
             )
     for point in worst.values():
-        owner, end = subject.tree.find(point.owner), point.end
+        owner = subject.tree.find(point.owner)
+        end = point.end
         names = f"'{point.point}' of {describe_object(owner)}"
         if point.moved >= made_up:
             report(

@@ -255,10 +255,8 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     )
     if faulty is not None:
         return f"must say how many of its columns are {faulty} (num_{faulty}=...)"
-    total, count = (
-        sum(int(number) for number in counts_by_kind.values() if number.isdecimal()),
-        len(guess.columns),
-    )
+    total = sum(int(number) for number in counts_by_kind.values() if number.isdecimal())
+    count = len(guess.columns)
     if total != count:
         return f"has {count} columns, and {total} by the counts in its header"
     states = find_variables(tree, "state variable")

@@ -56,7 +56,8 @@ def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
                 muscle,
                 tag="pennation_angle_at_optimal",
             )
-        length, optimal = getattr(muscle, "default_fiber_length", None), muscle.optimal_fiber_length
+        length = getattr(muscle, "default_fiber_length", None)
+        optimal = muscle.optimal_fiber_length
         # 0.1, the default, is what OpenSim prints of every muscle that does not say.
         is_given = "default_fiber_length" in muscle.model_fields_set and length != 0.1
         if is_given and length is not None and optimal > 0 and 0 < length < math.inf:
@@ -122,11 +123,9 @@ def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
     """
     longest = subject.config.value_of(LONGEST)
     for muscle in subject.find_by_class("Muscle"):
-        path, slack, optimal = (
-            muscle.geometry_path,
-            muscle.tendon_slack_length,
-            muscle.optimal_fiber_length,
-        )
+        path = muscle.geometry_path
+        slack = muscle.tendon_slack_length
+        optimal = muscle.optimal_fiber_length
         points = (
             _locate_path_points(subject, path)
             if isinstance(path, GeometryPath) and optimal > 0
@@ -203,7 +202,8 @@ _SHARED_CONSTANTS = (
 
 def _locate_path_points(subject: Subject, path: GeometryPath) -> list[Vector]:
     """Return the positions of the active points of a path in the default pose; empty if one is unknown."""
-    poses, positions = compute_default_poses(subject), []
+    poses = compute_default_poses(subject)
+    positions = []
     for point in path.path_point_set.objects:
         location = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
         if not isinstance(point, PathPoint) or location is None or id(location[0]) not in poses:

@@ -133,7 +133,8 @@ def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]
         yield None, "coordinate_paths is empty"
     for name in sorted({name for name in coordinates if coordinates.count(name) > 1}):
         yield "coordinate_paths", f"coordinate_paths names '{name}' twice"
-    arms, count = path.moment_arm_functions, len(coordinates)
+    arms = path.moment_arm_functions
+    count = len(coordinates)
     if arms and len(arms) != count:
         counts = f"{len(arms)} functions for {format_count(count, 'coordinate')}"
         yield "moment_arm_functions", f"moment_arm_functions has {counts}"

@@ -248,7 +248,8 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
                 tag=naming.spec.tag,
             )
     for tool in setup.find_by_class("InverseKinematicsTool"):
-        folder, name = os.path.normpath(tool.results_directory or "."), tool.output_motion_file
+        folder = os.path.normpath(tool.results_directory or ".")
+        name = tool.output_motion_file
         # Only in inverse kinematics; other tools write into the folder for results.
         if folder != "." and name and not os.path.dirname(name):
             report(

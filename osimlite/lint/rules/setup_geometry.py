@@ -66,15 +66,11 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
         if setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
             continue
         units_entry = table.entries.get("Units")
-        positions, unit = (
-            locate_markers(setup),
-            # With an unknown unit nothing is reported, since all comparisons with NaN are false.
-            METRES_PER_UNIT.get(units_entry.value.text, math.nan) if units_entry else math.nan,
-        )
-        rows, columns = (
-            list(iterate_rows_between(table, scaler.time_range)),
-            dict(list_marker_cells(table)),
-        )
+        positions = locate_markers(setup)
+        # With an unknown unit nothing is reported, since all comparisons with NaN are false.
+        unit = METRES_PER_UNIT.get(units_entry.value.text, math.nan) if units_entry else math.nan
+        rows = list(iterate_rows_between(table, scaler.time_range))
+        columns = dict(list_marker_cells(table))
         for measurement in select_members(scaler.measurement_set, "Measurement") if rows else ():
             pairs = (
                 select_members(measurement.marker_pair_set, "MarkerPair")
@@ -135,7 +131,8 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
     for user, table in find_marker_users(setup):
         if setup.tree is None or not table.is_markers:
             continue
-        positions, columns = locate_markers(setup), dict(list_marker_cells(table))
+        positions = locate_markers(setup)
+        columns = dict(list_marker_cells(table))
         pairs = [
             (name, fellow)
             for name in columns

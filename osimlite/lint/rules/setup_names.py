@@ -104,7 +104,9 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
 
     for use in setup.uses:
         # References that OpenSim does not look up at all are no finding.
-        item, kind, text = use.holder, use.reference, str(use.value).strip()
+        item = use.holder
+        kind = use.reference
+        text = str(use.value).strip()
         if (
             not text
             or text.lower() == "unassigned"
@@ -164,7 +166,9 @@ def _look_up_text(
     Returns:
         What it should name or None, the text as looked up, and the component or None.
     """
-    item, kind, target_kind = use.holder, use.reference, _get_kind(use.reference)
+    item = use.holder
+    kind = use.reference
+    target_kind = _get_kind(use.reference)
     # In older formats controllers name their actuators without a path.
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.

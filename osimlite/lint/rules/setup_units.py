@@ -60,7 +60,8 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
         # A task that is not applied reads no markers.
         if not getattr(user, "apply", True):
             continue
-        positions, columns = locate_markers(setup), dict(list_marker_cells(table))
+        positions = locate_markers(setup)
+        columns = dict(list_marker_cells(table))
         names = [name for name in columns if name in positions]
         sizes = []
         # A few frames tell the size; some markers may be hidden in each.

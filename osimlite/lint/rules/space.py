@@ -195,10 +195,8 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
       </ContactSphere>
     ```
     """
-    min_depth, min_depth_share = (
-        subject.config.value_of(DEPTH),
-        subject.config.value_of(DEPTH_SHARE),
-    )
+    min_depth = subject.config.value_of(DEPTH)
+    min_depth_share = subject.config.value_of(DEPTH_SHARE)
     for force, surfaces in _find_contact_groups(subject):
         for surface, other_surface in combinations(surfaces, 2):
             # The pair is tried in both orders: a force may name the half-space first or second.

@@ -418,7 +418,8 @@ def list_homes(tag: str, owner: type[Object]) -> list[str]:
 
     In a model those of tools are left out, and the other way round.
     """
-    homes, package = set(), owner.__module__.rpartition(".")[0]
+    homes = set()
+    package = owner.__module__.rpartition(".")[0]
     for cls in find_classes_mentioning(tag):
         spec = get_field_specs(cls).get(tag)
         if spec is not None and spec.declared_in.__module__.rpartition(".")[0] == package:

@@ -41,7 +41,8 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
       0.1 0.6
     ```
     """
-    start, header = Position(1, 1), table.header
+    start = Position(1, 1)
+    header = table.header
     if not table.data or table.data.isspace():
         report("the file is empty: OpenSim rejects it", at=start)
     elif isinstance(header, MarkerHeader):

@@ -41,10 +41,8 @@ def report_control_function_count(subject: Subject, report: FindingCollector) ->
     for controller in subject.find_by_class("PrescribedController"):
         if isinstance(controller.ControlFunctions, Unknown):
             continue
-        functions, actuators = (
-            len(controller.ControlFunctions.objects),
-            len(controller.socket_actuators),
-        )
+        functions = len(controller.ControlFunctions.objects)
+        actuators = len(controller.socket_actuators)
         if subject.version is not None and subject.version < 40600:
             # There OpenSim drops a name that no actuator has.
             actuators = sum(
@@ -158,7 +156,8 @@ def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault 
     match = _INPUT.fullmatch(text)
     if match is None or match["path"] is None:
         return _InputFault("; expected the path of a component, a bar and an output")
-    tree, path = subject.tree, match["path"]
+    tree = subject.tree
+    path = match["path"]
     base = tree.path_of(use.owner) or "/"
     component_path = normalize_path(path if path.startswith("/") else f"{base}/{path}")
     component = tree.by_path.get(component_path) if component_path is not None else None

@@ -92,7 +92,9 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
     for path in subject.find_instances(GeometryPath):
         points = path.path_point_set.objects
         count = len(points)
-        owner, is_left, may_leave = subject.tree.parent_of(path), False, False
+        owner = subject.tree.parent_of(path)
+        is_left = False
+        may_leave = False
         for wrap in _list_wraps(path):
             first, last = wrap.range
             surface = subject.target_of(wrap, "wrap_object")
@@ -101,7 +103,8 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
                 f"the range of {describe_object(wrap)} of {describe_object(owner or path)}, "
                 f"{first} {last},"
             )
-            start, end = max(first, 1), last if last > 0 else count
+            start = max(first, 1)
+            end = last if last > 0 else count
             if end > count and start <= end and not (is_left or is_off):
                 consequence = "OpenSim fails when it computes its length"
                 consequence += ", unless an earlier wrap has no points there" if may_leave else ""

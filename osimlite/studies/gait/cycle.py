@@ -147,7 +147,9 @@ def find_cycle(
             raise OsimliteError(
                 f"no cycle of '{name}' is found from there; the best is {previous_size:.2g} off"
             )
-        reduced, residual, size = reduced + step_fraction * move, next_state, trial_size
+        reduced = reduced + step_fraction * move
+        residual = next_state
+        size = trial_size
         step_count += 1
     state_found = step_map.expand(reduced)
     images = step_map(state_found[None])

@@ -284,7 +284,8 @@ class CycleSearch:
             seed: seed of the random numbers.
             progress: callback after each part of the walkers.
         """
-        rng, result = np.random.default_rng(seed), []
+        rng = np.random.default_rng(seed)
+        result = []
         for first_walker in range(0, count, WALKERS_PER_CALL):
             size = min(WALKERS_PER_CALL, count - first_walker)
             result += self._draw_samples(rng, size)

@@ -281,7 +281,8 @@ def choose_start(
         Value (rad or m) and speed by the names of coordinates, and the walk.
     """
     step_map = search.make_step_map(found.fractions, found.cycle.state, TIGHT_ACCURACY)
-    engine, ordered = step_map.engine, sorted(START_PHASES)
+    engine = step_map.engine
+    ordered = sorted(START_PHASES)
     # States are sampled in the order of time, and then sorted by preference.
     states = sample_states_of_step(step_map, found.cycle, ordered)[
         [ordered.index(part) for part in START_PHASES]

@@ -135,7 +135,8 @@ def plant_feet(
     Returns:
         States (W, y).
     """
-    dof_count, state_indices = len(engine.order), np.arange(len(states))
+    dof_count = len(engine.order)
+    state_indices = np.arange(len(states))
     carriers = find_carriers(engine, foot_contacts)
     unplaced = states.copy()
     # The result must not depend on the carriers' previous values, not even by rounding.

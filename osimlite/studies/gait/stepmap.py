@@ -232,7 +232,8 @@ class StepMap:
 
     def _make_step(self, states: Floats, leading_foot: int) -> StepImages:
         """Simulate one step of the trailing foot."""
-        count, trailing_foot = len(states), 1 - leading_foot
+        count = len(states)
+        trailing_foot = 1 - leading_foot
         result = StepImages(
             np.full(states.shape, np.nan),
             np.full(count, np.nan),

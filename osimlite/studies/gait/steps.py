@@ -245,7 +245,8 @@ def follow_events(
     """
     contact_indices = {name: index for index, name in enumerate(contacts)}
     feet = [np.array([contact_indices[contact] for contact in foot]) for foot in footing.feet]
-    walk, foot_of = WalkerSteps(), footing.foot_of
+    walk = WalkerSteps()
+    foot_of = footing.foot_of
     touching_names = [
         {name for name in foot if touching[contact_indices[name]]} for foot in footing.feet
     ]
@@ -284,7 +285,8 @@ def follow_events(
             rear_position = float(contact_positions[feet[last_foot]].max())
         else:
             rear_position = position
-        length, air_time = position - rear_position, time - lift_times[number]
+        length = position - rear_position
+        air_time = time - lift_times[number]
         if first_place is None:
             first_place = position
         if number != last_foot and length >= MIN_STEP_LENGTH_M and air_time >= MIN_AIR_TIME_S:

@@ -342,7 +342,8 @@ class EffortMeasure(Measure):
 
         The mass is F_max / specific tension * density * optimal fiber length.
         """
-        effort_type, walkers = node.text("measure_type"), self.walkers
+        effort_type = node.text("measure_type")
+        walkers = self.walkers
         if effort_type not in EFFORTS:
             raise node.error(
                 f"effort of the type '{effort_type}' is not done here{suggest_or_list(effort_type, EFFORTS)}"

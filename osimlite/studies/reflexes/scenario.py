@@ -404,7 +404,8 @@ class Candidates:
         walkers.advance(ORDER.BEGIN)
         walkers.equilibrate_muscles(walkers.excitations)
         walkers.advance(ORDER.START)
-        rows, active = [], list(range(walkers.count))
+        rows = []
+        active = list(range(walkers.count))
         for first_step in range(0, self._steps, STEPS_PER_CALL):
             rows.append(walkers.advance(min(STEPS_PER_CALL, self._steps - first_step), active))
             # Candidates that have fallen are not simulated any further.

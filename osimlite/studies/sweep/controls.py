@@ -104,9 +104,11 @@ def parse_control(name: str, actuators: Sequence[str], time_or_mode: str) -> Con
     if time_or_mode == SCALE:
         mode = SCALE
     elif number := re.fullmatch(rf"{SWITCH}(\d+)", time_or_mode):
-        mode, time = SWITCH, float(number[1])
+        mode = SWITCH
+        time = float(number[1])
     elif time_or_mode:
-        mode, time = NODE, _parse_time(name, time_or_mode)
+        mode = NODE
+        time = _parse_time(name, time_or_mode)
     return Control(tuple(actuators), mode, time)
 
 

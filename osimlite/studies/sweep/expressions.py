@@ -169,7 +169,8 @@ class ExpressionMeasure:
 
 def _measure_depth(tree: ast.AST) -> int:
     """Return how many levels of expressions nest in each other."""
-    depth, level = 0, [tree]
+    depth = 0
+    level = [tree]
     while level:
         depth += 1
         level = [child for node in level for child in ast.iter_child_nodes(node)]
@@ -185,7 +186,8 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
     Returns:
         Quantity by name and by path. Where several components have a name, it means the first.
     """
-    mechanism, count = engine.mechanism, len(engine.order)
+    mechanism = engine.mechanism
+    count = len(engine.order)
     result: dict[str, Quantity] = {
         "time": lambda engine, moments: np.array([t for t, _ in moments])
     }

@@ -215,7 +215,8 @@ class Gradients:
 
     def _record_motion(self, neighbour: _Neighbour) -> tuple[list[float], Array]:
         """Return times (s,) and states (s, y) at the ends of all integrator steps of a run."""
-        times, states = [0.0], [neighbour.start.tolist()]
+        times = [0.0]
+        states = [neighbour.start.tolist()]
 
         def note(t: float, y: list[float]) -> None:
             times.append(t)

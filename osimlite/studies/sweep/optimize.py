@@ -239,7 +239,8 @@ def _resolve_start(
                 f"the start has one number for each of the {len(plan.variables)} variables, not {len(start)}"
             )
         start = dict(zip((variable.name for variable in plan.variables), start or (), strict=False))
-    result, current_values = [], variants.list_current_values()
+    result = []
+    current_values = variants.list_current_values()
     for index in free_indices:
         variable = plan.variables[index]
         value = start.get(variable.name, current_values[index])

@@ -529,7 +529,8 @@ def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, ColumnRa
                     int(numbers[index_of_most]),
                     float(column.mean()),
                 )
-                earlier_range, earlier_count = result.get(name, batch_range), counts[name]
+                earlier_range = result.get(name, batch_range)
+                earlier_count = counts[name]
                 counts[name] = earlier_count + len(column)
                 range_of_least = min(
                     (earlier_range, batch_range), key=lambda column_range: column_range.least

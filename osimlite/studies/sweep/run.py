@@ -153,7 +153,8 @@ def sweep(
         OsimliteError: the model cannot be simulated, there are results of other settings, or the
             cluster cannot be reached.
     """
-    path, started = Path(output), time.perf_counter()
+    path = Path(output)
+    started = time.perf_counter()
     if path.suffix.lower() in OTHER_TABLE_ENDINGS:
         parquet_name = path.with_suffix(".parquet").name
         raise SettingError(

@@ -339,7 +339,8 @@ class Runner:
         endings: Endings = []
         order, contacts = engine.order, engine.contacts
         count, size = len(order), len(starts)
-        times, states = np.zeros(size), starts.copy()
+        times = np.zeros(size)
+        states = starts.copy()
         reports = np.full((size, len(self._report_times), starts.shape[1]), np.nan)
         events: list[list[tuple[float, str, bool]]] = [[] for _ in range(size)]
         peaks = np.zeros((size, len(contacts), 2))

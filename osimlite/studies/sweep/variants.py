@@ -197,7 +197,8 @@ class Variants:
         if self._plan.equilibrate:
             for row, variant in zip(rows, variants, strict=True):
                 # A new engine is made only if the update fails, then also for its error message.
-                values, result = row.tolist(), None
+                values = row.tolist()
+                result = None
                 if len(variant.numbers):
                     with suppress(SimulationError):
                         result = engine.equilibrate_muscles(0.0, values, variant.numbers)
@@ -313,7 +314,8 @@ class Variants:
                 setter.set_value(float(values[index]))
         self._controls.apply(values)
         for index in self._slopes:
-            angle, gravity = float(values[index]), self._gravity
+            angle = float(values[index])
+            gravity = self._gravity
             # Tilting gravity about z is equivalent to a slope of the floor.
             self.model.gravity = (
                 gravity * math.sin(angle),

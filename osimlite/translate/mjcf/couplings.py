@@ -102,7 +102,8 @@ def _add_follower(
         return
     coordinate = draft.mechanism.coordinates[driver.coordinate]
     leader = draft.leads.get(driver.coordinate) or _add_argument_joint(draft, driver.coordinate)
-    coordinate_line, function = leader.line.inverse(), driver.function
+    coordinate_line = leader.line.inverse()
+    function = driver.function
     lower, upper = select_span(function, coordinate.range, coordinate.default_value)
     first, last = sorted(leader.line.slope * end + leader.line.offset for end in (lower, upper))
     exact = (

@@ -64,7 +64,8 @@ def _fit_piece(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     All numbers are fitted together by least squares, then the side of each surface, repeatedly.
     """
     search = require("scipy.optimize", extra="sim", purpose="fits of tendons").least_squares
-    best, smallest_error = piece, _compute_error(compute_residuals(piece))
+    best = piece
+    smallest_error = _compute_error(compute_residuals(piece))
     for _ in range(MAX_ROUNDS):
         start = best
         variable_count = sum(

@@ -185,7 +185,8 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
     ):
         raise Untranslatable("its lengths or its force are not positive")
     rates = _read_rates(force)
-    vmax, fvmax = rates.vmax / cosine**2, rates.fvmax
+    vmax = rates.vmax / cosine**2
+    fvmax = rates.fvmax
     if not min(vmax, fvmax) > MIN_POSITIVE:
         raise Untranslatable(
             "its greatest velocity, or what it holds while it lengthens, is not positive"
@@ -378,11 +379,9 @@ def _fit_curves(initial: Curves, lengths: Array, tensions: Array, *, free: bool)
         )
         return ((residuals[1:] - residuals[0]) / (x + step - x)[:, None]).T
 
-    start, lower, upper = (
-        [initial.lmin, initial.lmax, initial.end, initial.fpmax],
-        list(LOWER_BOUNDS),
-        list(UPPER_BOUNDS),
-    )
+    start = [initial.lmin, initial.lmax, initial.end, initial.fpmax]
+    lower = list(LOWER_BOUNDS)
+    upper = list(UPPER_BOUNDS)
     if free:
         start = [*start, *[0.0] * 4]
         lower = [*lower, *[-FIT_RANGE] * 4]

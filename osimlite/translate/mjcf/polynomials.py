@@ -83,7 +83,8 @@ def fit_quartic(
     if exact is not None and exact.degree() <= DEGREE:
         return PolynomialFit(tuple(exact.coef.tolist()))
     lower, upper = interval
-    middle, half_width = 0.5 * (upper + lower), 0.5 * (upper - lower)
+    middle = 0.5 * (upper + lower)
+    half_width = 0.5 * (upper - lower)
     # Chebyshev points are dense at the ends, where the error of a fit is largest.
     x = middle + half_width * np.cos(np.linspace(0.0, np.pi, _SAMPLE_COUNT))
     y = sample_function(function, x)
@@ -96,7 +97,8 @@ def fit_quartic(
         result = np.linalg.lstsq(root_weights[:, None] * basis, root_weights * y, rcond=None)[0]
         errors = np.abs(basis @ result - y)
         if errors.max() < smallest_error:
-            best, smallest_error = result, errors.max()
+            best = result
+            smallest_error = errors.max()
         # All weights of an exact fit would vanish.
         if not errors.any():
             break
@@ -150,5 +152,6 @@ def select_span(
         upper = min(upper, max(points))
     # An empty or absurd range says nothing about the motion.
     if not 0.0 < upper - lower <= _MAX_RANGE:
-        lower, upper = start - 1.0, start + 1.0
+        lower = start - 1.0
+        upper = start + 1.0
     return min(lower, start), max(upper, start)

@@ -321,7 +321,8 @@ class Router:
         point = make_site(self.route.points[number])
         node = self.route.points[number]
         lower, upper = node.range
-        range_center, half_width = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        range_center = 0.5 * (lower + upper)
+        half_width = 0.5 * (upper - lower)
         parabola = (
             SPECK_RADIUS_M
             / half_width**2

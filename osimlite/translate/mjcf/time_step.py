@@ -67,7 +67,8 @@ def choose_step(draft: MjcfDraft) -> None:
         detail = f"{step:g} s, for a rate of {rate:.3g} 1/s about the default pose"
         draft.fidelity.add("stiff", "/", description, "the file takes smaller steps", detail)
     for path, path_tendon in draft.tendons.items():
-        muscle, tension = draft.tree.by_path[path], 0.0
+        muscle = draft.tree.by_path[path]
+        tension = 0.0
         if isinstance(muscle, Muscle):
             with suppress(OsimliteError):
                 (tension,) = compute_isometric_tension(
@@ -90,7 +91,8 @@ def _compute_fastest_rate(draft: MjcfDraft) -> float:
     """
     mechanism, (q, u) = draft.mechanism, draft.default_state
     state = mechanism.at(q, u)
-    rows, free_motions = np.zeros((0, len(u))), np.eye(len(u))
+    rows = np.zeros((0, len(u)))
+    free_motions = np.eye(len(u))
     if mechanism.constraints:
         rows, _ = stack_equations(
             [constraint.velocity_equations(state) for constraint in mechanism.constraints]

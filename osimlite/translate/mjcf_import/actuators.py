@@ -292,7 +292,8 @@ def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None
     model = draft.mj
     gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     gear = np.array(model.actuator_gear[draft.get_output_index(actuator)])
-    force, torque = gear[:3], gear[3:]
+    force = gear[:3]
+    torque = gear[3:]
     body = int(model.site_bodyid[site])
     if (
         gain_and_bias is None
@@ -348,10 +349,8 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
     for tendon in range(model.ntendon):
         path = draft.paths[tendon]
         name = draft.source.name_of("tendon", tendon)
-        stiffness, damping = (
-            float(model.tendon_stiffness[tendon]),
-            float(model.tendon_damping[tendon]),
-        )
+        stiffness = float(model.tendon_stiffness[tendon])
+        damping = float(model.tendon_damping[tendon])
         if stiffness or damping:
             # MuJoCo's spring has a dead band between two lengths, and pushes below it.
             shorter_limit, longer_limit = (

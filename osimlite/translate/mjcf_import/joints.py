@@ -119,7 +119,8 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
             child, suffix = frame, ""
         else:
             name = draft.unique("body", f"{frame.name}_{number + 1}")
-            child, suffix = Body(name=name, mass=0.0), f"_{number + 1}"
+            child = Body(name=name, mass=0.0)
+            suffix = f"_{number + 1}"
             draft.model.add(child)
         name = draft.unique("joint", f"{frame.name}_joint{suffix}")
         if group.special >= 0:
@@ -149,7 +150,9 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
             )
         draft.model.add(joint)
         # The following groups begin in the frame of the helper body.
-        parent, position, rotation = child, np.zeros(3), np.eye(3)
+        parent = child
+        position = np.zeros(3)
+        rotation = np.eye(3)
     if len(groups) > 1:
         draft.record(
             "body",
@@ -190,7 +193,8 @@ def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordi
     lower, upper = map(float, model.jnt_range[joint])
     # A range that is not set is 0 to 0.
     if not lower < upper:
-        lower, upper = value - half_range, value + half_range
+        lower = value - half_range
+        upper = value + half_range
     if not lower <= value <= upper:
         # OpenSim moves a default value into the range of a clamped coordinate.
         draft.record(
@@ -219,7 +223,8 @@ def _make_special_joint(
     base = draft.source.name_of("joint", joint)
     suffixes = ("rx", "ry", "rz", "tx", "ty", "tz") if is_free else ("rx", "ry", "rz")
     values = (0.0, 0.0, 0.0, *map(float, position))
-    axes, coordinates = {}, []
+    axes = {}
+    coordinates = []
     for number, suffix in enumerate(suffixes):
         half_range = math.pi if number < 3 else FREE_RANGE_M
         value = values[number]
@@ -308,10 +313,8 @@ def _add_spring(draft: ConversionDraft, joint: int, name: str) -> None:
     address, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
     stiffness, rest_position = float(model.jnt_stiffness[joint]), float(model.qpos_spring[address])
     damping = float(model.dof_damping[dof])
-    spring_coefficients, damper_coefficients = (
-        _polynomial(model, "jnt_stiffnesspoly", joint),
-        _polynomial(model, "dof_dampingpoly", dof),
-    )
+    spring_coefficients = _polynomial(model, "jnt_stiffnesspoly", joint)
+    damper_coefficients = _polynomial(model, "dof_dampingpoly", dof)
     # SpringGeneralizedForce has a linear spring and damper, of positive numbers.
     if any(spring_coefficients) or any(damper_coefficients) or min(stiffness, damping) < 0.0:
         # MuJoCo: force = -x (k + k1 |x| + k2 x^2), and the same for the speed.
@@ -473,7 +476,8 @@ def compute_softness(
         k = 1.0 / max(most * most * first * first * second * second, 1e-15)
         b = 2.0 / max(most * first, 1e-15)
     else:
-        k, b = -first / most**2, -second / most
+        k = -first / most**2
+        b = -second / most
     mass = 1.0 / max(inverse_mass, 1e-9)
     factor = mass * most / (1.0 - most)
     return max(factor * k, 1e-9), max(factor * b, 0.0)

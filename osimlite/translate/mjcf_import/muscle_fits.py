@@ -111,7 +111,8 @@ class Shape(NamedTuple):
                 f"{between(falling_mid, self.lmax)}*0.5*(({_n(self.lmax)}-x)/{_n(self.lmax - falling_mid)})^2",
             )
         )
-        start, end = self.passive_start, self.passive_start + self.passive_width
+        start = self.passive_start
+        end = self.passive_start + self.passive_width
         stretch = f"((x-{_n(start)})/{_n(self.passive_width)})"
         passive = (
             f"{between(start, end)}*{_n(0.5 * self.fpmax)}*{stretch}^2"

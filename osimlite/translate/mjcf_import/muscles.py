@@ -43,7 +43,8 @@ class MuscleData(NamedTuple):
         so that the curves are as exact as before.
         """
         fiber = self.fiber + self.slack - slack
-        ratio, shift = self.fiber / fiber, (self.slack - slack) / fiber
+        ratio = self.fiber / fiber
+        shift = (self.slack - slack) / fiber
         shape = self.shape
         return MuscleData(
             self.force,

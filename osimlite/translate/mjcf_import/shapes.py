@@ -62,7 +62,8 @@ def add_shapes(draft: ConversionDraft) -> None:
             continue
         name = draft.source.name_of("geom", geom)
         body = int(model.geom_bodyid[geom])
-        rotation, position = quaternion_matrix(model.geom_quat[geom]), model.geom_pos[geom]
+        rotation = quaternion_matrix(model.geom_quat[geom])
+        position = model.geom_pos[geom]
         for part in parts:
             frame, _ = draft.frame_at(
                 body,

@@ -77,7 +77,8 @@ def read_tendon(source: MjcfSource, index: int) -> Tendon:
                 segments.append(TendonSegment(last, number, geom, side, divisor))
             last, geom, side = number, -1, -1
         else:
-            geom, side = number, round(value)
+            geom = number
+            side = round(value)
     return Tendon(index, tuple(segments), tuple(joints), has_pulley)
 
 

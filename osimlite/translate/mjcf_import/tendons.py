@@ -498,7 +498,9 @@ def _find_reach(
 
 def _make_linear_path(draft: ConversionDraft, tendon: Tendon) -> TendonPath:
     """Make the path of a fixed tendon, which is a linear function of joint positions."""
-    names, coefficients, shortest = [], [], 0.0
+    names = []
+    coefficients = []
+    shortest = 0.0
     for joint, coefficient in tendon.joints:
         names.append(draft.coordinate_path(joint))
         coefficients.append(coefficient)

@@ -292,7 +292,8 @@ def _find_opensim_path(draft: Draft, name: str) -> str:
     """
 
     def order(element: Element) -> tuple[int, bool, float, int]:
-        number, top = float(draft.numbers[element]), element
+        number = float(draft.numbers[element])
+        top = element
         # OpenSim's order at that point of its upgrade: joints behind bodies, axes before
         # coordinates.
         while (above := top.getparent()) is not None and above is not draft.model:
