@@ -159,7 +159,8 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
         if name not in namespace or (name == "__hash__" and namespace[name] is None):
             setattr(cls, name, method)
     setattr(cls, "__record_fields__", fields)  # noqa: B010 - mypy does not know the attribute
-    setattr(cls, "__dataclass_fields__", _DataclassFields())  # noqa: B010
+    for name in _DATACLASS_ATTRIBUTES:
+        setattr(cls, name, _DataclassAttribute(name, frozen))
     setattr(cls, "__match_args__", tuple(name for name, spec in fields.items() if spec.init))  # noqa: B010
     return cls
 
@@ -254,10 +255,18 @@ def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
     return result
 
 
-class _DataclassFields:
-    """Descriptor of ``__dataclass_fields__``, which creates the fields of dataclasses when needed."""
+_DATACLASS_ATTRIBUTES = ("__dataclass_fields__", "__dataclass_params__")
+"""What `dataclasses`, `pprint` and pytest read from the class of a dataclass."""
 
-    def __get__(self, instance: object, cls: Any) -> dict[str, Any]:
+
+class _DataclassAttribute:
+    """Descriptor of an attribute that dataclasses have, which is created when it is needed."""
+
+    def __init__(self, name: str, frozen: bool) -> None:
+        self.name = name
+        self.frozen = frozen
+
+    def __get__(self, instance: object, cls: Any) -> Any:
         import dataclasses as d
 
         fields = []
@@ -276,12 +285,11 @@ class _DataclassFields:
                 if value is not _NOTHING
             }
             fields.append((name, Any, d.field(**arguments)))
-        result: dict[str, Any] = d.make_dataclass(cls.__name__, fields).__dict__[
-            "__dataclass_fields__"
-        ]
-        # Replace this descriptor by its result, because creating the fields takes long.
-        cls.__dataclass_fields__ = result
-        return result
+        twin = d.make_dataclass(cls.__name__, fields, frozen=self.frozen)
+        # Replace the descriptors by their results, because creating the fields takes long.
+        for name in _DATACLASS_ATTRIBUTES:
+            setattr(cls, name, twin.__dict__[name])
+        return twin.__dict__[self.name]
 
 
 def _format_record(self: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
+import pprint
 from typing import Any
 
 import pytest
@@ -164,3 +165,20 @@ def test_the_first_objects_are_like_later_ones(values, named) -> None:
             assert str(raised.value) == str(error)
         else:
             assert vars(ours(*values, **named)) == expected
+
+
+def test_a_record_can_be_printed_by_pprint():
+    # Only what is longer than the width is looked at as a dataclass.
+    assert pprint.pformat(Place("a"), width=10) == repr(Place("a"))
+
+
+def test_a_dataclass_may_extend_a_record_that_is_frozen_as_it_is():
+    @dataclasses.dataclass(frozen=True)
+    class Longer(Place):
+        length: float = 1.0
+
+    assert [item.name for item in dataclasses.fields(Longer)][-1] == "length"
+    with pytest.raises(TypeError, match="cannot inherit non-frozen"):
+        dataclasses.dataclass(type("Other", (Place,), {}))
+    with pytest.raises(TypeError, match="cannot inherit frozen"):
+        dataclasses.dataclass(frozen=True)(type("Other", (Changing,), {}))
