@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from types import ModuleType
 
 from osimlite.errors import MissingDependency
@@ -99,7 +98,7 @@ def leave_current_folder() -> Iterator[None]:
     # An empty entry means the current folder.
     away = [os.path.abspath(entry) for entry in path if entry not in ("", ".")]
     sys.path[:] = away
-    os.chdir(Path(__file__).parent)
+    os.chdir(os.path.dirname(os.path.abspath(__file__)))
     try:
         yield
     finally:

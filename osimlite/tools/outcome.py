@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from html import escape
 from pathlib import Path
 from typing import Any
 from warnings import warn
@@ -77,6 +76,8 @@ class Outcome:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(message)}</td></tr>"
             for name, message in [*self.messages, *(("file", str(path)) for path in self.files)]
