@@ -18,7 +18,6 @@ from osimlite.fitting.placing import MarkerPlacement, format_pose, place_markers
 from osimlite.fitting.scaling import scale_model
 from osimlite.io.document.cache import read_copy
 from osimlite.io.document.printer import to_text
-from osimlite.io.document.reader import read_any
 from osimlite.io.tables.storage import expect_time_range
 from osimlite.schema.base import Object
 from osimlite.schema.frames import PhysicalFrame
@@ -272,7 +271,7 @@ def add_markers(model: Model, path: Path) -> None:
     Raises:
         DocumentError: the file has no MarkerSet.
     """
-    result = read_any(path)
+    result = read_copy(path, Object)
     if not isinstance(result, MarkerSet):
         raise DocumentError(
             f"the file holds a {type(result).__name__}, not a MarkerSet", file=str(path)

@@ -12,7 +12,9 @@ from osimlite.base.progress import report_stage
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import format_count, join_words
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
+from osimlite.io.document.cache import keep_object
 from osimlite.io.document.reader import pause_collector, read_any
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report, merge_reports
 from osimlite.lint.engine import load_subject
@@ -234,12 +236,12 @@ def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[R
     """
     waiting = deque([setup])
     visited = {os.path.realpath(setup)}
+    loaded: dict[str, CheckTarget] = {}
     while waiting:
         file = waiting.popleft()
-        subject = load_subject(file, find_settings(file).config_for(file, Config()))
-        read_subject.keep(file, subject)
-        yield checked(subject, measure=False)
+        subject = loaded.pop(file, None) or _load_subject(file)
         if not isinstance(subject, Setup):
+            yield checked(subject, measure=False)
             continue
         document_paths: list[str] = []
         for naming in subject.find_named_files("file"):
@@ -254,5 +256,26 @@ def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[R
                 visited.add(real)
                 limit_documents(visited, setup)
                 document_paths.append(path)
+        # Rules about a document read the documents that it names: these are read once, for both. Plug-in
+        # classes are those of the document that was loaded last.
+        for path in document_paths:
+            if not is_table(path) and _find_config(path).classes == subject.config.classes:
+                loaded[path] = _load_subject(path)
+        yield checked(subject, measure=False)
         # Depth first: files that a document names come before those of the next document.
         waiting.extendleft(reversed(document_paths))
+
+
+def _find_config(file: str) -> Config:
+    return find_settings(file).config_for(file, Config())
+
+
+def _load_subject(file: str) -> CheckTarget:
+    """Return the check target of a file, and keep it and its object for later readers."""
+    subject = load_subject(file, _find_config(file))
+    read_subject.keep(file, subject)
+    if not isinstance(subject, Setup) or subject.faults or subject.sure_until is not None:
+        return subject
+    if subject.top is not None:
+        keep_object(file, subject.top, subject.notes)
+    return subject

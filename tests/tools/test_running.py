@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,7 +14,9 @@ import numpy as np
 
 import osimlite
 from osimlite.errors import DeprecatedWarning, OsimliteError
+from osimlite.io.document import cache, survey
 from osimlite.io.tables.storage import read_sto, write_sto
+from osimlite.tools import running
 from osimlite.tools.job import NotRunnable
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.running import FaultySetup
@@ -193,3 +197,39 @@ def test_the_former_name_of_messages_warns() -> None:
     outcome = Outcome(messages=[("thigh", "was scaled")])
     with pytest.warns(DeprecatedWarning, match="use messages"):
         assert outcome.told == [("thigh", "was scaled")]
+
+
+def test_the_check_reads_each_document_once(
+    setup: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    loads = tmp_path / "loads.xml"
+    loads.write_text(
+        '<OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects />'
+        "<datafile>walk.mot</datafile></ExternalLoads></OpenSimDocument>"
+    )
+    setup.write_text(
+        SETUP.replace(
+            "</InverseDynamicsTool>",
+            "<external_loads_file>loads.xml</external_loads_file></InverseDynamicsTool>",
+        )
+    )
+    files: list[str] = []
+
+    for module in (cache, survey):
+        monkeypatch.setattr(
+            module, "read_document", partial(read_counted, files, module.read_document)
+        )
+    reports = list(running._check_documents(str(setup), {}))
+    assert len(reports) == 3
+    assert sorted(files) == ["loads.xml", "setup.xml", "walker.osim"]
+    # What reads the document next gets a copy, which it may change.
+    first, second = (cache.read_object(loads, osimlite.ExternalLoads) for _ in range(2))
+    assert first == second
+    assert first is not second
+    assert sorted(files) == ["loads.xml", "setup.xml", "walker.osim"]
+
+
+def read_counted(files: list[str], read: Any, source: Any, **options: Any) -> Any:
+    """Note the name of a file, and read it."""
+    files.append(Path(source.file).name)
+    return read(source, **options)

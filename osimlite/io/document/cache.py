@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Generic, TypeVar
 
 from osimlite.base.files import get_file_stamp
 from osimlite.base.text import find_nearest
 from osimlite.errors import DocumentError, OsimliteError
+from osimlite.io.document.notes import Note
 from osimlite.io.document.objects import get_layout
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
@@ -100,6 +101,24 @@ def _has_no_include(path: str) -> bool:
     )
 
 
+@cache_by_file(256)
+def _has_known_tags_only(path: str) -> bool:
+    """Return whether a document is known to have no unknown elements; `keep_object` stores that."""
+    return False
+
+
+def keep_object(path: str, top: Object, notes: Iterable[Note]) -> None:
+    """Store the object of a document that was read elsewhere, so that it is not read again.
+
+    Args:
+        path: the file, which is well-formed.
+        top: its object, as `read_document` returns it.
+        notes: what the reader noted.
+    """
+    get_object.keep(path, top)
+    _has_known_tags_only.keep(path, not any(note.kind == "unknown-tag" for note in notes))
+
+
 def read_copy(path: str | Path, expected_class: type[Top]) -> Top:
     """Return the object of a document as a copy that the caller may change.
 
@@ -142,6 +161,9 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
         DocumentError: the file is missing, has an object of another class, or has a misspelt
             property; with line and column.
     """
+    # In a document without unknown elements there is nothing to suggest.
+    if _has_known_tags_only(str(path)):
+        return read_copy(path, cls)
     document = read_document(Source.from_file(path), expected_class=cls)
     for note in document.notes:
         # Many files have properties of old versions; a name similar to a present one is a

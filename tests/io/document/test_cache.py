@@ -121,3 +121,20 @@ def test_what_somebody_else_has_made_is_kept(tmp_path: Path) -> None:
     assert known(str(files[1])) == "something else"
     known.keep(str(tmp_path / "nothing.txt"), "kept")
     assert known(str(tmp_path / "nothing.txt")) is None
+
+
+@pytest.mark.parametrize("tag", ["mass", "masss"])
+def test_a_misspelt_property_of_a_known_document_is_reported(tmp_path: Path, tag: str) -> None:
+    file = tmp_path / "scale.xml"
+    file.write_text(
+        f'<OpenSimDocument Version="40600"><ScaleTool name="s"><{tag}>60</{tag}></ScaleTool></OpenSimDocument>'
+    )
+    document = read_document(Source.from_file(file), expected_class=Object)
+    cache.keep_object(str(file), document.top, document.notes)
+    if tag == "mass":
+        copied = cache.read_object(file, ScaleTool)
+        assert copied == document.top
+        assert copied is not document.top
+    else:
+        with pytest.raises(DocumentError, match="did you mean <mass>"):
+            cache.read_object(file, ScaleTool)
