@@ -21,7 +21,7 @@ from tests.suite import choose
 
 pytestmark = [pytest.mark.oracle, pytest.mark.timeout(900)]
 
-MINUTE = 60.0 if "OSIMLITE_ALL_MODELS" in os.environ else choose(2.5, 12.0)
+MINUTE = 60.0 if "OSIMLITE_ALL_MODELS" in os.environ else choose(4.0, 12.0)
 """How long they walk; OpenSim takes half a minute for a whole one, which is asked with OSIMLITE_ALL_MODELS=1."""
 LONG = {"steady-walker": MINUTE, "human-walker": MINUTE, "furthest-walker": 5.0}
 ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}

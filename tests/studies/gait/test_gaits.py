@@ -100,6 +100,7 @@ def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
     assert to_text(before) == to_text(after)
 
 
+@pytest.mark.full
 def test_the_files_tell_what_was_found_and_how(found):
     gait, folder, _ = found
     summary = json.loads((folder / "summary.json").read_text())
@@ -277,6 +278,12 @@ def test_the_command_writes_a_walker(tmp_path):
         create_app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options]
     )
     assert "largest multiplier" in done.output and done.exit_code in (0, 1)
-    start = json.loads((tmp_path / "summary.json").read_text())["start"]
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["settings"]["seed"] == 0 and {*summary["numbers"]} == {INERTIA, AHEAD}
+    heads, *rows = (tmp_path / "cycles.csv").read_text().splitlines()
+    assert heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and rows
+    largest = [float(row.split(",")[2]) for row in rows]
+    assert summary["largest_multiplier"] == pytest.approx(min(largest), abs=0.05)
+    start = summary["start"]
     numbers = np.array([number for each in start.values() for number in each.values()])
     assert (numbers == [float(f"{number:.4g}") for number in numbers]).all()
