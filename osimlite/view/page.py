@@ -43,7 +43,7 @@ MOMENTS = 25
 
 
 class Story(NamedTuple):
-    """What a page tells of its motion, which it then plays at once."""
+    """Description of a motion and links to other pages; a page with a story plays its motion when it is opened."""
 
     words: str  # what there is to see
     command: str  # that makes more of it, for a terminal

@@ -205,5 +205,5 @@ def explain_source() -> list[str]:
     return sentences
 
 
-PYTHON_COST = "the kernels run as Python, some thousand times slower"
+PYTHON_COST = "the kernels run as Python, about a thousand times slower"
 """Consequence of missing machine code, for messages."""

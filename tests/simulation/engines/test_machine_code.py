@@ -165,7 +165,7 @@ def test_python_takes_over_with_one_warning(sources, caplog):
         assert linking.select_code() is linking.PYTHON_CODE
     (message,) = caplog.messages
     assert (
-        "run as Python, some thousand times slower" in message
+        "run as Python, about a thousand times slower" in message
         and "numba is not installed" in message
     )
 
