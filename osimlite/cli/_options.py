@@ -396,7 +396,11 @@ def parse_quantities(
                 raise SettingError(f"{option}: {suspicion} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The command is wrong and not the model, so this must not be a ModelError.
-            raise OsimliteError(f"{option}: {error.message}{suggest_name(name, states)}") from None
+            message, similar_state = error.message, suggest_name(name, states)
+            if similar_state:
+                # A similar state is a better hint than the list of coordinates.
+                message = message.partition("; it has ")[0] + similar_state
+            raise OsimliteError(f"{option}: {message}") from None
         except ValueError:
             raise SettingError(
                 f"{option}: the state '{name}' takes a number, not '{text}'"

@@ -406,7 +406,9 @@ assert Runner(made).run(np.array([[0.4]])).status == ["done"]
         [sys.executable, "-c", code, walker, engine], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    assert "numba is not installed" in done.stderr and "about a thousand times slower" in done.stderr
+    assert (
+        "numba is not installed" in done.stderr and "about a thousand times slower" in done.stderr
+    )
 
 
 def test_what_only_the_compiled_engine_watches(walker):
