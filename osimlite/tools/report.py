@@ -39,7 +39,8 @@ from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.page import page_data, page_text
-from osimlite.view.panels import COLORS, Panel, draw_pages, has_cycles, make_figure
+from osimlite.view.panel_groups import Panel
+from osimlite.view.panels import COLORS, draw_pages, has_cycles, make_figure
 from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.shown import Shown
 

@@ -27,7 +27,8 @@ from osimlite.tools.evidence import (
 )
 from osimlite.tools.outcome import DYNAMICS_TITLE, Outcome
 from osimlite.view.motion import contact_forces
-from osimlite.view.panels import STYLES, Column, Panel, group_columns, merge_panels
+from osimlite.view.panel_groups import Column, Panel, group_columns, merge_panels
+from osimlite.view.panels import STYLES
 from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
 from osimlite.view.table_plots import SECTIONS, ColumnNames, describe_columns
 

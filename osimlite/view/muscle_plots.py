@@ -14,7 +14,8 @@ from osimlite.base.progress import watch_items
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
-from osimlite.view.panels import COLORS, make_figure, split_sides, style_axes, write_pages
+from osimlite.view.panel_groups import split_sides
+from osimlite.view.panels import COLORS, make_figure, style_axes, write_pages
 from osimlite.view.plots import divide_among_panels
 
 _TITLES = {

@@ -19,15 +19,8 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import ContactForce, ShownMotion, contact_forces, order_columns
-from osimlite.view.panels import (
-    COLORS,
-    STYLES,
-    draw_pages,
-    group_columns,
-    make_figure,
-    name_pages,
-    render_png,
-)
+from osimlite.view.panel_groups import group_columns
+from osimlite.view.panels import COLORS, STYLES, draw_pages, make_figure, name_pages, render_png
 from osimlite.view.table_plots import ColumnNames, describe_columns
 
 Line = TypeVar("Line")

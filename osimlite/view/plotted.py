@@ -12,7 +12,8 @@ from osimlite.base.files import make_folder
 from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.panels import draw_pages, group_columns, name_pages, render_png
+from osimlite.view.panel_groups import group_columns
+from osimlite.view.panels import draw_pages, name_pages, render_png
 from osimlite.view.plots import draw_figures
 from osimlite.view.table_plots import ColumnNames, describe_columns, make_title
 

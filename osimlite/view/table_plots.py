@@ -22,17 +22,15 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath
 from osimlite.view.bands import Band, check_bands
-from osimlite.view.panels import (
+from osimlite.view.panel_groups import (
     FRACTION,
     MULTIPLE,
     Column,
     StepTimes,
-    draw_pages,
     group_columns,
-    has_cycles,
     split_sides,
-    write_pages,
 )
+from osimlite.view.panels import draw_pages, has_cycles, write_pages
 
 FORCE, MOMENT, POWER = "N", "N·m", "W"
 FORCE_OR_MOMENT = "N or N·m"

@@ -11,7 +11,8 @@ from osimlite.errors import DocumentError, SettingError
 from osimlite.io.tables.storage import StoTable
 from osimlite.tools.evidence import Steps
 from osimlite.view.bands import Band, read_bands
-from osimlite.view.panels import Column, draw_pages, group_columns
+from osimlite.view.panel_groups import Column, group_columns
+from osimlite.view.panels import draw_pages
 from osimlite.view.table_plots import ColumnNames, plot_tables
 
 pytest.importorskip("matplotlib")

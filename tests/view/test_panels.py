@@ -10,16 +10,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.tools.evidence import Steps
 from osimlite.view import panels
-from osimlite.view.panels import (
-    LIMIT_COLOR,
-    MAX_PANELS,
-    Column,
-    draw_pages,
-    group_columns,
-    render_png,
-    split_sides,
-    write_pages,
-)
+from osimlite.view.panel_groups import Column, group_columns, split_sides
+from osimlite.view.panels import LIMIT_COLOR, MAX_PANELS, draw_pages, render_png, write_pages
 from osimlite.view.table_plots import ColumnNames, describe_columns, make_title, plot_tables
 from tests.suite import choose
 
