@@ -11,9 +11,8 @@ With an elastic tendon, the fiber velocity v follows from the equilibrium
 (a fl(l) fv(v) + fp(l) + beta v) cos(phi) = ft
 
 where a is the activation, fl, fv, fp, ft are the curves, beta is the damping, and phi the pennation
-angle. The computation is divided into `fibers_at`, `combine_length_curves` and
-`combine_velocity_curve`, between which curves are evaluated, so that machine code can evaluate the
-curves of several muscles together.
+angle. Machine code evaluates the curves of several muscles together, between `fibers_at`,
+`combine_length_curves` and `combine_velocity_curve`.
 """
 
 from __future__ import annotations
@@ -232,8 +231,7 @@ def fibers_at(inputs: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     along_tendon = inputs.length - fiber * cos
     velocity_source = DAMPED if m.damping > 0.0 else INVERSE
-    velocity = 0.0
-    tendon = 0.0
+    velocity = tendon = 0.0
     if m.is_rigid:
         velocity_source = SLACK
         # A rigid tendon is slack where the path is too short for it; SIGNIFICANT allows for
@@ -555,7 +553,6 @@ def millard2012_equilibrium_length(
             step = -fraction * direction
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
-                # Try the opposite direction.
                 step = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0
                 fraction = 0.0
             fiber = max(previous_fiber + step, m.smallest)
