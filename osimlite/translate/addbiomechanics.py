@@ -202,7 +202,9 @@ class SubjectFolder:
         arrays = trial.read_arrays()
         paths: list[Path] = []
 
-        def put(file: str, table: StoTable, source: str, *, has_missing: bool = True) -> None:
+        def write_table(
+            file: str, table: StoTable, source: str, *, has_missing: bool = True
+        ) -> None:
             path = folder / file
             write_sto(path, name, table.times, table.columns, table.rows, has_missing=has_missing)
             paths.append(path)
@@ -238,14 +240,14 @@ class SubjectFolder:
             )
         plates = trial.read_force_plates()
         if plates.columns:
-            put(PLATES_FILE, plates, "plates")
+            write_table(PLATES_FILE, plates, "plates")
         for source, (key, axes) in SENSOR_TABLES.items():
             if source in arrays:
                 labels = _label_columns(self.subject.header, key, axes, arrays[source].shape[1])
-                put(f"{source}.sto", StoTable(name, times, labels, arrays[source]), source)
+                write_table(f"{source}.sto", StoTable(name, times, labels, arrays[source]), source)
         reason_codes = trial.missing_forces
         if reason_codes.any():
-            put(
+            write_table(
                 MISSING_FILE,
                 StoTable(name, times, ("reason",), reason_codes[:, None].astype(float)),
                 "missing_forces",
@@ -261,7 +263,7 @@ class SubjectFolder:
             )
             return paths, facts
         facts["pass"] = trial.passes[index].name
-        put(
+        write_table(
             COORDINATES_FILE,
             self._complete_coordinates(trial, index),
             "coordinates",
@@ -270,14 +272,14 @@ class SubjectFolder:
         # Ground forces come from the selected pass, as the model does.
         forces = trial.read_ground_forces(index)
         if forces.columns:
-            put(FORCES_FILE, forces, "ground_forces", has_missing=False)
+            write_table(FORCES_FILE, forces, "ground_forces", has_missing=False)
             self._note_forces(trial, index, forces, trial_path)
             paths.append(
                 _write_document(folder / LOADS_FILE, _create_loads(self.subject.contact_bodies))
             )
         moments = trial.read_moments(index)
         if moments.rows.any():
-            put(MOMENTS_FILE, moments, "moments")
+            write_table(MOMENTS_FILE, moments, "moments")
         self._note_left_out(trial, index, trial_path)
         if index in self._models and len(times) > 1:
             model = f"../../{self._models[index]}"

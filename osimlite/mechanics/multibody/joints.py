@@ -45,7 +45,11 @@ from osimlite.schema.joints import Joint, MotionType
 def make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
     """Return the motions of a joint type without properties, as its schema declares them.
 
-    Translations come first, then rotations; those of a ball joint are one motion.
+    Args:
+        joint_class: class of the joint, whose motions are about and along the axes of its frames.
+
+    Returns:
+        Translations first, then rotations; those of a ball joint are one motion.
     """
     axes = {"x": X, "y": Y, "z": Z}
     words = [*enumerate((joint_class.moves or "").split())]
