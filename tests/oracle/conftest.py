@@ -50,6 +50,23 @@ def opensims_defaults() -> None:
         opensim.OpenSimObject.registerType(item)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def default_constants_of_smooth_muscles() -> None:
+    """OpenSim keeps the time constants of the first DeGrooteFregly2016Muscle that a process computes: take the defaults."""
+    if not PRISTINE:
+        return
+    model = opensim.Model()
+    muscle = opensim.DeGrooteFregly2016Muscle()
+    muscle.setName("muscle")
+    body = opensim.Body("body", 1.0, opensim.Vec3(0.0), opensim.Inertia(1.0))
+    model.addBody(body)
+    model.addJoint(opensim.SliderJoint("joint", model.getGround(), body))
+    muscle.addNewPathPoint("origin", model.getGround(), opensim.Vec3(0.0))
+    muscle.addNewPathPoint("insertion", body, opensim.Vec3(0.2, 0.0, 0.0))
+    model.addForce(muscle)
+    model.realizeAcceleration(model.initSystem())
+
+
 @pytest.fixture(scope="session")
 def opensim_says() -> Iterator[Callable[[Path], str | None]]:
     """Asks OpenSim about a file: None if it takes it, else what it says."""
