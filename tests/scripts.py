@@ -1,10 +1,10 @@
-"""Scripts in processes of their own that start in a moment: copies of a process that has imported the large libraries.
+"""Scripts in processes of their own that start in a moment: copies of a process that has imported what they need.
 
-OpenSim and CasADi take most of a second to import, and cannot be in one process. A test that needs
-one of them in a process of its own calls `run_script`. As a program, this module is the process
-that is copied:
+OpenSim, CasADi and the commands of osimlite each take most of a second to import, and OpenSim and
+CasADi cannot be in one process. A test that needs one of them in a process of its own calls
+`run_script`. As a program, this module is the process that is copied:
 
-    python -m tests.scripts OUTPUT ERRORS MODULE...    the numbers of the files that scripts write
+    python -m tests.scripts INPUT OUTPUT ERRORS MODULE...    numbers of the files that scripts read and write
 
 A line of JSON asks for a script: its text, its arguments, its folder, its environment. The answers
 are the number of its process, and its exit code.
@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
@@ -33,25 +34,35 @@ from tests.suite import is_full
 ROOT = Path(__file__).resolve().parent.parent
 OPENSIM = ("opensim",)
 CASADI = ("casadi", "osimlite.moco", "osimlite.optimal.program")
+QUIET = ("-W", "ignore")
+"""Options of Python for scripts that import OpenSim or CasADi, whose bindings warn."""
 
 
 def run_script(
     script: str,
     *words: object,
+    program: str = "-c",
+    text: str = "",
     folder: Path | None = None,
+    settings: Mapping[str, str] | None = None,
     timeout: float = 300.0,
     check: bool = True,
     modules: tuple[str, ...] = OPENSIM,
+    options: tuple[str, ...] = QUIET,
 ) -> subprocess.CompletedProcess[str]:
     """Run Python code in a process of its own.
 
     Args:
         script: the code.
         words: its arguments.
+        program: its name, which is the first of `sys.argv`.
+        text: its standard input.
         folder: its working folder; by default the present one.
+        settings: variables of its environment, besides those of this process.
         timeout: time by the clock after which it is killed, s.
         check: whether a script that fails is an error.
         modules: what is imported already when it starts.
+        options: options of Python.
 
     Returns:
         Its exit code, output and errors.
@@ -60,22 +71,35 @@ def run_script(
         TimeoutExpired: it takes longer than `timeout`.
         CalledProcessError: it fails, and `check` is true.
     """
-    arguments, where = [str(word) for word in words], str(folder or Path.cwd())
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(_paths())}
+    arguments = [str(word) for word in words]
+    where = str(folder or Path.cwd())
+    search_path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    environment = {**os.environ, "PYTHONPATH": search_path, **(settings or {})}
     if not hasattr(os, "fork"):
         return subprocess.run(
-            [sys.executable, "-W", "ignore", "-c", script, *arguments],
-            cwd=where, env=environment, capture_output=True, text=True, timeout=timeout, check=check,
-        )  # fmt: skip
-    server, files = _server(modules)
+            [sys.executable, *options, "-c", script, *arguments],
+            input=text,
+            capture_output=True,
+            encoding="utf-8",
+            cwd=where,
+            env=environment,
+            timeout=timeout,
+            check=check,
+        )
+    server, files = _start_server(modules, options)
     for file in files:
         file.seek(0)
         file.truncate()
+    files[0].write(text.encode())
+    files[0].seek(0)
     order: dict[str, object] = {
-        "script": script, "words": arguments, "folder": where, "environment": environment,
+        "script": script,
+        "arguments": [program, *arguments],
+        "folder": where,
+        "environment": environment,
         # The full suite sees what Python and libraries say as they end.
         "ends": is_full(),
-    }  # fmt: skip
+    }
     server.stdin.write(json.dumps(order) + "\n")
     timer = threading.Timer(timeout, _kill, [int(server.stdout.readline())])
     timer.start()
@@ -83,8 +107,7 @@ def run_script(
     timed_out = not timer.is_alive()
     timer.cancel()
     out, err = (
-        os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")
-        for file in files
+        os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode() for file in files[1:]
     )
     if timed_out:
         raise subprocess.TimeoutExpired(script, timeout, out, err)
@@ -100,20 +123,22 @@ def _kill(process: int) -> None:
         os.kill(process, signal.SIGKILL)
 
 
-def _paths() -> list[str]:
-    return [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-
-
 @cache
-def _server(modules: tuple[str, ...]) -> tuple[Any, list[Any]]:
-    """Return the process that is copied, and the files that its copies write."""
-    files = [tempfile.TemporaryFile(buffering=0) for _ in range(2)]  # noqa: SIM115
+def _start_server(modules: tuple[str, ...], options: tuple[str, ...]) -> tuple[Any, list[Any]]:
+    """Start the process that is copied, and return it with the files that its copies read and write."""
+    # These files stay open until this process ends.
+    files = [tempfile.TemporaryFile(buffering=0) for _ in range(3)]  # noqa: SIM115
     numbers = [file.fileno() for file in files]
-    command = [sys.executable, "-W", "ignore", "-m", "tests.scripts", *map(str, numbers), *modules]
     server = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1, pass_fds=numbers,
-        cwd=ROOT, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )  # fmt: skip
+        [sys.executable, *options, "-m", "tests.scripts", *map(str, numbers), *modules],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        bufsize=1,
+        pass_fds=numbers,
+        cwd=ROOT,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )
     atexit.register(_stop, server, files)
     return server, files
 
@@ -126,8 +151,8 @@ def _stop(server: Any, files: list[Any]) -> None:
         file.close()
 
 
-def become_one() -> tuple[str, bool]:
-    """Wait for orders, and return the script in a process that is to run it, and whether its interpreter shall end.
+def copy_for_orders() -> dict[str, Any]:
+    """Copy this process for each order, and return the order in the copy that is to run it.
 
     Raises:
         SystemExit: no more orders come.
@@ -139,31 +164,36 @@ def become_one() -> tuple[str, bool]:
         order: dict[str, Any] = json.loads(line)
         child = os.fork()
         if not child:
-            for number, own in enumerate(map(int, sys.argv[1:3]), 1):
+            for number, own in enumerate(map(int, sys.argv[1:4])):
                 os.dup2(own, number)
-            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            sys.stdin = os.fdopen(0, encoding="utf-8", closefd=False)
             os.environ.clear()
             os.environ.update(order["environment"])
             os.chdir(order["folder"])
-            sys.path[0] = ""
-            sys.argv = ["-c", *order["words"]]
-            return order["script"], order["ends"]
+            sys.path[0] = order["folder"]
+            sys.argv = order["arguments"]
+            return order
         print(child, file=answers, flush=True)
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), file=answers, flush=True)
     raise SystemExit
 
 
-if __name__ == "__main__":
-    # The imports put folders into the paths of programs and libraries, which is of no use here.
-    for name in sys.argv[3:]:
+def main() -> None:
+    """Import the modules, and run a script in each copy of this process."""
+    # Some imports change the paths of programs and libraries; a script has those of its order.
+    for name in sys.argv[4:]:
         import_module(name)
-    text, ends = become_one()
+    order = copy_for_orders()
     code: object = None
     try:
-        exec(compile(text, "<script>", "exec"), {"__name__": "__main__"})
+        exec(compile(order["script"], "<script>", "exec"), {"__name__": "__main__"})
     except SystemExit as ended:
-        if ends:
+        if order["ends"]:
             raise
         code = ended.code
-    if not ends:
+    if not order["ends"]:
         leave(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -16,8 +16,9 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.tools.many import JOURNAL, compute_digest, find_setups, run_many
 from osimlite.tools.running import list_runnable
-from tests.cli.command import ROOT, run
+from tests.cli.command import run
 from tests.fitting.support import free_body
+from tests.scripts import ROOT
 from tests.tools.support import make_trial
 
 
