@@ -396,10 +396,9 @@ def parse_quantities(
                 raise SettingError(f"{option}: {suspicion} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The command is wrong and not the model, so this must not be a ModelError.
-            message, similar_state = error.message, suggest_name(name, states)
-            if similar_state:
-                # A similar state is a better hint than the list of coordinates.
-                message = message.partition("; it has ")[0] + similar_state
+            message = error.message
+            if name not in mechanism.coordinate_names and (similar := suggest_name(name, states)):
+                message = f"'{mechanism.name}' has no coordinate or state '{name}'{similar}"
             raise OsimliteError(f"{option}: {message}") from None
         except ValueError:
             raise SettingError(

@@ -221,7 +221,7 @@ def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
     assert read_sto(tmp_path / "spent" / "states.sto")[spent][0] == 0.5
     for name, value, told in (
         (spent, "much", f"the state '{spent}' takes a number, not 'much'"),
-        (spent[:-1], "1", f"has no coordinate '{spent[:-1]}'; did you mean '{spent}'?"),
+        (spent[:-1], "1", f"has no coordinate or state '{spent[:-1]}'; did you mean '{spent}'?"),
     ):
         done = run(*words, "--set", f"{name}={value}", folder=tmp_path)
         assert done.code == 2 and told in done.err
