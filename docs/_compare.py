@@ -139,8 +139,16 @@ def draw_screenshot(clone: Path, folder: Path) -> Any:
     """The same moment as a picture without a browser."""
     make_jump(clone, folder)
     run_command(
-        clone, folder, "view", "jumper.osim", "jump/states.sto", "--at", "0.25", "--screenshot", "picture.png",
-    )  # fmt: skip
+        clone,
+        folder,
+        "view",
+        "jumper.osim",
+        "jump/states.sto",
+        "--at",
+        "0.25",
+        "--screenshot",
+        "picture.png",
+    )
     return open_image(folder / "picture.png")
 
 

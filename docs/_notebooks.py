@@ -79,16 +79,16 @@ def read(path: Path) -> Any:
 
 
 def execute_once(path: Path) -> Any:
-    """A notebook with its outputs from the cache, or executed."""
+    """Return a notebook with its outputs, which are cached."""
     folder = user_cache_folder()
     if folder is None:
-        return executed(path)
+        return execute(path)
     cached = folder / f"notebook-{compute_key(path)}.ipynb"
     if cached.exists():
         # Entries that were used are kept longest.
         cached.touch()
         return read(cached)
-    notebook = executed(path)
+    notebook = execute(path)
     write_cached(cached, nbformat.writes(notebook))
     return notebook
 
@@ -117,8 +117,8 @@ def list_sources() -> str:
     return "\n".join([sys.version, *versions, *digests])
 
 
-def executed(path: Path) -> Any:
-    """A notebook with its outputs, run in a folder of its own; without them if there is no model that it needs."""
+def execute(path: Path) -> Any:
+    """Return a notebook with its outputs, run in a folder of its own; without them if a model that it needs is missing."""
     notebook = read(path)
     needed = notebook.metadata.get("needs", [])
     found = [folder / name for name in needed for folder in MODELS if (folder / name).exists()]

@@ -44,7 +44,7 @@ def test_it_runs(name: str) -> None:
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in kept.cells), (
         "strip its outputs"
     )
-    notebook = notebooks.executed(path)
+    notebook = notebooks.execute(path)
     if not any(cell.get("outputs") for cell in notebook.cells):
         pytest.skip(
             f"needs {notebook.metadata['needs']}, beside the notebook or in the shared folder"
@@ -74,7 +74,7 @@ def test_an_executed_notebook_is_cached_until_something_changes(
         return str(notebooks.execute_once(path).cells[0].outputs[0].text)
 
     path = tmp_path / "a.ipynb"
-    monkeypatch.setattr(notebooks, "executed", execute)
+    monkeypatch.setattr(notebooks, "execute", execute)
     monkeypatch.setattr(notebooks, "user_cache_folder", lambda: tmp_path / "cache")
     write("1")
     assert [read_output(), read_output()] == ["run 1", "run 1"]

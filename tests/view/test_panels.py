@@ -99,8 +99,12 @@ def test_a_group_begins_a_row_if_it_fits_there_only():
     rows = [sorted({*tops}, reverse=True).index(top) for top in tops]
     # The knee fills the gap beside the pelvis.
     assert [axes.get_title(loc="left")[:4] for axes in figure.axes] == [
-        "pelv", "knee", "hip0", "hip1", "hip2"
-    ]  # fmt: skip
+        "pelv",
+        "knee",
+        "hip0",
+        "hip1",
+        "hip2",
+    ]
     assert rows == [0, 0, 1, 1, 1]
 
 
