@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-_before_output: Callable[[], None] | None = None
+_output_hook: Callable[[], None] | None = None
 """Function that makes room for output."""
 
 
-def before_output(function: Callable[[], None] | None) -> None:
-    """Let a function run before anything is printed; None for nothing."""
-    global _before_output
-    _before_output = function
+def set_output_hook(function: Callable[[], None] | None) -> None:
+    """Set the function that is called before anything is printed; None for none."""
+    global _output_hook
+    _output_hook = function
 
 
 class EscapingStream:
@@ -43,8 +43,8 @@ class EscapingStream:
 
     def write(self, text: str) -> int:
         """Write text, and return the number of its characters."""
-        if _before_output is not None:
-            _before_output()
+        if _output_hook is not None:
+            _output_hook()
         self.stream.write(escape_control_sequences(text, starts_line=self._starts_line))
         last = text[text.rfind("\n") + 1 :]
         # Commands of CI systems such as `::error::` count at the start of a line only, after blanks
@@ -184,8 +184,8 @@ def print_diff(old_text: str, new_text: str, old_name: str, new_name: str) -> No
 
 def print_for_programs(text: str) -> None:
     """Write text for other programs to standard output, unescaped and in UTF-8."""
-    if _before_output is not None:
-        _before_output()
+    if _output_hook is not None:
+        _output_hook()
     # Text before this line is still in the buffer of the text stream, above the bytes written
     # below.
     sys.stdout.flush()

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from osimlite.base.text import escape_unprintable
-from osimlite.cli._console import before_output, complain, count_columns, get_raw_stream
+from osimlite.cli._console import complain, count_columns, get_raw_stream, set_output_hook
 
 SILENT_S = 0.5
 """Time without any output after which the line appears, s."""
@@ -177,7 +177,7 @@ class _Line:
     def start(self) -> None:
         """Redraw the line in the background, while the program computes."""
         if self._thread is None and self.is_terminal():
-            before_output(self.make_room)
+            set_output_hook(self.make_room)
             if hasattr(os, "register_at_fork"):
                 # A child has the line of its parent, but not the thread.
                 os.register_at_fork(after_in_child=self.abandon)
@@ -190,7 +190,7 @@ class _Line:
         self.tasks, self._shown = [], 0
         # The lock of the parent may be held by a thread that the child does not have.
         self._lock = threading.RLock()
-        before_output(None)
+        set_output_hook(None)
 
     def _redraw(self) -> None:
         while True:

@@ -75,18 +75,23 @@ Cluster = Annotated[
 
 
 SIMULATION_PARAMETERS = (
-    *(
-        "to",
-        "engine",
-        "stop_below",
-        "stop_above",
-        "planted",
-        "foot",
-        "report_interval",
-        "parameter",
-    ),
-    *("controls", "controller", "par", "interpolation", "accuracy", "integrator", "equilibrate"),
-    *("wrapping", "skip_unsupported"),
+    "to",
+    "engine",
+    "stop_below",
+    "stop_above",
+    "planted",
+    "foot",
+    "report_interval",
+    "parameter",
+    "controls",
+    "controller",
+    "par",
+    "interpolation",
+    "accuracy",
+    "integrator",
+    "equilibrate",
+    "wrapping",
+    "skip_unsupported",
 )
 """Parameters of the simulations, which the help lists as a group."""
 

@@ -119,7 +119,7 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
     while isinstance(frame, PhysicalOffsetFrame) and depth < 100:
         pose = make_offset(frame.orientation, frame.translation).compose(pose)
         frame = subject.target_of(frame, "socket_parent")
-        depth = depth + 1
+        depth += 1
     return (frame, pose) if isinstance(frame, (Body, Ground)) else None
 
 

@@ -384,7 +384,7 @@ class RecordedMotion(Movement):
         for row, q in zip(rows, poses, strict=True):
             state = mechanism.at(q)
             angles = np.degrees(angles_xyz(state.rotations[:-1]))
-            centres = MassCentres.of(state).positions()
+            centres = MassCentres.compute(state).positions()
             row[:-3] = np.concatenate([centres, angles], axis=1).ravel()
             # A massless model has its mass centre at the origin, instead of NaN.
             row[-3:] = mechanism.inertial[0] @ centres / (mechanism.total_mass or 1.0)

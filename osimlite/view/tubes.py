@@ -138,13 +138,13 @@ def _place_rings(
         after = before + segment
         is_last = k == corner_count - 1
         while step <= last_step:
-            place = start + (stop - start) * min(max(step - 1, 0), FIBER_STEPS) / FIBER_STEPS
+            distance = start + (stop - start) * min(max(step - 1, 0), FIBER_STEPS) / FIBER_STEPS
             # Rounding may put the last ring behind the last corner.
-            if place > after and not is_last:
+            if distance > after and not is_last:
                 break
-            fraction = min((place - before) / segment, 1.0) if segment > 0.0 else 0.0
+            fraction = min((distance - before) / segment, 1.0) if segment > 0.0 else 0.0
             is_fiber = 0 < step < FIBER_STEPS + 2
-            radius = measure_radius(place, start, stop, thin, thick) if is_fiber else thin
+            radius = measure_radius(distance, start, stop, thin, thick) if is_fiber else thin
             center = add_scaled(here, fraction, minus(there, here))
             ring = _add_ring(rings, ring, center, growth * radius, 1.0 if is_fiber else 0.0)
             step += 1
@@ -157,17 +157,17 @@ def _place_rings(
     return ring
 
 
-def measure_radius(place: float, start: float, stop: float, thin: float, thick: float) -> float:
+def measure_radius(distance: float, start: float, stop: float, thin: float, thick: float) -> float:
     """Return the radius of fibers at a distance along the path, m.
 
     Args:
-        place: distance from the first corner of the path, m.
+        distance: distance from the first corner of the path, m.
         start: distance at which the fibers begin, m.
         stop: distance at which they end, m.
         thin: radius of the tendons, m.
         thick: radius of the fibers in their middle, m.
     """
-    bulge = max(0.0, sin(pi * (place - start) / (stop - start))) if stop > start else 1.0
+    bulge = max(0.0, sin(pi * (distance - start) / (stop - start))) if stop > start else 1.0
     return max(thin, thin + (thick - thin) * bulge**BULGE)
 
 
@@ -251,8 +251,10 @@ def build_tube(line: Line, corners: Array) -> tuple[Surface, NDArray[np.bool_]]:
     """
     # Lists: kernels in Python read single numbers, which arrays give slowly.
     numbers: Any = [0.0] * ((len(corners) + MORE_RINGS) * RING.SIZE)
-    places: Any = corners.ravel().tolist()
-    ring_count = lay_tube(places, len(corners), line.radius, line.fibers, line.tendon, 1.0, numbers)
+    coordinates: Any = corners.ravel().tolist()
+    ring_count = lay_tube(
+        coordinates, len(corners), line.radius, line.fibers, line.tendon, 1.0, numbers
+    )
     rings = np.array(numbers).reshape(-1, RING.SIZE)[:ring_count]
     center, along, across = (
         rings[:, offset : offset + 3] for offset in (RING.CENTER, RING.ALONG, RING.ACROSS)

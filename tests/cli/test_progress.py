@@ -40,9 +40,9 @@ def clock(monkeypatch):
     line = _progress._Line()
     monkeypatch.setattr(_progress, "_line", line)
     monkeypatch.setattr(_progress, "_stack", _progress.ExitStack())
-    monkeypatch.setattr(line, "start", lambda: _console.before_output(line.make_room))
+    monkeypatch.setattr(line, "start", lambda: _console.set_output_hook(line.make_room))
     yield clock
-    _console.before_output(None)
+    _console.set_output_hook(None)
 
 
 def shown(stream: io.StringIO) -> str:

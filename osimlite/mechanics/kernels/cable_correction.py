@@ -131,7 +131,7 @@ def correct_geodesics(
             # Penalize changes of the length in proportion to the kinks, as Scholz et al. do.
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
-            number = number + 1
+            number += 1
             previous_obstacle = k
     # The threshold of independence is Simbody's.
     rank = factorise_equations(equations, size, a, SIGNIFICANT * equations)

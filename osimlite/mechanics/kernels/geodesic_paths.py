@@ -266,7 +266,7 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
         # surfaces intersect, no smooth path may exist, and one surface alone must do.
         if combination == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
             combination = 0
-            stage = stage + 1
+            stage += 1
     return best_count
 
 

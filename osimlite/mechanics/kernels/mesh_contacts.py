@@ -92,7 +92,7 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
             push, turn, stored_energy = spring_load(constants, middle, end, about, v, turning)
             force = plus(force, push)
             torque = plus(torque, turn)
-            energy = energy + stored_energy
+            energy += stored_energy
     apply_mesh_load(model, data, item, about, force, torque, energy)
     return OUTCOME.OK
 

@@ -302,7 +302,7 @@ def tangent_point(
             step = times(size, step)
             d_step = size * d_step
             r = plus(r, step)
-            d = d + d_step
+            d += d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
             previous_error = error
             error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
@@ -315,12 +315,12 @@ def tangent_point(
                 break
             longer *= 2.0
             r = add_scaled(r, longer, step)
-            d = d + longer * d_step
+            d += longer * d_step
             e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
             previous_error = error
             error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
         r = add_scaled(r, -longer, step)
-        d = d - longer * d_step
+        d -= longer * d_step
         e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
         previous_error = error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     return r

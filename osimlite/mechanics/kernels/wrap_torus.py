@@ -240,7 +240,7 @@ def minimize_residual(
                 radius, damping = 2.0 * size, 0.5 * damping
             accepted = ratio >= WORTHWHILE
             if accepted:
-                u = u + step
+                u += step
                 value = next_value
                 has_moved = True
             small = abs(actual) <= TOLERANCE and predicted <= TOLERANCE and ratio <= 2.0

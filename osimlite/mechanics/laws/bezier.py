@@ -440,7 +440,7 @@ def find_section_of_sum(
             break
         k = following
         start = knot
-        number = number + 1
+        number += 1
     return k, total - start, (total - start) / (end - start)
 
 

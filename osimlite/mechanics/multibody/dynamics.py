@@ -59,7 +59,7 @@ class MassCentres:
     arms: Array  # from the body origins to the mass centres (b, 3), m
 
     @classmethod
-    def of(cls, state: MechanismKinematics) -> MassCentres:
+    def compute(cls, state: MechanismKinematics) -> MassCentres:
         """Return the mass centres of a state."""
         masses, centres, _ = state.mechanism.inertial
         return cls(state, masses, (state.rotations[:-1] @ centres[:, :, None])[:, :, 0])

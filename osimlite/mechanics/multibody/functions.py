@@ -104,7 +104,7 @@ class Multivariate(SmoothFunction):
         table = make_floats([*arguments, *self.table])
         gradient = make_floats([0.0] * size)
 
-        def at_rates(*moving: int) -> tuple[float, float]:
+        def evaluate_at_rates(*moving: int) -> tuple[float, float]:
             """Return the value, and its second derivative while some arguments change by 1.
 
             Returns:
@@ -114,13 +114,13 @@ class Multivariate(SmoothFunction):
             value, _, curvature = evaluate_monomials(size, indices, table, values, rates, gradient)
             return value, curvature
 
-        value = at_rates()[0]
+        value = evaluate_at_rates()[0]
         hessian = make_zero_derivatives(size)[2]
         for k in indices:
-            hessian[k][k] = at_rates(k)[1]
+            hessian[k][k] = evaluate_at_rates(k)[1]
         for row, column in combinations(indices, 2):
             # The mixed entry is half of what both rates give together beyond each alone.
-            mixed = at_rates(row, column)[1] - hessian[row][row] - hessian[column][column]
+            mixed = evaluate_at_rates(row, column)[1] - hessian[row][row] - hessian[column][column]
             hessian[row][column] = hessian[column][row] = 0.5 * mixed
         return value, list(gradient), hessian
 

@@ -91,7 +91,7 @@ class MechanismKinematics:
 
     def equations(self, constraint: ConstraintEquations) -> Equations:
         """Return the equations of a constraint, which need not be one of the mechanism."""
-        program = self.program.with_constraint(constraint)
+        program = self.program.find_program(constraint)
         if program is self.program:
             errors, rows, rates, drifts = self.all_equations
             first, end, end_position = program.equations_of(constraint)

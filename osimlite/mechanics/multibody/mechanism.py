@@ -415,7 +415,7 @@ class Mechanism(MechanismStructure):
 
     def center_of_mass(self, q: Values) -> Array:
         """Return the mass centre in ground (3,), m."""
-        return self._average_by_mass(MassCentres.of(self.at(q)).positions())
+        return self._average_by_mass(MassCentres.compute(self.at(q)).positions())
 
     def center_of_mass_velocity(self, q: Values, u: Values) -> Array:
         """Return the velocity of the mass centre in ground (3,), m/s.
@@ -424,7 +424,7 @@ class Mechanism(MechanismStructure):
             q: coordinate values.
             u: generalized speeds.
         """
-        return self._average_by_mass(MassCentres.of(self.at(q, u)).velocities())
+        return self._average_by_mass(MassCentres.compute(self.at(q, u)).velocities())
 
     def kinetic_energy(self, q: Values, u: Values) -> float:
         """Return the kinetic energy of all bodies (J).
@@ -433,7 +433,7 @@ class Mechanism(MechanismStructure):
             q: coordinate values.
             u: generalized speeds.
         """
-        return MassCentres.of(self.at(q, u)).kinetic_energy()
+        return MassCentres.compute(self.at(q, u)).kinetic_energy()
 
     def potential_energy(self, q: Values) -> float:
         """Return the potential energy of gravity (J).
@@ -453,7 +453,7 @@ class Mechanism(MechanismStructure):
             Linear momentum (3,) in kg m/s, and angular momentum (3,) about the origin of ground in
             kg m²/s.
         """
-        return MassCentres.of(self.at(q, u)).momentum()
+        return MassCentres.compute(self.at(q, u)).momentum()
 
     # --------------------------------------------------------------------------------------------- helpers
     @cached_property

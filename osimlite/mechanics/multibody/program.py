@@ -74,7 +74,7 @@ class PackedMechanism:
         self._kept = [*constraints]
         self._others: dict[int, PackedMechanism] = {}
 
-    def with_constraint(self, constraint: ConstraintEquations) -> PackedMechanism:
+    def find_program(self, constraint: ConstraintEquations) -> PackedMechanism:
         """Return the program if it contains a constraint, else one with this constraint only."""
         if id(constraint) in self.constraints:
             return self
@@ -136,7 +136,7 @@ class PackedMechanism:
             while ancestor >= 0:
                 entries.append((self.order[freedom], self.order[ancestor], offset))
                 ancestor = s[s[MODEL.DOF_AT] + DOF.SIZE * ancestor + DOF.ABOVE]
-                offset = offset + 1
+                offset += 1
         return np.array(entries, dtype=int).reshape(-1, 3).T
 
     def mass_matrix(self, data: Floats) -> Array:

@@ -367,13 +367,13 @@ def _find_minimum(function: Callable[[float], float], start: float) -> float:
     if function(right) < function(middle):
         while right < start + limit and function(right) < function(middle):
             middle = right
-            right = right + step
+            right += step
         left = middle - step
     else:
         left = middle - step
         while left > start - limit and function(left) <= function(middle):
             middle = left
-            left = left - step
+            left -= step
         right = middle + step
     while right - left > 1e-9:
         first = right - _GOLDEN * (right - left)

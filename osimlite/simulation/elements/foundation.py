@@ -232,7 +232,7 @@ class Springs:
             )
             force = plus(force, push)
             torque = plus(torque, turn)
-            energy = energy + stored
+            energy += stored
         return force, torque, energy
 
 

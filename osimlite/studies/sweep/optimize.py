@@ -425,7 +425,7 @@ class _Evaluations:
                 :func:`osimlite.studies.sweep.registry.make_gradients`.
         """
 
-        def at(point: Floats) -> Floats:
+        def compute_gradient(point: Floats) -> Floats:
             (values,) = self._compute_values(point[None])
             stretched = [
                 self.plan.variables[index].differentiate(values[index]) for index in self.free
@@ -433,7 +433,7 @@ class _Evaluations:
             slopes: Floats = gradients.evaluate(values.tolist(), self.free)
             return self.sign * slopes * stretched
 
-        return at
+        return compute_gradient
 
     def _compute_values(self, points: Floats) -> Floats:
         """Return the values of all variables (k, v) at points (k, d) of the cube of the free ones."""

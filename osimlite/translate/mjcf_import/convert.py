@@ -196,7 +196,7 @@ def from_mjcf(
         draft.source.path.stem if name is None else name,
         draft.model,
         draft.fidelity,
-        CoordinateMap.of(draft.mj, draft.coordinates, draft.rotors),
+        CoordinateMap.build(draft.mj, draft.coordinates, draft.rotors),
         draft.files,
     )
 

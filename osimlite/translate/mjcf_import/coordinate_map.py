@@ -36,7 +36,7 @@ class CoordinateMap:
     rotors: dict[str, str]
 
     @classmethod
-    def of(
+    def build(
         cls, model: Any, coordinates: Sequence[tuple[str, ...]], rotors: dict[str, str]
     ) -> CoordinateMap:
         """Return the map of a compiled model.
@@ -87,7 +87,7 @@ class CoordinateMap:
         return [name for joint in self.joints for name in joint.names]
 
 
-def as_rows(map_: CoordinateMap, poses: Array) -> Array:
+def tabulate_values(map_: CoordinateMap, poses: Array) -> Array:
     """Return the values (P, n) of the coordinates of a map in poses (P, nq), rotors left out."""
     names = map_.names()
     rows = [map_.values(pose) for pose in poses]

@@ -22,7 +22,7 @@ def add_keyframes(draft: ConversionDraft) -> None:
         )
     if not names:
         return
-    coordinates = CoordinateMap.of(model, draft.coordinates, draft.rotors)
+    coordinates = CoordinateMap.build(model, draft.coordinates, draft.rotors)
     rows = [coordinates.values(np.array(model.key_qpos[key])) for key in range(model.nkey)]
     labels = coordinates.names()
     file = f"{draft.source.path.stem}_keyframes.mot"

@@ -100,27 +100,27 @@ class Shape(NamedTuple):
         y = self.fvmax - 1.0
 
         # `step` of OpenSim's expressions switches between the pieces.
-        def between(first: float, last: float) -> str:
+        def write_step(first: float, last: float) -> str:
             return f"step(x-{_n(first)})*(1-step(x-{_n(last)}))"
 
         active = "+".join(
             (
-                f"{between(self.lmin, rising_mid)}*0.5*((x-{_n(self.lmin)})/{_n(rising_mid - self.lmin)})^2",
-                f"{between(rising_mid, 1.0)}*(1-0.5*((1-x)/{_n(1.0 - rising_mid)})^2)",
-                f"{between(1.0, falling_mid)}*(1-0.5*((x-1)/{_n(falling_mid - 1.0)})^2)",
-                f"{between(falling_mid, self.lmax)}*0.5*(({_n(self.lmax)}-x)/{_n(self.lmax - falling_mid)})^2",
+                f"{write_step(self.lmin, rising_mid)}*0.5*((x-{_n(self.lmin)})/{_n(rising_mid - self.lmin)})^2",
+                f"{write_step(rising_mid, 1.0)}*(1-0.5*((1-x)/{_n(1.0 - rising_mid)})^2)",
+                f"{write_step(1.0, falling_mid)}*(1-0.5*((x-1)/{_n(falling_mid - 1.0)})^2)",
+                f"{write_step(falling_mid, self.lmax)}*0.5*(({_n(self.lmax)}-x)/{_n(self.lmax - falling_mid)})^2",
             )
         )
         start = self.passive_start
         end = self.passive_start + self.passive_width
         stretch = f"((x-{_n(start)})/{_n(self.passive_width)})"
         passive = (
-            f"{between(start, end)}*{_n(0.5 * self.fpmax)}*{stretch}^2"
+            f"{write_step(start, end)}*{_n(0.5 * self.fpmax)}*{stretch}^2"
             f"+step(x-{_n(end)})*{_n(self.fpmax)}*({stretch}-0.5)"
         )
-        velocity = f"{between(-1.0, 0.0)}*(x+1)^2"
+        velocity = f"{write_step(-1.0, 0.0)}*(x+1)^2"
         if y > 0.0:
-            velocity += f"+{between(0.0, y)}*({_n(self.fvmax)}-({_n(y)}-x)^2/{_n(y)})"
+            velocity += f"+{write_step(0.0, y)}*({_n(self.fvmax)}-({_n(y)}-x)^2/{_n(y)})"
         velocity += f"+step(x-{_n(y)})*{_n(self.fvmax)}"
         return active, passive, velocity
 

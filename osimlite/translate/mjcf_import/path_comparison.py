@@ -31,7 +31,7 @@ class Bench:
 
     def __init__(self, draft: ConversionDraft) -> None:
         self._draft = draft
-        self.coordinates = CoordinateMap.of(draft.mj, draft.coordinates, draft.rotors)
+        self.coordinates = CoordinateMap.build(draft.mj, draft.coordinates, draft.rotors)
         self.model = read_text(to_text(draft.model))
         self.frames: list[PhysicalFrame] = []
         for frame in draft.frames:

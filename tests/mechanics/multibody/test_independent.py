@@ -39,7 +39,7 @@ def same_mechanics(mechanism: Mechanism, q, u) -> Moved:
             strict=True,
         ):
             same(mine, its, f"{name} of {constraint.name}")
-    bodies = MassCentres.of(theirs)
+    bodies = MassCentres.compute(theirs)
     same(mechanism.mass_matrix(q), bodies.mass_matrix(), "mass matrix")
     same(mechanism.gravity_forces(q), bodies.gravity_forces(), "gravity")
     same(mechanism.bias(q, u), bodies.inertia_forces(theirs.biases), "bias")
@@ -58,7 +58,7 @@ def test_random_trees(case: Case, kinds: list[str], seed: int):
     assert mechanism.acceleration(case.q, case.u, pushed, time=0.3) == pytest.approx(
         udot, abs=1e-8 * scale
     )
-    needed = MassCentres.of(state).mass_matrix() @ case.udot + mechanism.bias(case.q, case.u)
+    needed = MassCentres.compute(state).mass_matrix() @ case.udot + mechanism.bias(case.q, case.u)
     missing = needed - mechanism.gravity_forces(case.q)
     same(mechanism.inverse_dynamics(case.q, case.u, case.udot), missing, "inverse dynamics")
 

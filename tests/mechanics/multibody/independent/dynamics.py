@@ -28,7 +28,7 @@ class MassCentres:
     moving: Array  # from the n speeds to the velocities of the mass centres (b, 3, n)
 
     @classmethod
-    def of(cls, state: Moved) -> MassCentres:
+    def compute(cls, state: Moved) -> MassCentres:
         """See a mechanism at `state` from its mass centres."""
         masses, centres, inertias = state.mechanism.inertial
         rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
@@ -68,7 +68,7 @@ class MassCentres:
 
 def acceleration(state: Moved, applied: Array) -> Array:
     """Udot (n,) with M udot = f but for what makes G udot = b; by the null space of G, if M cannot be divided by."""
-    bodies, constraints = MassCentres.of(state), state.mechanism.constraints
+    bodies, constraints = MassCentres.compute(state), state.mechanism.constraints
     matrix = bodies.mass_matrix()
     right = applied + bodies.gravity_forces() - bodies.inertia_forces(state.biases)
     if not constraints:

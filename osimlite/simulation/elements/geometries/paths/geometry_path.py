@@ -226,7 +226,7 @@ class ThroughPoints:
             most = max(Counter(surface.first for surface in self.surfaces).values())
             slots, work = layout_slots(most, len(self.surfaces), work)
             kernel = "geodesic_path"
-            wraps = wraps + slots
+            wraps += slots
         return [
             *parts,
             ForceRecord(kernel, (*ints, *wraps), tuple(numbers), record_size=work, is_part=True),
