@@ -218,6 +218,31 @@ def format_count(number: int, noun: str) -> str:
     return f"{number} {noun if number == 1 else plural}"
 
 
+def format_time_span(start: float, end: float) -> str:
+    """Return a span of times in words; ends at infinity are left out.
+
+    Args:
+        start: first time, s.
+        end: last time, s.
+    """
+    if end == float("inf"):
+        return f"after {start:g} s"
+    return f"before {end:g} s" if start == float("-inf") else f"between {start:g} and {end:g} s"
+
+
+def with_article(noun: str) -> str:
+    """Return a noun with its indefinite article: ``"a Body"``, ``"an Ellipsoid"``.
+
+    Args:
+        noun: the noun, for example the name of a class; also in brackets, as in ``"<Body>"``.
+    """
+    return f"{'an' if noun.lstrip('<').startswith(_VOWELS) else 'a'} {noun}"
+
+
+_VOWELS = (*"AEIOaeio", "RRA", "Um")
+"""Beginnings of words with the article "an"; a UniversalJoint needs "a"."""
+
+
 def make_unique_name(name: str, used_names: Container[str | None], first_number: int = 1) -> str:
     """Return a name that is not taken: the name, or the name with the smallest number that makes it unique.
 

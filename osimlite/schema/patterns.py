@@ -398,7 +398,7 @@ class _Compiler:
         if letter in "xu":
             digits = "".join(self._take_character() for _ in range(2 if letter == "x" else 4))
             if not frozenset(string.hexdigits).issuperset(digits):
-                raise PatternError(f"'\\{letter}{digits}' is no character")
+                raise PatternError(f"'\\{letter}{digits}' is not a character")
             return frozenset(chr(int(digits, 16))), False
         # Digits are back references, which this algorithm cannot match.
         if letter.isalnum():

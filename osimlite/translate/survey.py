@@ -368,7 +368,7 @@ class _Survey:
             self.note(
                 "frame",
                 path,
-                "a frame that is no link",
+                "a frame that is not a link",
                 "left out as a frame; what is fixed to it is in the body's link",
                 f"in {owner} at ({x:g}, {y:g}, {z:g}) m",
             )

@@ -180,7 +180,7 @@ def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
             HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates"
         )
     if not np.isfinite(q).all():
-        return {"error": "a coordinate value is no number"}
+        return {"error": "a coordinate value is not a number"}
     try:
         # The page may send any numbers while a user drags; failures are answered below, not logged.
         with np.errstate(all="ignore"):

@@ -199,7 +199,7 @@ class Shown:
         motion = self.motion
         if motion is None:
             if time is not None:
-                raise OsimliteError("a moment belongs to a motion; name one after the model")
+                raise OsimliteError("a time needs a motion; name one after the model")
             return self.q, [], frozenset(), {}
         first, last = float(motion.times[0]), float(motion.times[-1])
         if time is not None and not first <= time <= last:

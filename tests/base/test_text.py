@@ -16,7 +16,9 @@ from osimlite.base.text import (
     escape_unprintable,
     find_nearest,
     format_json,
+    format_time_span,
     measure_similarity,
+    with_article,
 )
 from osimlite.errors import OsimliteError
 
@@ -122,3 +124,23 @@ def test_the_nearest_name() -> None:
     assert find_nearest("tibia", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_l"
     assert find_nearest("xyz", ["femur_r", "tibia_l"]) is None
     assert find_nearest("xyz", []) is None
+
+
+@pytest.mark.parametrize(
+    ("noun", "words"),
+    [
+        ("Body", "a Body"),
+        ("<InverseDynamicsTool>", "an <InverseDynamicsTool>"),
+        ("RRATool", "an RRATool"),
+        ("UniversalJoint", "a UniversalJoint"),
+        ("Umberger2010MuscleMetabolicsProbe", "an Umberger2010MuscleMetabolicsProbe"),
+    ],
+)
+def test_articles(noun: str, words: str) -> None:
+    assert with_article(noun) == words
+
+
+def test_spans_of_times() -> None:
+    assert format_time_span(0.5, 2.0) == "between 0.5 and 2 s"
+    assert format_time_span(5.0, float("inf")) == "after 5 s"
+    assert format_time_span(float("-inf"), 0.1) == "before 0.1 s"

@@ -119,7 +119,7 @@ def test_data_that_cannot_be_used(model, tmp_path):
     (tmp_path / "model.xml").write_text(
         '<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
     )
-    with pytest.raises(DocumentError, match="holds a <Model>, not a <ExternalLoads>"):
+    with pytest.raises(DocumentError, match="holds a <Model>, not an <ExternalLoads>"):
         read_external_loads(mechanism, tmp_path / "model.xml")
 
 

@@ -112,7 +112,7 @@ def test_the_server_answers_the_page_and_nobody_else():
             == view.q.tolist()
         )
         assert (
-            "no number"
+            "not a number"
             in ask(server, json.dumps({"values": [np.nan] * len(view.q)}).encode())["error"]
         )
         for wrong in (
@@ -177,7 +177,7 @@ def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):
         view.write_picture(tmp_path / "b.png", size, 0.7)
     with pytest.raises(OsimliteError, match=r"written as \.png"):
         view.write_picture(tmp_path / "b.xyz", size)
-    with pytest.raises(OsimliteError, match="belongs to a motion"):
+    with pytest.raises(OsimliteError, match="a time needs a motion"):
         walker().write_picture(tmp_path / "b.png", size, 0.1)
     assert not (tmp_path / "b.png").exists()
 

@@ -113,7 +113,7 @@ def _make_syntax_error(source: Source, line: int, column: int, message: str) -> 
     line, column, _ = locate_error(source, line, column, message)
     words = rephrase_message(message) if "<" in source.text else "there is no element in it"
     if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
-        words += "; of tables, 'validate', 'info' and 'diff' know more"
+        words += "; the commands 'validate', 'info' and 'diff' accept tables"
     return NotWellFormedError(
         f"not well-formed XML: {words}", file=source.file, line=line, column=column
     )
@@ -147,7 +147,9 @@ def read_version(source: Source, root: etree._Element) -> int:
     position = source.locate_tag(0)
     if root.tag != ROOT:
         tag = decode_name(root.tag)
-        message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
+        message = (
+            f"the root element is <{tag}>, not <OpenSimDocument>: this is not an OpenSim document"
+        )
         if tag == "mujoco":
             message += "; this is MJCF (MuJoCo): convert it with 'osimlite convert'"
         raise add_suggestion(source.fault(DocumentError, message, position), _guess_root(tag, root))

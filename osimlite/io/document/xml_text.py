@@ -113,7 +113,7 @@ def format_xml(
         )
     except etree.XMLSyntaxError as error:
         raise ModelError(
-            f"the content of an unknown component is no XML element: {error.msg}"
+            f"the content of an unknown component is not an XML element: {error.msg}"
         ) from None
     if element.getroottree().docinfo.internalDTD is not None:
         raise ModelError("the content of an unknown component has a DOCTYPE; leave it out")

@@ -69,7 +69,7 @@ def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Ind
                 ends.append(len(corners))
         except ValueError:
             raise OsimliteError(
-                f"this is no {'point' if kind == 'v' else 'face'}", file=name, line=number
+                f"this is not a {'point' if kind == 'v' else 'face'}", file=name, line=number
             ) from None
     if not corners:
         raise OsimliteError("it is not an OBJ file with faces; save it again", file=name)

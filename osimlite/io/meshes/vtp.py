@@ -153,7 +153,7 @@ class _File:
         try:
             offsets = {int(array.get("offset", "0")) for array in self.root.iter("DataArray")}
         except ValueError:
-            raise _Unreadable("one of its offsets is no number") from None
+            raise _Unreadable("one of its offsets is not a number") from None
         # An array ends where the next one begins.
         self.offsets = [*sorted(offsets), len(self.appended)]
 

@@ -88,7 +88,10 @@ class TableStream:
                 row.append(float(word))
             except ValueError:
                 raise DocumentError(
-                    f"'{word}' is no number", file=self.file, line=number, column=match.start() + 1
+                    f"'{word}' is not a number",
+                    file=self.file,
+                    line=number,
+                    column=match.start() + 1,
                 ) from None
         return row
 

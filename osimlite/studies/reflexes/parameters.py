@@ -186,7 +186,7 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
             best_value, mean, std = (parse_finite(field) for field in fields[1:4])
         except ValueError:
             raise DocumentError(
-                "a name, best, mean and standard deviation are wanted", file=str(path), line=number
+                "expected a name, best, mean and standard deviation", file=str(path), line=number
             ) from None
         result[fields[0]] = best_value, mean, std
     return result

@@ -349,7 +349,7 @@ def _fill_from_yaml(
         budget: remaining files and parts.
     """
     if mapping.id != "mapping":
-        raise node.error("keys with values are wanted")
+        raise node.error("expected keys with values")
     # An anchor that contains an alias of itself has no end.
     if level > MAX_NESTING:
         raise node.error(f"the parts nest more than {MAX_NESTING} levels deep")
@@ -445,7 +445,7 @@ class _TokenReader:
                 if self.next() != "}":
                     raise child_node.error(f"'{key}' has no end")
             elif token != "=":
-                raise child_node.error(f"after '{key}' a '=' or a '{{' is wanted, not '{token}'")
+                raise child_node.error(f"expected '=' or '{{' after '{key}', found '{token}'")
             # Constants are shared by all files that are read after this line.
             if key.startswith("$"):
                 self.constants[key] = child_node.value
@@ -462,7 +462,7 @@ class _TokenReader:
             return " ".join(texts)
         if value in ("{", "}", "="):
             raise DocumentError(
-                f"a value is wanted, not '{value}'", file=str(self.path), line=self.line()
+                f"expected a value, found '{value}'", file=str(self.path), line=self.line()
             )
         if value.startswith("$"):
             if value not in self.constants:

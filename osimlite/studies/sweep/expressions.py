@@ -110,7 +110,7 @@ class ExpressionMeasure:
             self._tree = parse_expression(python.strip()).body
         except SyntaxError:
             raise SettingError(
-                f"the measure '{text}' is no expression; write it as in max(NAME) - 2*end(NAME)"
+                f"the measure '{text}' is not an expression; write it as in max(NAME) - 2*end(NAME)"
             ) from None
         if _measure_depth(self._tree) > MAX_DEPTH:
             raise SettingError(
@@ -163,7 +163,7 @@ class ExpressionMeasure:
                 # Adding zeros makes a history of a constant.
                 return REDUCTIONS[name](times, evaluate(argument) + np.zeros(len(times)))
         raise SettingError(
-            f"the measure '{self._text}' is no expression; there are + - * / ^ and functions of one number"
+            f"the measure '{self._text}' is not an expression; there are + - * / ^ and functions of one number"
         )
 
 

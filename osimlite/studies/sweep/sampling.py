@@ -151,7 +151,7 @@ def choose_samples(
             )
         return Samples(tuple(variables), sampler, grid_size, seed)
     if count is None:
-        raise SettingError("say how many samples are wanted, as in --samples 1000")
+        raise SettingError("the number of samples is missing; add it, as in --samples 1000")
     if count < 1:
         raise SettingError(f"the number of samples is above zero, not {count}")
     if sampler == "sobol" and count > MAX_SOBOL_POINTS:

@@ -340,7 +340,7 @@ class MjcfDraft:
             Untranslatable: the path has no tendon.
         """
         if path not in self.tendons:
-            raise Untranslatable("its path is no tendon")
+            raise Untranslatable("its path is not a tendon")
         return self.tendons[path]
 
     def add_follower(self, joint: str, follower: Follower) -> None:

@@ -95,7 +95,7 @@ def add_ligament(draft: MjcfDraft, force: Ligament | Blankevoort1991Ligament, pa
     draft.fidelity.add(
         "ligament",
         path,
-        "a ligament whose tension is no line of its length",
+        "a ligament whose tension is not linear in its length",
         "the nearest spring without damping",
         f"tendon {path_tendon.name}: {stiffness:g} N/m beyond {rest_length:g} m",
         {

@@ -143,7 +143,7 @@ def _read_linear_law(
         draft.drop(
             "actuator",
             actuator,
-            "a force that is no linear function of the control, or other dynamics",
+            "a force that is not a linear function of the control, or other dynamics",
         )
         return None
     return *gain_and_bias, delay

@@ -105,12 +105,12 @@ def test_old_names_at_the_top() -> None:
     [
         (
             document("<InverseKinemtaticsTool/>"),
-            "a <InverseKinemtaticsTool>, which is no class of OpenSim 4.6; did",
+            "an <InverseKinemtaticsTool>, which is not a class of OpenSim 4.6; did",
         ),
         (document(""), "the document holds no object"),
-        ("<project/>", "this is no OpenSim document$"),
+        ("<project/>", "this is not an OpenSim document$"),
         ("<mujoco><worldbody/></mujoco>", "convert it with 'osimlite convert'"),
-        (document("<Tool/>"), "a <Tool>, which is no class"),
+        (document("<Tool/>"), "a <Tool>, which is not a class"),
     ],
 )
 def test_what_is_no_document_is_refused(text: str, message: str) -> None:

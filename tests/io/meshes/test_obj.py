@@ -61,9 +61,9 @@ def test_a_surface_without_all_its_normals_has_none(old, new):
     ("line", "said"),
     [
         ("root:x:0:0:root:/root:/bin/bash", "not an OBJ file with faces"),
-        ("v 1 2\nf 1 1 1", "line 1|this is no point"),
-        ("v 1 2 3\nf 0 1 1", "this is no face"),
-        ("v 1 2 3\nf 1 1 -2", "this is no face"),
+        ("v 1 2\nf 1 1 1", "line 1|this is not a point"),
+        ("v 1 2 3\nf 0 1 1", "this is not a face"),
+        ("v 1 2 3\nf 1 1 -2", "this is not a face"),
         ("v 1 2 3\nf 1 1 9", "a point that is not there"),
         ("v 1 2 3\nf 1 1 99999999999999999999999", "not there"),
         ("v 1 2 1e999\nf 1 1 1", "three finite numbers"),

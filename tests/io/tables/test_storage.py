@@ -62,7 +62,7 @@ def test_older_layout(tmp_path):
         ("t\nendheader\n", 2, "before its column labels"),
         ("t\nendheader\nx\ty\n", 3, "must be 'time'"),
         ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, "1 number and needs 2"),
-        ("t\nendheader\ntime\ta\n0\tone\n", 4, "no number"),
+        ("t\nendheader\ntime\ta\n0\tone\n", 4, "not a number"),
     ],
 )
 def test_faults_are_placed(tmp_path, text, line, words):
@@ -78,7 +78,7 @@ def test_faults_are_placed(tmp_path, text, line, words):
     [
         ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, 2, "1 number and needs 2"),
         ("t\nendheader\ntime\ta\n\n0\t1 22\n", 5, 5, "3 numbers and needs 2"),
-        ("t\nendheader\ntime\ta\n0\t one\n", 4, 4, "'one' is no number"),
+        ("t\nendheader\ntime\ta\n0\t one\n", 4, 4, "'one' is not a number"),
         ("t\nDataType=Vec3\nendheader\ntime\ta\n0\t1,2\n", 5, 6, "3 numbers and needs 4"),
     ],
 )
@@ -164,7 +164,7 @@ def test_rows_one_by_one(tmp_path):
         assert next(rows_) == (0.0, [0.0])
         assert next(rows_) == (0.1, [1.0])
     with (
-        pytest.raises(DocumentError, match="'damaged' is no number") as caught,
+        pytest.raises(DocumentError, match="'damaged' is not a number") as caught,
         stream_table(path) as table,
     ):
         assert sum(1 for _ in table) == 1000

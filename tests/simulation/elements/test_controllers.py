@@ -45,7 +45,7 @@ HEAD = "controls\nversion=1\nnRows=2\nnColumns=3\ninDegrees=no\nendheader\ntime\
             "controls.sto:9: the time goes back from 0.5 to 0.1 s; sort the rows",
         ),
         ("0\t1\n", "controls.sto:8:4: the row has 2 numbers and needs 3"),
-        ("0\t1\tx\n", "controls.sto:8:5: 'x' is no number"),
+        ("0\t1\tx\n", "controls.sto:8:5: 'x' is not a number"),
         ("", "controls.sto:7: the table has no rows; add at least one"),
         (
             "0\t1\t2\n1\t1\t2\n",

@@ -56,7 +56,7 @@ def test_yaml_and_data_are_the_same_trees(tmp_path) -> None:
     ("text", "words"),
     [
         ("a: [1", "it.yaml:1:6: not YAML"),
-        ("- 1", "keys with values are wanted"),
+        ("- 1", "expected keys with values"),
         ("a: [{b: 1}, [2]]", "keys with"),
     ],
 )
@@ -75,9 +75,9 @@ def test_damage_of_yaml_is_told(text, words, tmp_path) -> None:
         ("a = 1\n}", "line 2: a '}' without"),
         ('a = "b', "quotation mark"),
         ("<< other.scone >>", "no such file"),
-        ("a b", "after 'a' a '=' or a '{' is wanted"),
+        ("a b", "expected '=' or '{' after 'a', found 'b'"),
         ("<< it.scone >>", "without end"),
-        ("a = {", "a value is wanted"),
+        ("a = {", "expected a value"),
     ],
 )
 def test_damage_is_told(text, words, tmp_path) -> None:

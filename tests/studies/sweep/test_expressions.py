@@ -152,13 +152,13 @@ def test_a_run_that_is_stopped_is_looked_at_up_to_its_end(walker):
         ("max(mu/activaton)", "has no 'activaton' to look at"),
         ("max(center_of_mas_Y)", "did you mean 'center_of_mass_Y'"),
         ("max(x) + (x)", "changes during a run; say what of it, as in max"),
-        ("max(x", "is no expression; write it"),
-        ("max(x" + "+x" * 20000 + ")", "is no expression; write it"),
+        ("max(x", "is not an expression; write it"),
+        ("max(x" + "+x" * 20000 + ")", "is not an expression; write it"),
         ("max(x" + "+x" * 300 + ")", "nests more than 200 levels deep; write it shorter"),
-        ("max(x, 1)", "is no expression; there are"),
-        ("(1, 2)", "is no expression; there are"),
+        ("max(x, 1)", "is not an expression; there are"),
+        ("(1, 2)", "is not an expression; there are"),
         ("open(1)", "has no 'open' to look at"),
-        ("max(x)[0]", "is no expression; there are"),
+        ("max(x)[0]", "is not an expression; there are"),
     ],
 )
 def test_what_is_none_is_told(text, words):
