@@ -132,7 +132,10 @@ Par = Annotated[
     ),
 ]
 Numbers = Annotated[
-    str, Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")
+    str,
+    Option(
+        help="'shortest': as few digits as give the same number when read; 'opensim': 17 digits."
+    ),
 ]
 Format = Annotated[
     str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
@@ -282,6 +285,21 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
     # redirect results.
     expect_folder_inside(Path(file.stem))
     return Path(file.stem)
+
+
+def check_mass(mass: float) -> None:
+    """Check the mass of a subject in kg; -1, the default, keeps the mass of the model.
+
+    Args:
+        mass: the mass, kg.
+
+    Raises:
+        SettingError: the mass is not positive.
+    """
+    from osimlite.errors import SettingError
+
+    if mass != -1.0 and not mass > 0.0:
+        raise SettingError(f"--mass: expected a positive mass in kg, found {mass:g}")
 
 
 def parse_named_words(

@@ -92,4 +92,5 @@ def _show_verdicts(report: TrialReport) -> None:
         print_table(table)
         show("\n")
     if report.verdicts:
-        say("Limits: up to the first number a value is good, up to the second it is okay.\n")
+        say("Limits: up to the first number a value is good, up to the second it is okay.")
+        say()

@@ -57,6 +57,7 @@ def fit(
     from osimlite.fitting.person_files import create_person_files
     from osimlite.io.document.reader import read
 
+    options.check_mass(mass)
     with progress_bar("fitting", None):
         person = fitted(
             read(file),

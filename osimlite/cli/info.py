@@ -64,6 +64,8 @@ def info(
     # Leave out the components that OpenSim adds itself: they are not in the file.
     components = [component for component in tree.components if not tree.is_internal(component)]
     muscles = [component for component in components if is_a(component, "Muscle")]
+    # Since OpenSim 4, forces may also stand outside of the ForceSet, in <components>.
+    forces = [component for component in components if is_a(component, "Force")]
     wraps = [component for component in components if is_a(component, "PathWrap")]
     surfaces = sum(is_a(component, "WrapObject") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
@@ -85,7 +87,7 @@ def info(
                 str(sum(isinstance(component, Coordinate) for component in components)),
             ),
             ("muscles", str(len(muscles))),
-            ("other forces", str(len(model.force_set.objects) - len(muscles))),
+            ("other forces", str(len(forces) - len(muscles))),
             (
                 "wrap surfaces",
                 f"{surfaces}, used by {format_count(len(wraps), 'path wrap')}" if surfaces else "0",
@@ -149,8 +151,9 @@ def _print_table_info(file: Path, show_all: bool) -> None:
 
 
 def _make_note_rows(count: int) -> list[tuple[str, str]]:
-    """Return a row for the notes of the reader, if there are any."""
-    return [("notes of the reader", f"{count}; see 'osimlite validate'")] if count else []
+    """Return a row with the number of problems that the reader met, if there are any."""
+    problems = format_count(count, "problem")
+    return [("reading the file", f"{problems}; see 'osimlite validate'")] if count else []
 
 
 def _list_files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:

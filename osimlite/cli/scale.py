@@ -22,7 +22,7 @@ def scale(
             "--distance",
             metavar="BODY=A:B",
             help="Scale a body by the distance between the markers A and B: measured distance divided by that in the model. "
-            "With several pairs, separated by commas, by their mean. BODY.XZ scales these axes only. May be repeated.",
+            "Several pairs, separated by commas, are averaged. BODY.XZ scales the axes X and Z only. May be repeated.",
         ),
     ] = None,
     factor: Annotated[
@@ -85,6 +85,7 @@ def scale(
         for body, text in options.parse_named_words(factor, "--factor").items()
     }
     # Without any of these the model would be written unchanged.
+    options.check_mass(mass)
     if not (measurements or factors or place or mass > 0.0):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
     with progress_bar("scaling", None):

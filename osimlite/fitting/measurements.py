@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import format_time_span, join_words, suggest_name
 from osimlite.errors import DocumentError, OsimliteError, SettingError
 from osimlite.io.tables.storage import expect_increasing_times
 from osimlite.mechanics.multibody.spatial import Array
@@ -90,7 +90,7 @@ class Measurements:
         """Return the error for a range of times without frames."""
         file_note = f" of '{self.file}'" if self.file else ""
         return SettingError(
-            f"no frame{file_note} lies between {start:g} and {end:g} s; the data are from "
+            f"no frame{file_note} lies {format_time_span(start, end)}; the data are from "
             f"{self.times[0]:g} to "
             f"{self.times[-1]:g} s"
         )

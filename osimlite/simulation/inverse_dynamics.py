@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_time_span
 from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
@@ -235,7 +236,7 @@ def prepare_motion(
     if lowpass is not None:
         recorded = recorded.lowpassed(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):
-        message = f"no time of the motion lies between {start:g} and {end:g} s"
+        message = f"no time of the motion lies {format_time_span(start, end)}"
         raise SettingError(
             f"{message}; it is from {recorded.times[0]:g} to {recorded.times[-1]:g} s"
         )

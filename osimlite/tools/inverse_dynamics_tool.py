@@ -10,6 +10,7 @@ import numpy as np
 from osimlite.base.progress import watch_items
 from osimlite.base.records import replace
 from osimlite.base.text import join_words, suggest_name
+from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable, expect_time_range
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.kinematics import MechanismKinematics
@@ -58,7 +59,12 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
         recorded = recorded.lowpassed(cutoff, continued=True)
     # After filtering, so that the filter sees the complete motion.
     recorded = recorded.between(*expect_time_range(setup.time_range))
-    exclude_forces(model, map(str, setup.forces_to_exclude))
+    for name in map(str, setup.forces_to_exclude):
+        try:
+            exclude_forces(model, [name])
+        except SettingError as error:
+            # As in OpenSim, an unknown name excludes nothing.
+            outcome.add_message("forces to exclude", f"{error.message}; nothing is excluded for it")
     loads = job.find_path("external_loads_file")
     forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)
     table = recorded.inverse_dynamics(forces)

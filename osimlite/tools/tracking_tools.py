@@ -185,6 +185,10 @@ def run_cmc_tool(job: Job, outcome: Outcome) -> None:
             "osimlite does not support actuators_to_exclude, and controls all actuators; leave it "
             "empty"
         )
+    if not setup.cmc_time_window > 0.0:
+        raise job.create_error(
+            f"cmc_time_window is {setup.cmc_time_window:g} s, expected more than 0; 0.01 s is usual"
+        )
     model = build_model(job)
     with build_simulation(job, model) as simulation:
         desired = DesiredMotion.read(job, outcome, simulation, model)

@@ -42,6 +42,10 @@ def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
             "there is nothing to scale; add --distance, --factor, --mass or --place",
         ),
         (("scale", "box.osim", "--preserve-masses"), "there is nothing to scale"),
+        (
+            ("scale", "box.osim", "--mass", "-72"),
+            "--mass: expected a positive mass in kg, found -72",
+        ),
         (("modify", "box.osim"), "there is nothing to replace; add --replace NAME=WORD"),
         (("simulate", "box.osim", "--to"), "'osimlite simulate --help' shows the usage"),
         (("validate", "--format"), "'osimlite validate --help' shows the usage"),

@@ -61,7 +61,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
             "'much' is not a number for 'one'",
         ),
         (("ik", "box.osim", "walk.trc", "--keep", "knee=1"), "no coordinate 'knee'"),
-        (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies between"),
+        (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies after"),
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
         (("ik", "box.osim", "box.osim"), "this is not a marker file"),
         (("scale", "box.osim", "--distance", "b=one:two"), "need markers of the standing subject"),

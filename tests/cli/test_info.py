@@ -109,7 +109,7 @@ def test_diff_of_tables(fixtures, tmp_path):
     ]
     assert (run("diff", old, old).code, run("diff", old, old).out) == (0, "")
     said = run("format", old).err
-    assert "no element in it; of tables, 'validate', 'info' and 'diff' know more" in said
+    assert "no element in it; the commands 'validate', 'info' and 'diff' accept tables" in said
     assert (
         run("diff", "--git", "a.mot", "/dev/null", "0", "0", old, "0", "0").out.splitlines()[2]
         == "+ pelvis_tilt"
@@ -151,6 +151,17 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     facts = dict(line.split("  ", 1) for line in lines if "  " in line.strip())
     assert facts["wrap surfaces"].strip() == "1, used by 1 path wrap"
     assert facts["simulation"].strip() == "possible, every force is supported"
+    assert facts["other forces"].strip() == "0"
+    # Since OpenSim 4, forces may stand in <components>, outside of the ForceSet.
+    model.subcomponents.append(model.force_set.objects.pop())
+    osimlite.write(model, tmp_path / "m.osim")
+    facts = dict(
+        line.split("  ", 1)
+        for line in run("info", tmp_path / "m.osim").out.splitlines()
+        if "  " in line.strip()
+    )
+    assert facts["muscles"].strip() == "2" and facts["other forces"].strip() == "0"
+    model.force_set.objects.append(model.subcomponents.pop())
     model.find("/forceset/m1").ignore_tendon_compliance = True
     osimlite.write(model, tmp_path / "m.osim")
     assert "not possible: the ignore_tendon_compliance of '/forceset/m1'" in " ".join(

@@ -24,7 +24,7 @@ def test_the_moments_without_equilibrium_are_named(tmp_path: Path) -> None:
     folder = copy_lab("unbalanced", tmp_path)
     done = run("run", "ma.xml", "-o", "out", folder=folder)
     assert done.code == 0
-    assert "at 17 of 51 moments, from 0.62 s to 0.94 s" in " ".join(done.out.split())
+    assert "17 of 51 times, from 0.62 s to 0.94 s" in " ".join(done.out.split())
     assert (
         "calf"
         in (folder / "out" / "ma_MuscleAnalysis_FiberLength.sto")
@@ -137,6 +137,27 @@ SHORT_MUSCLE = """<Thelen2003Muscle name="short"><max_isometric_force>381</max_i
 </objects></PathPointSet></GeometryPath></path></Thelen2003Muscle></objects></ForceSet>"""
 
 
+def test_a_window_of_no_length_is_refused(tmp_path: Path) -> None:
+    folder = copy_lab("locked", tmp_path)
+    change(
+        folder / "cmc.xml",
+        ("<cmc_time_window>0.01<", "<cmc_time_window>0<"),
+    )
+    done = run("run", "cmc.xml", "-o", "out", folder=folder)
+    assert done.code == 2
+    assert "cmc.xml: cmc_time_window is 0 s, expected more than 0" in done.err
+
+
+def test_an_unknown_force_to_exclude_does_not_end_a_run(tmp_path: Path) -> None:
+    """OpenSim excludes nothing for such a name, and continues."""
+    folder = copy_lab("ground", tmp_path)
+    rows = osimlite.run(folder / "id_all.xml", folder / "one").tables["id_all.sto"].rows
+    change(folder / "id_all.xml", ("</forces_to_exclude>", " nothing</forces_to_exclude>"))
+    done = osimlite.run(folder / "id_all.xml", folder / "two")
+    assert np.array_equal(done.tables["id_all.sto"].rows, rows)
+    assert "no group of forces 'nothing'" in dict(done.messages)["forces to exclude"]
+
+
 def test_computed_controls_do_not_depend_on_rounding(tmp_path: Path) -> None:
     """A tendon that is longer by an atom's width changes the forces of no muscle.
 
@@ -185,7 +206,7 @@ def test_parts_of_unknown_classes_are_named(tmp_path: Path, part: str, setup: st
     words = " ".join(done.err.split())
     for name in ("LabContactForce", "LabWrap", "Other_Plugin"):
         assert (name in words) == (name in (folder / "leg.osim").read_text())
-    assert ("left in the size of the generic model" in words) == (setup == "scale.xml")
+    assert ("keep the size of the generic model" in words) == (setup == "scale.xml")
 
 
 @pytest.mark.parametrize("setup", ["id.xml", "so.xml"])

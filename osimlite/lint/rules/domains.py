@@ -135,8 +135,8 @@ def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """A number makes OpenSim fail or compute NaN.
 
     Reports values outside their domain that OpenSim is known to reject or to compute wrong results
-    with: contact stiffness 0, a negative mass, a limit whose transition is 0, or so small that
-    adding it does not change the limit.
+    with. Examples are a contact stiffness of 0, a negative mass, and a limit force with a
+    `transition` of 0, or of so few degrees that they are lost when they are added to the limit.
 
     OpenSim gives no message for most of them. A contact stiffness of 0 gives 0/0 as soon as the
     surfaces touch.
@@ -472,9 +472,10 @@ def _report_domain(
         if is_given
         else f"not given (default {format_quantity(value, spec.kind.unit)})"
     )
-    # Domains are written as comparisons; the message needs words.
+    # Domains are written as comparisons with all digits; the message needs words and few digits.
+    rounded = re.sub(r"\d\.\d{6,}(e-?\d+)?", lambda match: f"{float(match[0]):.6g}", verdict.domain)
     domain_text = (
-        re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain)
+        re.sub(r"^>= (\S+)$", r"\1 or more", rounded)
         .replace(">", "more than")
         .replace("!=", "other than")
     )

@@ -210,6 +210,8 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
     out = capsys.readouterr().out
     assert stopped.value.code == 1 and "OSIM911" in out and "Not checked: results of " in out
     assert any(line.startswith("bad") and "30 N" in line for line in out.splitlines())
+    # The line after the tables ends there, without an escaped line break.
+    assert "it is okay.\n\n" in out
     assert (
         max(
             map(
