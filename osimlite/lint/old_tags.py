@@ -74,7 +74,9 @@ _OLD: Final[dict[str, dict[str, Successor]]] = {
     "Component": {"connectors": Successor(30508, None, "write one <socket_...> element for each")},
 }
 _UNUSED: Final[dict[str, dict[str, str]]] = {
-    "MovingPathPoint": {"location": "its functions give the place"},
+    "MovingPathPoint": {
+        "location": "its functions <x_location>, <y_location> and <z_location> give the location"
+    },
     "Component": {"VisibleObject": "OpenSim 4 draws by attached_geometry and Appearance"},
     "Thelen2003Muscle": {
         tag: "this muscle has never had it" for tag in ("Vmax", "Vmax0", "damping", "muscle_model")

@@ -80,11 +80,11 @@ def suggest_names(unknown_texts: Iterable[str], valid_texts: Iterable[str]) -> s
     """
     sorted_texts = sorted(valid_texts)
     suggestions = [
-        f"'{name}' for '{text}'"
+        f"'{text}' spelt '{name}'"
         for text in unknown_texts
         if (name := find_nearest_name(text, sorted_texts))
     ]
-    return f"; is it {join_words(suggestions)}?" if suggestions else ""
+    return f"; is {join_words(suggestions)} there?" if suggestions else ""
 
 
 def pick_closest(text: str, candidates: list[str]) -> str:

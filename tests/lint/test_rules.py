@@ -259,7 +259,8 @@ def test_a_tag_of_an_old_format_is_called_so(fragment, tag, words):
     report = validate(Source(skeleton.document(fragment).encode()), select="OSIM101")
     (finding,) = report.findings
     assert (
-        words in finding.message and "in one of version 40600 OpenSim ignores it" in finding.message
+        words in finding.message
+        and "this file has version 40600, so OpenSim ignores it" in finding.message
     )
     assert finding.suggestion == tag
 

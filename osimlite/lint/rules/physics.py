@@ -142,8 +142,8 @@ def report_limit_outside_range(subject: Subject, report: FindingCollector) -> No
 
     Reports limits that lie outside the range of the coordinate by more than the transition.
 
-    The limit force stops the motion, not the range; the model then moves beyond its range. Note
-    that limits are in degrees and ranges in radians.
+    A range does not stop the motion; only the limit force does. The model can then move beyond the
+    range. Note that limits are in degrees and ranges in radians.
 
     ```xml
       <CoordinateLimitForce name="stop">

@@ -165,9 +165,9 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
                 # A finding at the task points to the name that the user has to compare.
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
                 report(
-                    f"in {wrong} of {format_count(rows, 'row')} of '{user.marker_file}' that were "
-                    f"looked at, '{right}' and '{left}' are the other way round than other "
-                    "markers of both sides: are they swapped?",
+                    f"'{right}' and '{left}' are on the wrong sides, compared with the other markers of "
+                    f"both sides, in {wrong} of {format_count(rows, 'checked row')} of "
+                    f"'{user.marker_file}': are they swapped?",
                     task or user,
                     tag=None if task else "marker_file",
                     attribute="name" if task else None,

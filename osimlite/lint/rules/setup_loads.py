@@ -133,12 +133,12 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
 def report_load_place(setup: Setup, report: FindingCollector) -> None:
     """A measured force acts far away from its body, or is expressed in the wrong frame.
 
-    Poses the model along the motion of the tool, and checks where measured forces act: no part of a
-    foot or a hand is more than 40 cm from the origin, the mass centre, the joints, the markers and
-    the contact surfaces of its body, even if foot and shank are one body. For a force
-    that is expressed in a body, the rule checks in which frame its components point up more: in
-    ground (then the frame is wrong), or in that body. Torques are compared with the moment of the force at 40 cm, and the sum
-    of all forces must point up if it is at least half the weight of the model.
+    Poses the model along the motion of the tool, and reports measured forces that act more than
+    40 cm from their body: from its origin, mass centre, joints, markers and contact surfaces. Every
+    point of a foot or a hand is nearer, even if foot and shank are one body. A force that is
+    expressed in a body is reported if the same numbers point up more when they are read as components
+    in ground. A torque is reported if it is larger than the moment of the force at a distance of
+    40 cm. The sum of all forces must point up if it is at least half the weight of the model.
 
     OpenSim applies the force where the setup says: joint moments are wrong by the force times that
     distance, without a message. Typical causes are swapped feet, points in millimetres, torques in

@@ -256,7 +256,8 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
     of the model's forces, and, if there is no group, with the names of the forces: in a model with
     groups OpenSim looks at groups only. An empty list is reported if the model has muscles.
 
-    The force is included: joint moments then lack the contribution of the passive muscles.
+    The force still acts. If muscles act, their passive forces produce a part of the joint moments,
+    and the tool writes only the rest.
 
     ```setup
       <InverseDynamicsTool name="id">

@@ -102,7 +102,8 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
             tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution
         ):
             report(
-                f"a mass of {tool.mass:g}: OpenSim does not change the mass",
+                f"the mass is {tool.mass:g}: OpenSim keeps the mass of the generic model; set that of "
+                "the subject",
                 tool,
                 tag="mass",
                 fault="mass-not-scaled",

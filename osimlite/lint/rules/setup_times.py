@@ -362,9 +362,9 @@ def report_filter_frequency(setup: Setup, report: FindingCollector) -> None:
             elif table.step > 0.0 and cutoff > 0.5 / table.step:
                 report(
                     # The Nyquist frequency is half the sampling rate.
-                    f"{describe_object(item)} filters at {cutoff:g} Hz, and "
-                    f"'{getattr(item, tag)}' has {1.0 / table.step:.4g} rows a second, of which "
-                    f"{0.5 / table.step:.4g} Hz is the highest that can be filtered",
+                    f"{describe_object(item)} filters at {cutoff:g} Hz, but "
+                    f"'{getattr(item, tag)}' has {1.0 / table.step:.4g} rows per second, so that the "
+                    f"cut-off frequency must be below {0.5 / table.step:.4g} Hz",
                     item,
                     tag=filter_tag,
                 )
@@ -374,9 +374,9 @@ def report_filter_frequency(setup: Setup, report: FindingCollector) -> None:
 def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
     """Angles of a motion are in degrees and OpenSim reads them as radians, or vice versa.
 
-    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: no joint has
-    an angle of more than 10 radians. In a motion with `inDegrees=yes`, the largest angle of many
-    joints is more than 3 degrees.
+    Without `inDegrees=yes`, reports a motion with an angle of more than 10 radians, which no joint
+    reaches. With `inDegrees=yes`, reports a motion of many joints in which no angle is larger than 3
+    degrees.
 
     Joint moments become hundreds of thousands of newton metres, without a message.
 

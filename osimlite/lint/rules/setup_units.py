@@ -214,8 +214,8 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
                 "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
             )
             report(
-                f"{names} of the model and the loads of '{tool.external_loads_file}' both push "
-                f"{bodies} from the ground: exclude the contact forces, or the ground counts twice",
+                f"{names} of the model and the loads of '{tool.external_loads_file}' are both ground "
+                f"reactions on {bodies}, which count twice: exclude the contact forces",
                 tool,
                 tag=tag,
             )

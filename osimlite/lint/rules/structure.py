@@ -219,7 +219,7 @@ def _report_old(
     version = subject.version or CURRENT_VERSION
     report(
         f"<{note.word}> of {describe_object(owner)} belongs to files before version {successor_tag.since}; "
-        f"in one of version {version} OpenSim ignores it{advice}",
+        f"this file has version {version}, so OpenSim ignores it{advice}",
         owner,
         number=note.number,
         suggestion=successor_tag.tag,

@@ -199,8 +199,9 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
     Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the actual rows and
     labels.
 
-    From a storage file of version 1 OpenSim reads as many rows as the header says, and fills rows
-    of `nColumns` numbers across lines. It rejects a marker file with another number of labels.
+    From a storage file of version 1 OpenSim reads as many rows as `nRows` says, and takes the next
+    `nColumns` numbers as a row, even if they stand on two lines. It rejects a marker file whose
+    number of labels is not `NumMarkers`.
     Where OpenSim ignores a count, it is a warning.
 
     ```sto

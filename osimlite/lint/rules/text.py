@@ -186,7 +186,7 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
     """The document has no version or an unsupported one.
 
     Reports a `Version` that is missing, not a whole number, too old for osimlite, newer than that
-    of OpenSim 4.6, or too old for a socket in the document.
+    of OpenSim 4.6, or older than the first version with a socket that the document uses.
 
     OpenSim reads each file by the rules of its version. Without a version it fails; from an unknown
     version it reads what it understands, without a message (a warning).

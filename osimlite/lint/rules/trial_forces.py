@@ -188,9 +188,9 @@ def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
 def report_reserve_moment(trial: Trial, report: FindingCollector) -> None:
     """Reserve actuators replace muscles.
 
-    Compares the reserve actuators of CMC and StaticOptimization, of coordinates that muscles cross,
-    with the joint moments of the motion, peak with peak and root mean square with root mean square:
-    up to 5 % is good (Hicks and others 2015, Is my model good enough?,
+    Compares the reserve actuators of CMC and StaticOptimization with the joint moments of the
+    motion: peak with peak, and root mean square with root mean square. Only coordinates that muscles
+    cross are checked. Up to 5 % is good (Hicks and others 2015, Is my model good enough?,
     https://doi.org/10.1115/1.4029304), and more than 10 % is bad (OpenSim's checklist,
     https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
     Moments below 1 N m are not checked.

@@ -89,9 +89,9 @@ WRONG_WEIGHT = Threshold(
 def report_scale_marker_error(trial: Trial, report: FindingCollector) -> None:
     """A scaled model does not fit the static trial.
 
-    Runs the setup of the ScaleTool, and compares the markers that pose the scaled model, before
-    they are moved, with the measured ones: 1 cm for the root mean square, and 2 cm for the largest
-    error of markers on bones. The limits are those of OpenSim's checklist for evaluating a
+    Runs the setup of the ScaleTool, which puts the scaled model into the static pose, and compares
+    its markers with the measured ones, before the markers are moved. Accepts 1 cm for the root mean
+    square, and 2 cm for the largest error of markers on bones. The limits are those of OpenSim's checklist for evaluating a
     simulation
     (https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
 
@@ -199,7 +199,8 @@ def report_filter_content(trial: Trial, report: FindingCollector) -> None:
     15 Hz, as human gait is slower (Winter 2009, Biomechanics and Motor Control of Human Movement,
     chapter 3).
 
-    Forces follow accelerations, which noise of a tenth of a degree makes useless. A filter that is
+    Forces are computed from accelerations, and noise of a tenth of a degree is enough to make
+    accelerations useless. A filter that is
     too strong removes the motion itself, above all at foot strike.
 
     ```trial
@@ -262,8 +263,8 @@ def report_measured_weight(trial: Trial, report: FindingCollector) -> None:
     A missing plate, or a wrong calibration, has the same effect.
 
     ```trial
-    - difference of the mass of the model from 72.1 kg on the plates: 12 %
-    + difference of the mass of the model from 72.1 kg on the plates: 0.7 %
+    - difference between the model's mass, 80.8 kg, and 72.1 kg on the plates: 12 %
+    + difference between the model's mass, 72.6 kg, and 72.1 kg on the plates: 0.7 %
     ```
     """
     trial.judge(
