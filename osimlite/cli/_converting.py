@@ -485,7 +485,7 @@ def print_formats() -> None:
         OSIM,
         ".osim",
         "in, out",
-        "everything of OpenSim 4.6, and of older files after an upgrade",
+        "everything that a file of OpenSim 4.6 contains; older files are upgraded first",
     )
     exporters = {exporter.name: exporter for exporter in EXPORTERS}
     importers = list_importers()

@@ -22,7 +22,7 @@ def format(
 ) -> None:
     """Rewrite files in OpenSim's layout: one property per line, shortest numbers, your comments preserved.
 
-    Comments that OpenSim prints itself are removed. Formatting twice changes nothing. A file of an
+    Comments that OpenSim prints itself are removed. Formatting a formatted file does not change it. A file of an
     older format keeps its format and its numbers; use 'osimlite upgrade' to convert it.
 
     Example: osimlite format models --check

@@ -16,7 +16,7 @@ MAX_NAMED_COORDINATES = 8
 """Number of undetermined coordinates that a message names."""
 RECOMMENDS = "OpenSim recommends"
 """Begins the note of a message about marker errors beyond the recommended limits."""
-NO_EFFECT = "without effect on the fit"
+NO_EFFECT = "Such parts have no effect on the fit"
 """Consequence for parts of unknown classes where a motion is fitted to markers."""
 MAX_NAMED_PARTS = 3
 """Number of parts that a message names."""
@@ -101,14 +101,13 @@ def describe_unknown(model: Model, consequence: str) -> str:
 
     Args:
         model: the model.
-        consequence: consequence for these parts, for example "not scaled".
+        consequence: what this means for these parts, for example "Such parts are not scaled".
     """
     unknown_parts = find_unknown(model)
     if not unknown_parts:
         return ""
     return (
-        f"{consequence}: {format_count(len(unknown_parts), 'part')} of classes that osimlite does not "
-        "know, "
-        f"{join_words(unknown_parts, max_count=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in "
-        "of these classes is loaded"
+        f"osimlite does not know the classes of {format_count(len(unknown_parts), 'part')}: "
+        f"{join_words(unknown_parts, max_count=MAX_NAMED_PARTS)}. {consequence}. OpenSim refuses the "
+        "model unless the plug-in of these classes is loaded"
     )

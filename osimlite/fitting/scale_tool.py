@@ -61,7 +61,7 @@ class ScaledModel:
     unknown: str = ""
 
 
-UNSCALED = "not scaled, and left in the size of the generic model"
+UNSCALED = "Such parts are not scaled, and keep the size of the generic model"
 """Consequence for parts of unknown classes."""
 
 

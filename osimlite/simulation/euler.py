@@ -119,7 +119,7 @@ class SemiImplicitEuler(Stepper):
             self._accept_step(t, y)
         except IntegrationError as error:
             raise IntegrationError(
-                f"{error} If they are right, take a shorter fixed step than {self._h:g} s, or control the error "
+                f"{error} If all of these are correct, take a shorter fixed step than {self._h:g} s, or control the error "
                 "(--accuracy).",
                 t,
                 error.index,

@@ -224,9 +224,10 @@ class Stepper(ABC):
         for index, value in enumerate(derivative):
             if not isfinite(value):
                 raise IntegrationError(
-                    f"The derivative of {self._get_state_name(index)} is {value} at t = {t:.9g} s; check the masses, inertias "
-                    "and parameters of forces that it depends on, of a muscle also whether it starts in equilibrium, "
-                    "and whether its control is above 0: near rest, an elastic tendon can be stiff without bound.",
+                    f"The derivative of {self._get_state_name(index)} is {value} at t = {t:.9g} s. Check the masses, inertias "
+                    "and parameters of the forces that it depends on. If it depends on a muscle, start the muscle "
+                    "in equilibrium, with a control above 0: near zero activation, the equations of an elastic "
+                    "tendon can become infinitely stiff.",
                     t,
                     index,
                 )

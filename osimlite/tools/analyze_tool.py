@@ -131,9 +131,9 @@ def equilibrate_rows(
             states[missing, index : index + len(element.states)] = np.nan
         outcome.add_message(
             "no equilibrium",
-            f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, "
-            f"{_describe_spans(times, missing)}; "
-            "what depends on its fibers or its force is NaN then",
+            f"{reasons[path]}. This concerns {np.count_nonzero(missing)} of {len(times)} times, "
+            f"{_describe_spans(times, missing)}; values that depend on its fibers or its force are "
+            "NaN there",
         )
     outcome.summary["without_equilibrium"] = {
         path: times[missing].tolist() for path, missing in unbalanced.items()

@@ -160,9 +160,9 @@ class Outcome:
         # One message suffices: all tables of a motion lack numbers for the same reason.
         if not any("NaN" in message for _, message in self.messages):
             self.add_message(
-                "not a number", f"{path.name} has NaN where there is no value: {names}"
+                "missing values", f"{path.name} has NaN where a value is missing, in {names}"
             )
-        return f"NaN stands where there is no value: {names}"
+        return f"NaN stands for missing values, in {names}"
 
     def _require_numbers(self) -> None:
         """Raise an error for a motion with NaN, or a table with infinite numbers.

@@ -115,7 +115,7 @@ URDF_CHOICES = (
     OptionSpec(
         "merge",
         bool | None,
-        "Make bodies that do not move relative to each other one link.",
+        "Merge bodies that do not move relative to each other into one link.",
         group="URDF",
         spelled=("--merge",),
     ),
@@ -162,7 +162,7 @@ MJCF_CHOICES = (
     OptionSpec(
         "spline",
         str | None,
-        "Fit of joints that follow splines: one 'quartic', or a 'series' of two, the second applied to the first.",
+        "How to fit a spline that moves a joint: 'quartic', a polynomial of degree four, or 'series', a quartic of a quartic.",
         shown="series",
         group="MJCF",
     ),
@@ -179,7 +179,7 @@ MJCF_CHOICES = (
 BVH_SCALE = OptionSpec(
     "scale",
     float | None,
-    "Units of length of the BVH file in one metre.",
+    "How many length units of the BVH file are one metre.",
     shown="100, centimetres",
     group="BVH",
 )

@@ -479,7 +479,7 @@ class _SceneCollector:
         result = self.folders.find(name)
         if result is None:
             raise ModelError(
-                f"the mesh file {name} is in none of the folders searched; name its folder {MESH_FOLDER_HINT}"
+                f"the mesh file {name} was not found; name its folder {MESH_FOLDER_HINT}"
             )
         if result not in self.meshes:
             self.meshes[result] = read_surface(result)

@@ -390,10 +390,12 @@ def test_tables_of_tools_say_where_they_have_nan(tmp_path: Path) -> None:
         '<OpenSimDocument Version="40600"><InverseDynamicsTool name="a"/></OpenSimDocument>'
     )
     outcome.write(setup, ResultWriter.for_document(setup))
-    assert outcome.messages == [("not a number", "old.sto has NaN where there is no value: 'a'")]
+    assert outcome.messages == [
+        ("missing values", "old.sto has NaN where a value is missing, in 'a'")
+    ]
     for name in ("old.sto", "new.sto"):
         head, _, _ = (tmp_path / name).read_text().partition("endheader")
-        assert "NaN stands where there is no value: 'a'" in head
+        assert "NaN stands for missing values, in 'a'" in head
 
 
 def test_linearize_gives_no_nan(fixtures: Path) -> None:

@@ -140,8 +140,8 @@ def _describe_failure(values: Mapping[str, float]) -> str:
     )
     return (
         f", whose path of {values['length']:.4g} m is {abs(excess_length):.3g} m "
-        f"{'longer' if excess_length > 0.0 else 'shorter'} than its "
-        f"tendon_slack_length and optimal_fiber_length together{fibers_text}"
+        f"{'longer' if excess_length > 0.0 else 'shorter'} than the sum of its "
+        f"tendon_slack_length and optimal_fiber_length{fibers_text}"
     )
 
 

@@ -343,7 +343,9 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
     if not violation_count:
         yield (
             file,
-            Measurement("beyond-range", "peak", "coordinates beyond their ranges", 0.0, "deg"),
+            Measurement(
+                "beyond-range", "peak", "the distance of coordinates from their ranges", 0.0, "deg"
+            ),
         )
 
 

@@ -253,7 +253,7 @@ def measure_weight(tool: TrialTool) -> Numbers:
     speeds = [_compute_rising_speed(smooth, time, up) for time in (start, end)]
     # Newton's second law over the interval: mean lift = m (g + change of speed / duration).
     carried_mass = mean / (gravity + (speeds[1] - speeds[0]) / (end - start))
-    subject = f"the difference of the mass of the model, {mass:.4g} kg, from {carried_mass:.4g} kg on the plates"
+    subject = f"the difference between the model's mass, {mass:.4g} kg, and {carried_mass:.4g} kg on the plates"
     interval_note = f"mean from {start:.4g} to {end:.4g} s"
     value = 100.0 * abs(mass / carried_mass - 1.0) if carried_mass > 0.0 else float("inf")
     yield (

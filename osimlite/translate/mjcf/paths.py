@@ -148,7 +148,7 @@ def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
     result = [
         *(["a point that moves with a coordinate"] if NODE_TYPE.MOVING in point_types else []),
         *(
-            ["a point that comes and goes with a coordinate"]
+            ["a point that acts only in a range of a coordinate"]
             if NODE_TYPE.CONDITIONAL in point_types
             else []
         ),
