@@ -37,15 +37,15 @@ _AXES: Mapping[str, tuple[Array, Array]] = {
     "yz": (np.array((0.0, 0.0, -1.0)), np.array((0.0, 1.0, 0.0))),
     "xz": (np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, -1.0))),
 }
-"""To the right and up in each plane. The viewer looks along their cross product, from its positive
-side: along -Z, -X (so that Z points to the left) and -Y (so that Z points down).
+"""Unit vectors to the right and up in the picture of each plane. The view is against their cross
+product: along -Z, -X (so that Z points to the left) and -Y (so that Z points down).
 """
 
 LONGEST_ARROW = 0.7
 """Length of the arrow of the largest force, as a part of half the picture's height."""
 
 SCENERY = 3.0
-"""How many times larger than what moves something that stands still may be and still be shown whole."""
+"""Size of a static object, relative to the moving objects, above which pictures may cut it off."""
 
 Progress = Callable[[int, int], None]
 
@@ -71,17 +71,17 @@ def animate(
     moves.
 
     Args:
-        model: what moves.
-        trajectory: how it moves.
+        model: model that moves.
+        trajectory: motion of the model.
         path: the file to write.
         fps: frames per second of the film; a GIF shows at most 50.
-        speed: seconds of motion per second of film.
-        plane: the plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along
-            -Y.
+        speed: seconds of motion per second of film, 1 for real time.
+        plane: plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along -Y.
         size: width and height in pixels.
-        folders: where the model's mesh files are looked for besides the folder of `file`.
-        file: that the model was read from, if there is one.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+        folders: further folders with mesh files, besides the folder of `file`.
+        file: model file, in whose folder mesh files are searched; None to search only `folders`.
+        wrapping: method of wrapping paths around surfaces, see
+            :class:`osimlite.simulation.Options`.
         progress: called with the number of frames done and of all frames.
 
     Raises:
@@ -143,7 +143,7 @@ def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
 
 
 class Film:
-    """Motion at the moments of the film, and how much of space it takes."""
+    """Motion at the times of the frames, with the region of space that it covers."""
 
     def __init__(
         self, scene: Scene, motion: ShownMotion, fps: int, speed: float, plane: Plane
@@ -169,11 +169,11 @@ class Film:
         self.reach = self._compute_reach()
 
     def project_points(self, points: Array) -> Array:
-        """Points (k, 3) in ground as they appear in the plane (k, 2)."""
+        """Project points (k, 3) in ground onto the picture plane (k, 2), m."""
         return np.column_stack((points @ self.right, points @ self.up))
 
     def _compute_focus(self) -> Array:
-        """Return the point (m, 3) that the camera follows: the mass centre of the moving bodies.
+        """Return the points (m, 3) that the camera follows: the mass centre of the moving bodies.
 
         Without a moving mass it is the mean of the body origins in the first pose.
         """
@@ -235,16 +235,15 @@ class Film:
 
 
 class _Painter:
-    """Draws one frame after the other."""
+    """Painter of single frames."""
 
     def __init__(self, film: Film, size: tuple[int, int]) -> None:
         self.film, self.size = film, size
         self.pen = require("PIL.ImageDraw", extra="view", purpose="an animation")
         fonts = require("PIL.ImageFont", extra="view", purpose="an animation")
         self.font, self.small = (fonts.load_default(size[1] / divisor) for divisor in (26.0, 32.0))
-        # Half the width and half the height of the picture, in metres, with a margin around what
-        # 12 % margin.
-        # moves.
+        # Half the width and half the height of the picture in metres, with a margin of 12 % around
+        # what moves.
         half_width, half_height = (1.12 * film.reach).tolist()
         aspect = size[0] / size[1]
         self.half = max(half_width, half_height * aspect), max(half_height, half_width / aspect)
@@ -254,7 +253,7 @@ class _Painter:
         )
 
     def draw_frame(self, number: int) -> Any:
-        """Frame `number` as a pillow image."""
+        """Draw frame `number` as a pillow image."""
         film = self.film
         pose = self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)

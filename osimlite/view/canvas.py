@@ -12,30 +12,30 @@ from osimlite.io.meshes.surface import Indices
 from osimlite.mechanics.multibody.spatial import Array
 
 _AT_ONCE = 300_000
-"""How many pixels are worked on in one step; more would take more memory and leave the processor's caches."""
+"""Number of pixels in one portion of work; more would exceed the caches of the processor."""
 
 
 class Canvas:
-    """A picture of `width` times `height` pixels in one colour, to draw on.
+    """Picture of `width` times `height` pixels, at first in the colour `background`.
 
-    Positions are pixels to the right and down from the upper left corner; of two points at one
-    place, that with the greater depth is nearer to the viewer.
+    Positions are pixels to the right and down from the upper left corner. Of two points at one
+    position, the point with the greater depth is nearer to the viewer.
     """
 
     def __init__(self, width: int, height: int, background: Array) -> None:
         self.width, self.height = width, height
-        self._colors = np.empty((width * height, 3), dtype=np.float32)
         # float32 suffices for colours; depths stay double, since they decide what hides what.
+        self._colors = np.empty((width * height, 3), dtype=np.float32)
         self._colors[:] = background
+        # The background is infinitely far away.
         self._depths = np.full(width * height, -np.inf)
 
-    # Nothing is drawn: infinitely far away.
     def draw_opaque(self, vertices: Array, colors: Array) -> None:
-        """Draw triangles.
+        """Draw opaque triangles.
 
         Args:
-            vertices: position and depth of their corners (t, 3, 3).
-            colors: of their corners (t, 3, 3), 0 to 1.
+            vertices: position (pixels) and depth of the corners of each triangle (t, 3, 3).
+            colors: red, green and blue of the corners (t, 3, 3), 0 to 1.
         """
         for spans in self._iterate_spans(vertices):
             pixels, span_indices, steps = spans.to_pixels()
@@ -49,12 +49,12 @@ class Canvas:
             )
 
     def draw_translucent(self, vertices: Array, colors: Array, opacities: Array) -> None:
-        """Draw triangles that let shine through what is behind them; to be called once, after all solid ones.
+        """Draw translucent triangles. Call it once, after all opaque ones.
 
         Args:
-            vertices: as in :meth:`draw_opaque`.
-            colors: as in :meth:`draw_opaque`.
-            opacities: of the triangles (t,), 0 to 1.
+            vertices: position (pixels) and depth of the corners of each triangle (t, 3, 3).
+            colors: red, green and blue of the corners (t, 3, 3), 0 to 1.
+            opacities: opacity of each triangle (t,), 0 to 1.
         """
         portions: list[tuple[Indices, Array, Array, Array]] = []
         for spans in self._iterate_spans(vertices):
@@ -94,7 +94,7 @@ class Canvas:
             ] + alpha * shades[has_rank]
 
     def to_pixels(self, scale: int = 1) -> NDArray[np.uint8]:
-        """Return the picture (height, width, 3), every `scale` times `scale` pixels made one."""
+        """Return the picture (height, width, 3), averaged over squares of `scale`² pixels."""
         blocks = self._colors.reshape(self.height // scale, scale, self.width // scale, scale, 3)
         # One after the other: numpy takes several times as long for the mean over axes that short.
         colors = np.zeros_like(blocks[:, 0, :, 0])
@@ -138,7 +138,7 @@ class Canvas:
             yield _Spans(triangle, row * self.width + start, lengths[portion], *weights)
 
     def _find_row_ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
-        """Return the first and the last pixel of a row that triangles cover, given corners (r, 3, 2) and heights (r,)."""
+        """Return the first and last pixel that triangles (r, 3, 2) cover at heights (r,)."""
         left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
         # Each edge that crosses the height of the row limits the span.
         for first_corner, second_corner in ((0, 1), (1, 2), (2, 0)):
@@ -156,13 +156,13 @@ class Canvas:
 
 
 class _Spans(NamedTuple):
-    """Pixels side by side that a triangle covers."""
+    """Horizontal spans of pixels, each covered by one triangle."""
 
-    triangles: Indices  # to which they belong (s,)
+    triangles: Indices  # index of the triangle of each span (s,)
     starts: Indices  # number of the first pixel (s,)
-    lengths: Indices  # how many pixels (s,)
-    weights: Array  # of the triangle's corners at the first pixel's centre (s, 3)
-    changes: Array  # of the weights from one pixel to the next (s, 3)
+    lengths: Indices  # number of pixels (s,)
+    weights: Array  # weights of the triangle's corners at the first pixel's centre (s, 3)
+    changes: Array  # changes of the weights from one pixel to the next (s, 3)
 
     def to_pixels(self) -> tuple[Indices, Indices, Indices]:
         """Return all pixels of the spans.
@@ -177,9 +177,9 @@ class _Spans(NamedTuple):
         """Interpolate values (t, 3, ...) at the corners of triangles linearly at pixels.
 
         Args:
-            corners: values at the corners of all triangles.
-            span_indices: index of the span of each pixel.
-            steps: offset of each pixel in its span.
+            corners: values at the corners of all triangles (t, 3, ...).
+            span_indices: index of the span of each pixel (k,).
+            steps: offset of each pixel in its span (k,).
         """
         span_corners = corners[self.triangles]
         first, change = (
@@ -196,7 +196,7 @@ def _pixel_centres(numbers: Indices) -> Array:
 
 
 def _enumerate_ranges(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
-    """Return for every integer of some ranges (starts and lengths (r,)) the index of its range, and the integer."""
+    """Return every integer of ranges (starts and lengths (r,)), after the index of its range."""
     counts = counts.clip(0)
     range_indices = np.repeat(np.arange(len(counts)), counts)
     offsets = np.cumsum(counts) - counts
@@ -204,7 +204,7 @@ def _enumerate_ranges(starts: Indices, counts: Indices) -> tuple[Indices, Indice
 
 
 def _compute_weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
+    """Return weights (k, 3) of corners (k, 3, 2) at points, and their derivatives along x."""
     # Barycentric coordinates: areas of partial triangles over the whole.
     (ax, ay), (bx, by), (cx, cy) = (corners[:, index].T for index in range(3))
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""The scene of a model: what its geometry, contact surfaces, wrap objects, markers, paths and springs look like."""
+"""Builder of the scene of a model: geometry, contact and wrap surfaces, markers and paths."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ from osimlite.view.scene import (
 )
 
 WIDTH_OF_HALF_SPACE = 2.5
-"""How much of a half space is drawn: edges of the square as a multiple of the model's size."""
+"""Edge of the square that shows a half space, as a multiple of the model's size."""
 
 # Files show these surfaces as wireframes; a translucent surface also leaves the bodies visible.
 CONTACT_OPACITY = 0.5
@@ -68,40 +68,41 @@ WRAP_OPACITY = 0.3
 """Factor of the opacity of wrap surfaces."""
 
 SPRING: Color = (0.0, 0.62, 0.45)
-"""Colour of springs between points, which a file gives none."""
+"""Colour of springs between points, for which files have no colour."""
 
 STICK: Color = (0.149, 0.196, 0.247)
-"""Colour of sticks."""
+"""Colour of the sticks that show bodies without geometry."""
 
 _TO_Z = make_transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
-"""From a cylinder along Z to one along Y."""
+"""Rotation (4, 4) that turns a cylinder along Z into one along Y."""
 
 _ENDLESS = 1.0
-"""How long a contact cylinder is drawn, which has no ends, m."""
+"""Drawn length of a contact cylinder, which is infinitely long, m."""
 
 _MARKER_RADIUS = 0.008
 
 STRESS = 6e5
-"""Greatest stress of a muscle's fibers, Pa: 60 N/cm² gives the cross-section that its greatest force takes."""
+"""Specific tension (60 N/cm²) that gives the cross-section of drawn fibers, Pa."""
 
 SLENDER = 0.4
-"""How much of that cross-section's radius is drawn: pennate fibers lie beside each other, and bones are to be seen."""
+"""Drawn radius relative to that of the cross-section, so that muscles do not hide the bones."""
 
 THICKEST = 0.025
-"""No fibers are drawn with a greater radius, m."""
+"""Largest radius of drawn fibers, m."""
 
 
 @any_numbers
 def build_scene(
     model: Model, mechanism: Mechanism, folders: MeshFolders | None = None, wrapping: str = OPENSIM
 ) -> Scene:
-    """Everything that can be drawn of a model; what cannot is a remark.
+    """Build the scene of a model; each component that cannot be drawn becomes a remark.
 
     Args:
-        model: what to draw.
-        mechanism: of the same model.
-        folders: where its mesh files may be.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+        model: model to draw.
+        mechanism: mechanism of `model`.
+        folders: folders with mesh files; by default those of the environment variable alone.
+        wrapping: method of wrapping paths around surfaces, see
+            :class:`osimlite.simulation.Options`.
 
     Raises:
         SettingError: there is no such wrapping.
@@ -132,9 +133,9 @@ class _SceneCollector:
         for component in self.tree.components:
             path = self.tree.path_of(component) or ""
             with self._remark_failure(path):
-                # One component that cannot be drawn is no reason to draw none.
+                # Continue after a component that cannot be drawn.
                 self._add_component(component, path)
-        # A body without any shape is a stick to what it carries.
+        # Draw sticks from bodies without any shape to the bodies that they carry.
         undrawn = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
         for body, ends in draw_sticks(self.mechanism, undrawn):
             self.lines.append(
@@ -168,7 +169,7 @@ class _SceneCollector:
     def _add_component(self, component: Component, path: str) -> None:
         """Add what represents a component in the scene; components without a visible part add nothing."""
         match component:
-            # Axes of frames are shown as frames, by their own switch.
+            # The axes of a frame belong to the layer "frames", which has its own switch.
             case geometry.FrameGeometry():
                 pass
             case geometry.Geometry():
@@ -192,7 +193,7 @@ class _SceneCollector:
                 self._add_path(component, path)
             case Force():
                 self._add_force(component, path)
-            # Only frames that are fixed to a body have a place in the mechanism.
+            # Only frames that are fixed to a body have a position in the mechanism.
             case PhysicalFrame() if path in self.mechanism.frames:
                 self.axes.append(Axes(path, *self.mechanism.frames[path]))
 
@@ -246,7 +247,7 @@ class _SceneCollector:
 
     def _add_wrap_object(self, surface: wrapping.WrapObject, path: str) -> None:
         """Add the translucent surface of a wrap object."""
-        # A wrap object stands in a set of its body.
+        # A wrap object belongs to a set of its body.
         frame = self.tree.parent_of(surface)
         while frame is not None and not isinstance(frame, PhysicalFrame):
             frame = self.tree.parent_of(frame)
@@ -273,7 +274,7 @@ class _SceneCollector:
         )
 
     def _make_shape(self, shape: Component) -> tuple[Surface, Array]:
-        """Return a unit shape, and the matrix (4, 4) that turns it into the shape."""
+        """Return a unit shape, and the matrix (4, 4) that scales it to the shape."""
         match shape:
             case geometry_types.Brick():
                 return unit_shapes.make_cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
@@ -298,8 +299,8 @@ class _SceneCollector:
                     shape.tube_radius / shape.torus_radius
                 ), _make_stretch((shape.torus_radius,) * 3)
             case wrap_types.WrapTorus() if shape.outer_radius > 0.0:
-                # In spite of their names: the radius of the tube, and that of the circle in its
-                # middle.
+                # OpenSim's names mislead: inner_radius is the radius of the tube, outer_radius that
+                # of the circle in its middle.
                 return unit_shapes.make_torus(
                     shape.inner_radius / shape.outer_radius
                 ), _make_stretch((shape.outer_radius,) * 3)
@@ -320,7 +321,7 @@ class _SceneCollector:
                 "OpenSim does not draw it either"
             )
         owner_path = (self.tree.path_of(owner) if owner is not None else None) or name
-        # Paths of disabled forces would look as if they pulled.
+        # Hide the paths of disabled forces, which would look as if they pulled.
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
         result: list[Component | None] = []
         if isinstance(path, GeometryPath):
@@ -345,7 +346,7 @@ class _SceneCollector:
         )
 
     def _add_force(self, force: Force, path: str) -> None:
-        """Add the line of a force between two points, and where the force of a contact is shown."""
+        """Add the line of a force between two points, and the anchor of a contact force."""
         match force:
             case springs.PointToPointSpring():
                 self._add_line_between(
@@ -413,7 +414,7 @@ class _SceneCollector:
     # ----------------------------------------------------------------------------------------------- helpers
     @contextmanager
     def _remark_failure(self, path: str) -> Iterator[None]:
-        """Turns what goes wrong with one component into a remark."""
+        """Turn an error about one component into a remark."""
         try:
             yield
         except OsimliteError as error:
@@ -435,12 +436,12 @@ class _SceneCollector:
         Args:
             path: path of the component that it shows.
             layer: layer that the viewer can switch off.
-            body: index of its body.
-            surface: surface in a frame of its own.
+            body: index of the body that carries it, -1 for ground.
+            surface: surface in its own frame, m.
             matrix: affine matrix (4, 4) from that frame to the body, m.
             color: red, green and blue, 0 to 1.
             opacity: 0 to 1; clipped.
-            visible: whether it is shown at first.
+            visible: whether the viewer shows it at first.
 
         Raises:
             ModelError: the matrix has a number that is not finite.
@@ -519,7 +520,7 @@ def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
 
 
 def _make_stretch(size: Any, translation: Any = (0.0, 0.0, 0.0)) -> Array:
-    """Return the matrix (4, 4) that stretches along the axes and then moves."""
+    """Return the matrix (4, 4) that scales along the axes and then translates."""
     matrix = np.diag((*np.asarray(size, dtype=float).tolist(), 1.0))
     matrix[:3, 3] = translation
     return matrix

@@ -1,7 +1,7 @@
-"""A model, and how it moves, as one file of glTF 2.0 (.glb): for Blender, slides and pages.
+"""Export of a model and its motion to glTF 2.0 (.glb), for Blender, slides and web pages.
 
-Every body is a node with its shapes below it; a path and the arrow of a contact force are tubes of
-their own. Lengths are in metres, Y is up, and times are those of the motion, from 0.
+Every body is a node with its shapes below it. Paths and the arrows of contact forces consist of
+tubes, each a node of its own. Lengths are in metres, Y is up, and times begin at 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Bodies, Color, Scene
 
 RATE = 60.0
-"""Moments a second at most: between them players go straight."""
+"""Largest number of poses per second; players interpolate linearly between them."""
 
 _FLOAT, _UINT32 = 5126, 5125
 _VERTICES, _CORNERS = 34962, 34963
@@ -35,19 +35,19 @@ _ROUND = make_cylinder(8)
 
 
 def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Path) -> Path:
-    """Write what is shown of a model.
+    """Write the visible parts of a model, and their motion, as a .glb file.
 
     Args:
-        scene: what there is to see.
-        q: coordinate values (n,), the pose of a model without motion.
-        motion: how it moves, or None.
-        path: the file to write.
+        scene: scene of the model.
+        q: coordinate values (n,), the pose of a model without motion; not used with a motion.
+        motion: motion of the model; None for a still scene.
+        path: file to write.
     """
     times = np.zeros(1)
     rows = q[None, :]
     if motion is not None:
         recorded = np.asarray(motion.times, dtype=float)
-        # More moments than a player shows would only make the file larger.
+        # More poses than a player shows would only make the file larger.
         max_moments = round((recorded[-1] - recorded[0]) * RATE) + 1
         times = (
             recorded
@@ -88,7 +88,7 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
 
 
 class _Track(NamedTuple):
-    """How a node goes through n moments: translations (n, 3), rotations x y z w (n, 4), scales (n, 3) or None."""
+    """Motion of a node: translations (n, 3), rotations x y z w (n, 4), scales (n, 3) or None."""
 
     translation: Any
     rotation: Array
@@ -98,21 +98,21 @@ class _Track(NamedTuple):
 def _list_segments(
     scene: Scene, motion: ShownMotion | None, times: Array, rows: Array, poses: Sequence[Bodies]
 ) -> Iterator[tuple[str, Color, float, Array]]:
-    """Straight pieces of paths, and forces: path of the component, colour, radius, ends (n, 2, 3) in ground.
+    """Yield component path, colour, radius and ends (n, 2, 3) in ground of segments and forces.
 
-    Of a path that has fewer corners at a moment the last pieces have no length.
+    The last segments of a path that has fewer corners in a pose have no length there.
     """
     for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
             corners_by_pose = [pose.lines[index] for pose in poses]
             corner_count = max(map(len, corners_by_pose))
             padded_corners = [
-                # The last corner is repeated where a moment has fewer corners.
+                # The last corner is repeated in poses with fewer corners.
                 result[np.minimum(np.arange(corner_count), len(result) - 1)]
                 for result in corners_by_pose
                 if len(result)
             ]
-            # A path without corners at some moment is left out.
+            # A path without corners in some pose is left out.
             if len(padded_corners) == len(poses):
                 for k in range(corner_count - 1):
                     yield line.path, line.color, line.radius, np.array(padded_corners)[:, k : k + 2]
@@ -135,13 +135,13 @@ def _list_segments(
 
 
 def _lay_tubes(end_points: Array, radius: float) -> _Track:
-    """Return the poses of a tube of length 1 along Z that is laid from one end to the other (n, 2, 3)."""
+    """Return the n poses of a tube of length 1 along Z that connects two end points (n, 2, 3)."""
     directions = end_points[:, 1] - end_points[:, 0]
     lengths = np.linalg.norm(directions, axis=1)
     directions = directions / np.maximum(lengths, 1e-300)[:, None]
     axes = np.column_stack((-directions[:, 1], directions[:, 0], np.zeros(len(directions))))
     rotations = _turn_vectors(axes, directions[:, 2])
-    # A piece without length has no thickness either.
+    # A segment without length has no thickness either.
     radii = np.where(lengths > 0.0, radius, 0.0)
     return _Track(
         end_points.mean(axis=1),
@@ -151,14 +151,14 @@ def _lay_tubes(end_points: Array, radius: float) -> _Track:
 
 
 def _turn_vectors(axes: Array, cosines: Array) -> Array:
-    """Return the quaternions x y z w that turn unit vectors into others.
+    """Return the quaternions x y z w that turn unit vectors a into unit vectors b.
 
     Args:
-        axes: cross products of the vectors before and after (..., 3).
-        cosines: their scalar products (...).
+        axes: cross products a × b (..., 3).
+        cosines: scalar products a · b (...).
 
     Returns:
-        Unit quaternions (..., 4); those of opposite vectors are half a turn about X.
+        Unit quaternions (..., 4); for opposite vectors, half a turn about X.
     """
     # The sum of axis and 1 + cosine is the quaternion of half the angle, up to its length.
     result = np.concatenate((axes, np.asarray(1.0 + cosines)[..., None]), axis=-1)
@@ -180,7 +180,7 @@ def _make_continuous(quaternions: Array) -> Array:
 
 
 class _GlbWriter:
-    """Puts the parts of a file together: its JSON and its one buffer."""
+    """Writer of a .glb file: its JSON and its one buffer."""
 
     def __init__(self, times: Array, upright: Array) -> None:
         self.buffer = bytearray()
@@ -220,18 +220,18 @@ class _GlbWriter:
         return len(self.accessors) - 1
 
     def _add_once(self, key: Any, entries: list[dict[str, Any]], entry: dict[str, Any]) -> int:
-        """Return the index of an entry, which is written at its first use."""
+        """Return the index of an entry, and append the entry if its key is new."""
         if key not in self._known:
             self._known[key] = len(entries)
             entries.append(entry)
         return self._known[key]
 
     def add_mesh(self, surface: Any, color: Color, opacity: float) -> int:
-        """Return the index of a surface in a colour (sRGB)."""
+        """Return the index of a mesh with the shape of a surface and a colour (sRGB, 0 to 1)."""
         key = (id(surface), color, opacity)
         if key in self._known:
             return self._known[key]
-        # glTF has colours as amounts of light.
+        # glTF has linear colours.
         light = [
             channel / 12.92 if channel <= 0.04045 else ((channel + 0.055) / 1.055) ** 2.4
             for channel in color
@@ -262,7 +262,7 @@ class _GlbWriter:
         return self._add_once(key, self.meshes, {"primitives": [primitive]})
 
     def add_node(self, name: str, track: _Track, mesh: int | None = None) -> int:
-        """Add a node in ground, which moves if it is not the same all the time."""
+        """Add a node in ground, animated unless its track is constant; return its index."""
         index = len(self.nodes)
         node: dict[str, Any] = {"name": name} | ({} if mesh is None else {"mesh": mesh})
         for property_name, values in track._asdict().items():
@@ -280,7 +280,7 @@ class _GlbWriter:
         return index
 
     def add_shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
-        """Add a node that is fixed to another: `matrix` (4, 4) in its frame."""
+        """Add a node that is fixed to the node `parent`, with the matrix (4, 4) in its frame."""
         self.nodes[parent].setdefault("children", []).append(len(self.nodes))
         # Matrices are stored by columns.
         self.nodes.append({"name": name, "mesh": mesh, "matrix": matrix.T.ravel().tolist()})

@@ -1,4 +1,4 @@
-"""Models with faults: what of them can be shown, and a reason for each part that cannot."""
+"""Models with faults: the part that can be shown, and the reasons why the rest cannot."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 
 MAX_REMARKS = 12
-"""Number of single parts that are named; of more, the number is given."""
+"""Largest number of parts that are named; the number of the others is given."""
 
 MAX_SAME = 3
-"""Number of parts with the same reason that are named one by one."""
+"""Largest number of parts with the same reason that are named."""
 
 _MISSING_MESH = "the mesh file"
 _QUOTED_PATH = compile_later(r"'(/[^']+)'")
@@ -88,8 +88,8 @@ def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]
     """Return one sentence per error of the model, without errors of the omitted components.
 
     Args:
-        findings: of the validator.
-        parts: paths of the omitted components, and the reason of each.
+        findings: findings of the validator.
+        parts: path of each omitted component, with the reason.
     """
     omitted = [path for path, _ in parts]
     errors = [
@@ -116,7 +116,7 @@ def describe_left_out(
     """Yield sentences about parts that are not shown.
 
     Args:
-        parts: path of each, and why.
+        parts: path of each omitted component, with the reason.
         with_meshes: whether there is a sentence about missing mesh files.
     """
     # Parts with the same reason are one sentence: a model may have a hundred paths without points.

@@ -1,4 +1,4 @@
-"""The component tree of a model for people to look through: properties as text, findings, and where they belong."""
+"""Component tree of a model for the page: properties as text, findings and their positions."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from osimlite.schema.tree import Tree
 from osimlite.view.scene import Scene
 
 LONGEST = 400
-"""Characters of a property that are shown; curves have thousands."""
+"""Number of characters of a property that are shown; curves have thousands."""
 
 
 def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
     """Describe the components of a model file for the page, each after its owner.
 
-    A component has `path`, `name`, `class_tag`, `parent` (a place in the list, -1 for none), `values` of
-    its properties as text, and `is_given`: which of them are in the file or were assigned, and are no
-    mere defaults. Where a component has other properties than the first of its class, it has `tags`
-    of its own.
+    A component has `path`, `name`, `kind` (the class), `parent` (index in the list, -1 for none)
+    and `values`, the texts of its properties. `given` has the indices of the properties that are in
+    the file or were assigned; the others have their defaults. A component whose properties differ
+    from those of the first component of its class also has `tags`, their names.
 
     Returns:
         The components, and the names of the properties by class.
@@ -68,7 +68,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
 
 
 def _list_properties(tree: Tree, owner: Object, prefix: str) -> Iterator[tuple[str, str, bool]]:
-    """Name, text and whether it was given, of every property; those of objects without a path follow their holder."""
+    """Yield name, text and whether it was set, of every property, also of nested objects."""
     if isinstance(owner, Unknown):
         yield f"{prefix}content", owner.content, True
         return
@@ -94,7 +94,7 @@ def _name_values(tree: Tree, owner: Object, reference: Reference, value: Any) ->
     if isinstance(value, Component):
         try:
             return tree.format_reference(tree.owner_of(owner), reference, value)
-        # A reference to a component outside of the model has a name at least.
+        # Of a component outside of the model, only the name is known.
         except OsimliteError:
             return value.name
     if isinstance(value, tuple):
@@ -103,7 +103,7 @@ def _name_values(tree: Tree, owner: Object, reference: Reference, value: Any) ->
 
 
 def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
-    """Findings as the page shows them."""
+    """Return the findings as records for the page."""
     return [
         {
             "code": finding.code,
@@ -117,7 +117,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 
 
 def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
-    """Return one pin for each component with findings and a position: body, point, codes and worst severity."""
+    """Return a pin (body, point, codes, worst severity) per component with findings and position."""
     tree = model.tree()
     mechanism = scene.mechanism
     results: dict[str, list[Finding]] = {}

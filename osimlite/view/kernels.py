@@ -1,4 +1,4 @@
-"""A mechanism and its paths for the page: their layout as data, and the kernels that compute them as JavaScript."""
+"""Data and JavaScript kernels with which the page computes poses, paths and moment arms."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
     constrained_record = structure[structure[MODEL.CONSTRAINED] :]
     records = structure[constrained_record[CONSTRAINED.CONSTRAINT_AT] :]
     errors = constrained_record[CONSTRAINED.WORK_ERRORS]
-    # Of each its record, the degree of freedom that depends, and where its error is found.
+    # Each row: the record of the constraint, the dependent degree of freedom, the offset of the
+    # error.
     coupled = [
         (
             records[program.constraints[id(constraint)]],
@@ -48,7 +49,8 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
         if isinstance(constraint, Coupler)
     ]
     return {
-        # Of each body, and ground as the last, the link, and the frame in that by rows.
+        # Each row: the link of a body (the last row is ground), and the body's frame in the link by
+        # rows.
         "bodies": [
             *zip(
                 program.links.tolist(), program.frames[:, :3].reshape(-1, 12).tolist(), strict=True
@@ -99,5 +101,5 @@ def kernels_text(program: Mapping[str, Any]) -> str:
 
 
 def text_of(array: Any) -> str:
-    """Return the numbers of an array as text (base64), in their order."""
+    """Return the bytes of an array as base64 text, in the order of its elements."""
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

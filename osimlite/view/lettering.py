@@ -1,4 +1,4 @@
-"""Names in pictures that matplotlib draws."""
+"""Plain text in figures of matplotlib."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from osimlite.base.require import require
 
 @contextmanager
 def plain_lettering() -> Iterator[None]:
-    """Draw names as they are: a ``$`` in one begins no formula, and a letter that the font lacks is an empty box."""
+    """Draw names as plain text: ``$`` begins no formula, and missing letters are empty boxes."""
     matplotlib = require("matplotlib", extra="plot", purpose="drawing")
     with matplotlib.rc_context({"text.parse_math": False}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph", UserWarning)

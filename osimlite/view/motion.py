@@ -1,4 +1,4 @@
-"""What the views need to know of a motion, and the few numbers they work out from it."""
+"""Interface of a motion for the views: contact forces, activations, interpolated columns."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from osimlite.view.scene import Bodies, Color, Scene
 
 
 class ShownMotion(Protocol):
-    """A recorded motion of n moments: a Trajectory, or anything like it."""
+    """Recorded motion at n times, for example a Trajectory."""
 
     @property
     def times(self) -> Array:
-        """Moments (n,), s."""
+        """Times (n,), s."""
 
     @property
     def coordinates(self) -> Sequence[str]:
@@ -45,8 +45,7 @@ class ShownMotion(Protocol):
 class ContactForce(NamedTuple):
     """Force (n, 3) in ground of the force element `element` on the frame `frame`, N.
 
-    `torques` (n, 3), N·m, are about the origin of the frame's body, or None if they are not on
-    record.
+    `torques` (n, 3), N·m, are about the origin of the frame's body; None if they are not recorded.
     """
 
     element: str
@@ -103,12 +102,12 @@ def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
 
 
 def activity_color(activation: float) -> Color:
-    """Return the colour of a muscle, as OpenSim has it: from blue to red."""
+    """Return the colour of a muscle at an activation of 0 (blue) to 1 (red), as in OpenSim."""
     return activation, 0.0, 1.0 - activation
 
 
 def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
-    """Return which bodies (b + 1,) move between poses; all but ground if none does."""
+    """Return a mask (b + 1,) of the bodies that move between poses; all but ground if none does."""
     rotations = np.array([p.rotations for p in poses])
     origins = np.array([p.origins for p in poses])
     # Rotations and origins that change by rounding do not count.

@@ -25,11 +25,11 @@ _TITLES = {
     "passive_fiber_force": "Passive fiber force along the tendon",
 }
 MAX_LINE_PANELS = 6
-"""Panels of a page of curves, each with up to seven muscles."""
+"""Number of panels on a page of curves, each with up to seven muscles."""
 MAX_MAPS = 12
-"""Maps of a page."""
+"""Number of maps on a page."""
 MAPS_ACROSS = 4
-"""Maps side by side."""
+"""Number of maps side by side."""
 
 
 def plot_muscles(
@@ -49,7 +49,7 @@ def plot_muscles(
         mechanism: mechanism of the model.
         folder: folder to write into; it is made if it does not exist.
         other: curves of the same muscles in the same poses of another model, drawn thin.
-        regions: bodies between which the muscles run, by name.
+        regions: for each muscle by name, the bodies between which it runs.
 
     Returns:
         The PNG files: ``moment_arm_knee_angle_r.png``, ``tendon_force.png``, and further pages as
@@ -136,7 +136,7 @@ def _draw_lines(
         row_count = ceil(len(page) / column_count)
         figure = make_figure(f"{title}{count}", (6.5 * column_count, 0.6 + 2.9 * row_count))
         axes = figure.subplots(row_count, column_count, squeeze=False).ravel()
-        # Panels that are not needed leave the page.
+        # Unused panels are removed from the page.
         for panel in axes[len(page) :]:
             panel.remove()
         for panel, (region, pairs) in zip(axes, page, strict=False):
@@ -148,7 +148,7 @@ def _draw_lines(
 
 
 def _widen_constant(panel: Any) -> None:
-    """Give a panel whose curves are constant a range in which rounding errors do not show."""
+    """Widen the range of a panel whose curves are constant, so that rounding errors do not show."""
     lowest, highest = panel.dataLim.intervaly
     size = max(abs(lowest), abs(highest))
     # Matplotlib would show the noise of a constant in full height.

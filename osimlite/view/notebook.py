@@ -1,9 +1,8 @@
-"""What Jupyter shows of models, motions, findings, paths and sweeps: HTML, with the page of the viewer inside.
+"""HTML of models, motions, findings, paths and sweeps for Jupyter, with the embedded viewer.
 
-The page stands in an ``<iframe>`` whose text is all there: it asks no network for anything, has no
-more rights than to run its own program, and so works in the sandboxed frames of VS Code and Colab
-as well. A class says which of these functions shows its objects, see
-:func:`osimlite.base.lazy.make_notebook_repr`.
+The page is embedded as the text of an ``<iframe>``. It makes no network requests and may only run
+its own scripts, so it also works in the sandboxed frames of VS Code and Colab. Each class names its
+function of this module, see :func:`osimlite.base.lazy.make_notebook_repr`.
 """
 
 from __future__ import annotations
@@ -40,14 +39,14 @@ MOST_BYTES = 12_000_000
 """Largest size of an embedded page, compressed and in base64."""
 
 FIRST_ROWS = 10
-"""Rows of results that are shown."""
+"""Number of rows of results that are shown."""
 
 HEIGHT = 460
-"""Of the page, and of a table at most, pixels."""
+"""Height of the page, and largest height of a table, pixels."""
 
 COLORS = {"error": "#d1242f", "warning": "#b97700", "info": "#5d6b7a"}
 
-# The page unpacks itself in the frame: notebooks store less, and need no server.
+# The page decompresses itself in the frame: notebooks are smaller, and need no server.
 _UNPACK = """<!doctype html><meta charset="utf-8"><script>
 new Response(new Blob([Uint8Array.from(atob("@PAGE@"), (c) => c.charCodeAt(0))]).stream()
   .pipeThrough(new DecompressionStream("gzip"))).text()
@@ -56,7 +55,7 @@ new Response(new Blob([Uint8Array.from(atob("@PAGE@"), (c) => c.charCodeAt(0))])
 
 
 def model(shown_model: Model) -> str:
-    """Return the HTML of the component tree and of the model in space."""
+    """Return the HTML of the component tree of a model and of its geometry."""
     tree = shown_model.tree()
     components = [component for component in tree.components if not tree.is_internal(component)]
     children: dict[int, list[Component]] = {}
@@ -121,7 +120,7 @@ def findings(report: Report) -> str:
 
 
 def paths(model_paths: Paths) -> str:
-    """Length and moment arms of each path in the default pose."""
+    """Return an HTML table with length and moment arms of each path in the default pose."""
     lengths, arms = model_paths.lengths({}), model_paths.moment_arms({})
     cells = (
         [
@@ -139,7 +138,7 @@ def paths(model_paths: Paths) -> str:
 
 
 def muscle_curves(curves: MuscleCurves) -> str:
-    """Return a table of the least and greatest values of each muscle as HTML."""
+    """Return an HTML table of the least and greatest values of each muscle."""
     from osimlite.simulation.muscle_curves import QUANTITIES
 
     ranges = (
@@ -155,7 +154,7 @@ def muscle_curves(curves: MuscleCurves) -> str:
 
 
 def runs(outcome: Outcome) -> str:
-    """Return the HTML of the first rows of a sweep."""
+    """Return an HTML table of the first runs of a sweep."""
     table = outcome.to_arrow()
     rows = table.slice(0, FIRST_ROWS).to_pylist()
     cells = ([_format_number(value) for value in row.values()] for row in rows)
@@ -175,7 +174,7 @@ def optimum(best: Optimum) -> str:
 
 
 def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
-    """Return an iframe with the viewer, or a sentence with the reason why it cannot be shown."""
+    """Return an iframe with the viewer, or a sentence with the reason why there is none."""
     file = None if shown_model.layout is None else shown_model.layout.file
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
     try:
@@ -197,7 +196,7 @@ def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
         )
     remarks = "".join(f"<div>{escape(remark)}</div>" for remark in viewed.remarks)
     return (
-        # sandbox: the page may run its scripts, and nothing else.
+        # sandbox: the page may run its scripts only.
         f"<iframe srcdoc='{escape(_UNPACK.replace('@PAGE@', encoded))}' sandbox='allow-scripts' loading='lazy' "
         f"style='width:100%;height:{HEIGHT}px;border:1px solid #d9dfe6;border-radius:6px'></iframe>{remarks}"
     )

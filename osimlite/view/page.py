@@ -1,4 +1,4 @@
-"""A scene as one page for a browser: the data it shows, and the text of the page with everything it needs inside."""
+"""Self-contained HTML page that shows a scene: its data, and its text with all scripts."""
 
 from __future__ import annotations
 
@@ -33,33 +33,33 @@ from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
 
 SCRIPTS = ("mechanism.js", "tubes.js", "stage.js", "panels.js", "curves.js", "viewer.js")
-"""The parts of the page's own program, in their order."""
+"""Scripts of the page, in the order in which it runs them."""
 
 TRAVELS = 0.5
-"""The camera follows a motion at first if its middle goes further than this part of the model's size."""
+"""Travel of the model, relative to its size, beyond which the camera follows it at first."""
 
 MOMENTS = 25
-"""At so many moments of a motion it is looked how much of space it takes."""
+"""Number of poses along a motion that determine its bounding box."""
 
 
 class Story(NamedTuple):
     """Description of a motion and links to other pages; a page with a story plays its motion when it is opened."""
 
-    words: str  # what there is to see
-    command: str  # that makes more of it, for a terminal
+    words: str  # description of the motion
+    command: str  # command for a terminal that continues from here
     page: str  # name of the file of this page
-    # titles and files of all pages that belong together, in one folder
+    # title and file name of each linked page, in the same folder
     pages: Sequence[tuple[str, str]]
 
 
 def page_text(data: Mapping[str, Any]) -> str:
-    """Return the page (HTML) that shows data from :func:`page_data`."""
+    """Return the HTML page that shows the data from :func:`page_data`."""
     web = files("osimlite.view").joinpath("web")
 
     def read(name: str) -> str:
         return web.joinpath(name).read_text(encoding="utf-8")
 
-    # No "</script" may end the data early; in JSON the sign can be written by its number.
+    # No "</script" may end the data early, so "<" is written by its number in JSON.
     data_text = json.dumps(
         data, ensure_ascii=False, separators=(",", ":"), allow_nan=False
     ).replace("<", "\\u003c")
@@ -70,8 +70,7 @@ def page_text(data: Mapping[str, Any]) -> str:
         "@SCRIPT@": "".join((kernels_text(data["program"]), *map(read, SCRIPTS))),
         "@DATA@": data_text,
     }
-    # All at once: a model may be called "@DATA@", and a part that is in place already is no
-    # template.
+    # All placeholders are replaced at once, since a model may be called "@DATA@".
     return re.sub("|".join(replacements), lambda match: replacements[match[0]], read("page.html"))
 
 
@@ -89,26 +88,26 @@ def page_data(
     """Collect the data of the page.
 
     Args:
-        model: what to show.
-        scene: of that model.
-        motion: how it moves, or None.
-        findings: of the validator.
-        q: coordinate values (n,) at first.
-        server: whether a program answers the page, which then asks it for poses that fulfil the
-            constraints.
-        story: text about the motion, or None.
+        model: model to show.
+        scene: scene of `model`.
+        motion: motion to play; None for a still model.
+        findings: findings of the validator on the model.
+        q: coordinate values (n,) of the first pose; a motion starts at its own first row instead.
+        server: whether a server answers the page, so that the page may request poses that fulfil
+            the constraints.
+        story: text about the motion; None for none.
 
     Returns:
         Plain data for JSON, without NaN and infinite numbers.
     """
     mechanism = scene.mechanism
     motion_data = None if motion is None else _describe_motion(scene, motion)
-    # With a motion the page starts at its first moment.
+    # With a motion the page starts at its first row.
     start = q if motion is None else get_values(motion, mechanism)[0]
     lowest, highest = np.array(scene.compute_box(q) if motion_data is None else motion_data["box"])
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
-    # Couplers are solved in the page; others are listed.
+    # Couplers are solved in the page; the other constraints are listed by name.
     couplers = [
         constraint for constraint in mechanism.constraints if isinstance(constraint, Coupler)
     ]
@@ -155,7 +154,7 @@ def page_data(
             "findings": finding_rows(findings),
             "pins": place_pins(model, scene, findings),
             "remarks": [list(remark) for remark in scene.remarks],
-            # Missing meshes are among the findings.
+            # Missing meshes are among the findings, and need no note.
             "notes": [*describe_left_out(scene.remarks, with_meshes=False)],
         }
     )
@@ -291,7 +290,7 @@ def _describe_measured_markers(markers: MeasuredMarkers | None) -> dict[str, Any
 
 
 def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
-    """Return what the camera follows and the bounding box of the motion.
+    """Return the moving bodies, their mean position, their travel, and their bounding box.
 
     If the model travels, the box is relative to the moving bodies, because the camera follows them.
     """
@@ -317,8 +316,8 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
 
 
 def _choose_directions(up: Array) -> tuple[Array, Array]:
-    """Unit vectors (3,) to the front and to the right. OpenSim's models face +X, and have Z on their right."""
-    # OpenSim's models have Y up.
+    """Return unit vectors (3,) to the front and right of the model, perpendicular to `up`."""
+    # OpenSim's models have Y up, face +X and have Z on their right.
     if abs(up[1]) > 0.9:
         return np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
     front = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
@@ -327,7 +326,7 @@ def _choose_directions(up: Array) -> tuple[Array, Array]:
 
 
 def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
-    """Return the frame whose X-Z plane is the grid: the model's contact half space, or a level floor."""
+    """Return body and frame of the grid (its X-Z plane): a contact half space or a level floor."""
     bodies = scene.compute_poses(q)
     for drawn_item in scene.iterate_visible_items():
         outward = -bodies.transform_frame(drawn_item.body, drawn_item.matrix)[:3, 0]
@@ -348,7 +347,7 @@ def _list_directions(up: Array) -> dict[str, list[float]]:
     """Return the named view directions, from the model towards the viewer, in ground."""
     front, side = _choose_directions(up)
     home = front + 0.35 * up + 1.3 * side
-    # Straight from above, up is no direction in the picture.
+    # Straight from above, `up` would have no direction in the picture.
     return {
         name: vector.tolist()
         for name, vector in (

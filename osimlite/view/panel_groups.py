@@ -1,4 +1,4 @@
-"""Columns of tables as panels of curves: left and right of a quantity together, in one unit."""
+"""Grouping of table columns into panels: left and right of a quantity together, in one unit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.bands import Band
 
 MAX_CONSTANTS = 12
-"""Constant curves that the note of a page names."""
+"""Number of constant curves that the note of a page names."""
 RELATIVE_CHANGE = 1e-9
 """A curve whose range is below this part of its largest value is constant."""
 FRACTION = "0–1"
@@ -52,7 +52,7 @@ class StepTimes(Protocol):
 
 
 class Column(NamedTuple):
-    """A quantity over time, or over whatever a page has as its abscissa."""
+    """Quantity over time or over another abscissa of a page."""
 
     name: str  # name with its side, such as "hip_flexion_r"
     unit: str  # unit, "" for numbers without one
@@ -136,7 +136,7 @@ def _mirror(name: str) -> str:
 
 
 def _trim(name: str) -> str:
-    """Remove the separators that a side has left."""
+    """Remove the separators that remain when a side is cut out of a name."""
     return re.sub(r"(?<=[._/ ])[._ ]+|^[._/ ]|[._/ ]$", "", name)
 
 
@@ -162,14 +162,14 @@ def group_columns(
     Columns without any change have no panel, but the note of their section names them.
 
     Args:
-        columns: columns, each (n,).
-        times: abscissa (n,).
-        steps: steps by side, over which curves are cut into gait cycles.
+        columns: columns to draw, each with n values.
+        times: abscissa (n,), in seconds if `steps` are given.
+        steps: steps by side, which divide the curves into gait cycles.
         style: line style of the curves.
-        label: name of the curves in the legend.
+        label: name of the curves in the legend, "" for none.
 
     Returns:
-        The panels, with those of one group one after the other, and the notes by section.
+        The panels, those of one group one after the other, and the notes by section.
     """
     all_columns = list(columns)
     sides = split_sides(column.name for column in all_columns)
@@ -221,8 +221,8 @@ def _describe_constant(column: Column, values: Array) -> str:
     """Return name and value of a column that does not change, for the note below the panels.
 
     Args:
-        column: the column.
-        values: its values (n,), of which those that are not finite are unknown.
+        column: column that does not change.
+        values: values of the column (n,); numbers that are not finite count as unknown.
     """
     finite_values = values[np.isfinite(values)]
     if not finite_values.size:

@@ -1,4 +1,4 @@
-"""Pages of panels with curves, at most twelve on a page, and the pictures of them."""
+"""Drawing of panels with curves on pages of at most twelve panels."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ STYLES = ("-", "--", ":")
 """Line styles; when all colors are used, they are used again with the next style."""
 
 MAX_PANELS = 12
-"""Panels of one page: more cannot be read on one screen."""
+"""Number of panels on a page: more cannot be read on one screen."""
 MAX_COLUMNS = 3
-"""Panels side by side, each at least 3.5 inches wide."""
+"""Number of panels side by side, each at least 3.5 inches wide."""
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Points of the gait cycle at which curves are drawn, %."""
 MAX_LIMIT_DISTANCE = 0.5
@@ -91,7 +91,7 @@ def draw_pages(
 
     Args:
         title: title of the figures; "" for none.
-        panels: what to draw; without any panel there is no figure.
+        panels: panels to draw; without any there is no figure.
         abscissa: label of the abscissa, where it is not the gait cycle.
         notes: sentences by section, below the panels on its last page. Those of sections without
             panels are on the last page of all.
@@ -370,7 +370,7 @@ def make_figure(
     Args:
         title: bold title at the top left.
         size: width and height, inches.
-        layout: how matplotlib places the axes; None if they have places.
+        layout: layout engine of matplotlib that places the axes; None if the caller places them.
 
     Raises:
         MissingDependency: matplotlib is not installed.
@@ -420,7 +420,7 @@ def render_png(figure: Any, dpi: float = DPI) -> bytes:
     """Return a figure of matplotlib as a PNG file."""
     agg = require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
     buffer = io.BytesIO()
-    # `savefig` draws everything once more, only to lay the page out.
+    # `savefig` would draw everything once more, only for the layout.
     figure.set_dpi(dpi)
     agg.FigureCanvasAgg(figure).print_png(buffer)
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Pictures of a scene at a pose, drawn in software: for files, for films, and where there is no browser."""
+"""Pictures of a scene in a pose, rendered in software for files and animations."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FORCE = (0.835, 0.369, 0.0)
 TOUCHING = (0.969, 0.71, 0.22)
 """Colour of loaded contact surfaces."""
 
-# Axes of both: to the right, up, and towards the viewer.
+# Axes of both vectors: to the right, up, and towards the viewer.
 _KEY = np.array((-0.45, 0.75, 0.6)) / np.linalg.norm((-0.45, 0.75, 0.6))
 """Unit vector towards the key light, as seen by the viewer."""
 
@@ -46,22 +46,22 @@ _FILL = np.array((0.7, 0.1, 0.7)) / np.linalg.norm((0.7, 0.1, 0.7))
 _AMBIENT, _FROM_KEY, _FROM_FILL = 0.42, 0.46, 0.22
 
 _IN_GROUND = np.eye(4)
-"""Matrix of surfaces whose points are in ground."""
+"""Matrix (4, 4) of surfaces whose points are in ground."""
 
 _FROM_THE_EDGE = 0.02
-"""Sine of the angle below which a surface counts as seen from its edge."""
+"""Sine of the angle between view and plane below which a half space is drawn as a line."""
 
 _FINE = 2
-"""Pixels are drawn this many times finer than shown, so that edges are smooth."""
+"""Number of rendered pixels per pixel of the picture, along each axis, for smooth edges."""
 
 
 class Camera(NamedTuple):
-    """Looks at a model from infinitely far away."""
+    """Camera with parallel projection."""
 
     right: Array  # unit vector (3,) in ground that points to the right in the picture
-    up: Array  # unit vector (3,) that points up in it
-    center: Array  # the point (3,) of ground in the middle, m
-    half: tuple[float, float]  # half the width and half the height of what is seen, m
+    up: Array  # unit vector (3,) in ground that points up in the picture
+    center: Array  # point (3,) in ground in the middle of the picture, m
+    half: tuple[float, float]  # half the width and half the height of the visible region, m
 
     @property
     def towards(self) -> Array:
@@ -69,7 +69,7 @@ class Camera(NamedTuple):
         return np.cross(self.right, self.up)
 
     def project_points(self, points: Array, width: int, height: int) -> Array:
-        """Return pixels to the right and down, and depth (m), of points (..., 3) in a picture of that size."""
+        """Return pixels (right, down) and depth towards the viewer (m) of points (..., 3)."""
         away = points - self.center
         x = (away @ self.right / self.half[0] + 1.0) * (0.5 * width)
         y = (1.0 - away @ self.up / self.half[1]) * (0.5 * height)
@@ -79,7 +79,15 @@ class Camera(NamedTuple):
     def from_points(
         cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12
     ) -> Camera:
-        """Return the camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
+        """Return the camera that sees all points (k, 3).
+
+        Args:
+            points: points (k, 3) in ground that the picture shows, m.
+            up: vector (3,) in ground that points up in the picture.
+            direction: vector (3,) in ground from the model to the viewer, of any length.
+            aspect: width of the picture divided by its height.
+            margin: extent of the picture relative to that of the points.
+        """
         # `back` points from the model to the viewer.
         back = direction / np.linalg.norm(direction)
         right = np.cross(up, back)
@@ -93,14 +101,14 @@ class Camera(NamedTuple):
         half_width, half_height = np.maximum(
             margin * 0.5 * np.ptp(in_picture, axis=0), 1e-3
         ).tolist()
-        # The larger of both extents decides, by the shape of the picture.
+        # The shape of the picture decides which of the two extents counts.
         half_size = max(half_width, half_height * aspect), max(half_height, half_width / aspect)
         depth = float((points @ back).mean())
         return cls(right, upward, middle[0] * right + middle[1] * upward + depth * back, half_size)
 
 
 class ForceArrow(NamedTuple):
-    """A force to show: where it acts (3,) in ground, and the vector (3,), already as long as it is drawn, m."""
+    """Arrow of a force: its origin (3,) and its vector (3,), both in ground, in m."""
 
     point: Array
     vector: Array
@@ -108,7 +116,7 @@ class ForceArrow(NamedTuple):
 
 @dataclass(frozen=True)
 class Style:
-    """What else is in a picture: the height of a floor, surfaces (paths) shown as loaded, colours of lines by path."""
+    """Floor height (m, None for no floor), paths of loaded surfaces, colours of lines by path."""
 
     floor: float | None = None
     loaded: frozenset[str] = frozenset()
@@ -123,15 +131,16 @@ def draw_scene(
     arrows: Sequence[ForceArrow] = (),
     style: Style | None = None,
 ) -> Any:
-    """Draw a picture (pillow image) of a scene.
+    """Draw a scene in a pose as a pillow image.
 
     Args:
-        scene: what is to be seen.
-        q: coordinate values (n,).
-        camera: from where.
+        scene: scene to draw.
+        q: coordinate values (n,), rad or m.
+        camera: direction of view and visible region.
         size: width and height in pixels.
-        arrows: forces.
-        style: what else.
+        arrows: forces to draw as arrows.
+        style: floor, loaded surfaces and colours of lines; by default no floor and the scene's
+            colours.
 
     Raises:
         MissingDependency: pillow is not installed.
@@ -211,13 +220,13 @@ def _fill_background(
 
 
 def _lay_floor(triangles: _TriangleList, scene: Scene, height: float) -> None:
-    """Add a square mesh at a height over ground's origin, its lines half a metre apart."""
+    """Add the lines of a level floor at a height above ground's origin, m."""
     up = scene.up
     half_size = max(triangles.camera.half)
     first_axis = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
     first_axis /= np.linalg.norm(first_axis)
     second_axis = np.cross(first_axis, up)
-    # Lines at half a metre, at wider views at powers of ten.
+    # Lines are 0.5 m apart, in wider views a power of ten.
     step = 0.5 if half_size < 4.0 else 10.0 ** np.ceil(np.log10(half_size / 8.0))
     floor_extent = step * np.ceil(1.2 * half_size / step)
     center = triangles.camera.center
@@ -247,7 +256,7 @@ def _lay_floor(triangles: _TriangleList, scene: Scene, height: float) -> None:
 
 
 def _cut_half_space(triangles: _TriangleList, transform: Array) -> None:
-    """Add a half space seen from its edge: its line, and what is below it, behind everything else."""
+    """Add a half space seen from its edge: a line, and the region below it as background."""
     camera = triangles.camera
     inward = transform[:3, 0] / np.linalg.norm(transform[:3, 0])
     # Seen from above or below, the square of the half space is enough.
@@ -278,7 +287,7 @@ def _cut_half_space(triangles: _TriangleList, transform: Array) -> None:
 
 
 class _TriangleList:
-    """Triangles as they appear to a camera, lit, until all are drawn at once."""
+    """Lit triangles in the projection of a camera, collected to be drawn at once."""
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:
         self.camera, self.width, self.height = camera, width, height
@@ -299,12 +308,13 @@ class _TriangleList:
         """Add a surface to the list.
 
         Args:
-            surface: the surface.
-            matrix: affine matrix (4, 4) that places it in ground.
-            color: one colour, or those of its points (n, 3).
-            opacity: 0 to 1.
-            is_lit: whether light makes its sides differ.
-            in_front: whether it is drawn in front of all that is further away than 1 km.
+            surface: surface to draw.
+            matrix: affine matrix (4, 4) from the surface to ground, m.
+            color: red, green and blue (3,), or those of each point of the surface (n, 3), 0 to 1.
+            opacity: opacity from 0 to 1.
+            is_lit: whether brightness depends on the direction of the surface.
+            in_front: whether the surface is moved 1 km towards the viewer, to be in front of
+                everything.
         """
         points = surface.points @ matrix[:3, :3].T + matrix[:3, 3]
         vertices = self.camera.project_points(points, self.width, self.height)
@@ -313,7 +323,8 @@ class _TriangleList:
             vertices[:, 2] += 1e3
         shades = np.array(np.broadcast_to(np.asarray(color, dtype=float), points.shape))
         if is_lit:
-            # Normals follow the cofactors, which also serve what is stretched or flat.
+            # Normals transform with the cofactors of the matrix, which also exist if it is
+            # singular.
             linear_part = matrix[:3, :3]
             cofactors = np.cross(linear_part[[1, 2, 0]], linear_part[[2, 0, 1]])
             normals = unit_shapes.compute_normals(surface) @ cofactors.T @ self._axes.T
@@ -328,12 +339,12 @@ class _TriangleList:
             )
             shades *= light[:, None]
         corners, colors = vertices[surface.triangles], shades[surface.triangles]
-        # The far side is not drawn where it is hidden, nor of what shines through unless it is all
-        # there is of a sheet.
+        # Triangles that face away are left out if the surface is closed and opaque, where they are
+        # hidden, and in translucent surfaces. A sheet of one or two triangles keeps both sides.
         is_hidden = surface.is_closed and np.linalg.det(matrix[:3, :3]) > 0.0
         if is_hidden or (opacity < 1.0 and len(corners) > 2):
             (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))
-            # The sign of the area says which side is seen; the y axis of pictures points down.
+            # The sign of the area tells the side; the y axis of pictures points down.
             faces_viewer = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
             corners, colors = corners[faces_viewer], colors[faces_viewer]
         if opacity >= 1.0:
@@ -342,7 +353,7 @@ class _TriangleList:
             self._glassy.append((corners, colors, np.full(len(corners), opacity)))
 
     def draw_on(self, canvas: Canvas) -> None:
-        """Draw all triangles on a canvas: the translucent ones last, over the opaque ones."""
+        """Draw all triangles on a canvas, translucent ones after the opaque ones."""
         if self._solid:
             canvas.draw_opaque(
                 *(np.concatenate(column) for column in zip(*self._solid, strict=True))
@@ -354,11 +365,11 @@ class _TriangleList:
 
 
 def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
-    """Return the matrix (4, 4) that puts a unit cylinder along Z between two points."""
+    """Return the matrix (4, 4) that places a unit cylinder (along Z) between two points."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     z = axis / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
-    # An axis that is far from parallel to Z of the cylinder.
+    # Cross z with the coordinate axis that is farthest from parallel to it.
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
     matrix = np.eye(4)

@@ -24,18 +24,18 @@ from osimlite.view.panels import COLORS, STYLES, draw_pages, make_figure, name_p
 from osimlite.view.table_plots import ColumnNames, describe_columns
 
 Line = TypeVar("Line")
-"""Type of what is drawn as one line."""
+"""Type of the data of one line."""
 
 LINES_IN_PANEL = 7
-"""Lines of one panel: more cannot be told apart."""
+"""Number of lines in a panel: more cannot be told apart."""
 
 MOST_ENERGIES = 400
-"""Moments at which energy is worked out; more would not show."""
+"""Largest number of times at which energies are computed; more would not be visible."""
 
 STORED = "stored in contacts, springs, muscles"
 
 _NEVER_MIND = 1e-9
-"""A force below this part of the largest counts as none."""
+"""Force, relative to the largest one, below which there is no contact."""
 
 
 def plot_simulation(
@@ -44,13 +44,13 @@ def plot_simulation(
     """Draw the coordinates, states of muscles, forces, probes and energy of a motion over time.
 
     Args:
-        trajectory: the motion.
-        folder: where the pictures go; made if it is not there.
-        mechanism: what moves; the trajectory's own if left out. Without any, coordinates cannot be
-            told into angles and lengths, and there is no picture of the energy.
+        trajectory: motion to plot.
+        folder: output folder for the pictures; it is made if it does not exist.
+        mechanism: mechanism that moves; by default that of `trajectory`. Without any, coordinates
+            have no units, and there is no picture of the energy.
 
     Returns:
-        The PNG files, as far as there is something to show: ``coordinates.png``, ``states.png``,
+        The PNG files of the quantities that the motion has: ``coordinates.png``, ``states.png``,
         ``contact_forces.png``, ``other_forces.png``, ``probes.png`` and ``energy.png``; further
         pages are ``states-2.png`` and so on.
 
@@ -146,12 +146,12 @@ def _draw_table(
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
-    """Yield the forces, but only the first of an element with opposite forces on two frames."""
+    """Yield the forces; of two opposite forces of one element only the first."""
     by_element: dict[str, list[ContactForce]] = {}
     for force in forces:
         by_element.setdefault(force.element, []).append(force)
     for group in by_element.values():
-        # Force and reaction would be one curve over another.
+        # Force and reaction would be two curves, one over the other.
         opposite = len(group) == 2 and np.allclose(group[0].vectors, -group[1].vectors)
         yield from group[:1] if opposite else group
 
@@ -161,7 +161,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
         f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1)
         for force in forces
     }
-    # Noise of contacts that do not touch.
+    # Sizes below the threshold are noise of contacts that do not touch.
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
     active_sizes = {label: size for label, size in sizes.items() if size.max() > threshold}
     figure, (force_panel, contact_panel) = make_sheet(
@@ -172,7 +172,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     force_panel.set_ylim(bottom=0.0)
     for row, size in enumerate(active_sizes.values()):
         intervals = [
-            # A contact of one moment still gets a visible bar.
+            # A contact at a single time still gets a visible bar.
             (times[first], max(times[last] - times[first], 1e-3))
             for first, last in _find_spans(size > threshold)
         ]
@@ -223,7 +223,7 @@ def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
 def divide_among_panels(lines: Mapping[str, Line]) -> list[dict[str, Line]]:
     """Return the lines of each panel: equal numbers, at most `LINES_IN_PANEL` in one."""
     named_lines = list(lines.items())
-    # Panels of equal size, not a full one and a rest.
+    # All panels get about equal numbers of lines.
     size = ceil(len(named_lines) / ceil(len(named_lines) / LINES_IN_PANEL))
     return [dict(named_lines[first : first + size]) for first in range(0, len(named_lines), size)]
 
@@ -234,7 +234,7 @@ def _choose_style(number: int) -> dict[str, Any]:
 
 
 def draw_lines(panel: Any, abscissa: Array, lines: Mapping[str, Array], **style: Any) -> None:
-    """Draw lines over times, or whatever is across; with a style of their own they are not in the legend."""
+    """Draw lines over an abscissa. Lines with an explicit style are left out of the legend."""
     drawn_columns: list[Array] = []
     for number, (label, column) in enumerate(lines.items()):
         line_style = _choose_style(number)
@@ -243,8 +243,7 @@ def draw_lines(panel: Any, abscissa: Array, lines: Mapping[str, Array], **style:
             np.allclose(column, other_column, rtol=0.0, atol=tolerance, equal_nan=True)
             for other_column in drawn_columns
         ):
-            # What lies below shows through.
-            # The more curves are below, the shorter the dashes.
+            # A line that lies over others is dashed, the more of them, the shorter its dashes.
             line_style["ls"] = (
                 0.0,
                 (6.0 / (hidden_count + 1), 6.0 * hidden_count / (hidden_count + 1)),
@@ -262,7 +261,7 @@ def draw_lines(panel: Any, abscissa: Array, lines: Mapping[str, Array], **style:
 def finish_panels(
     panels: Sequence[Any], abscissa: Array, note: str, label: str = "time (s)"
 ) -> None:
-    """Give panels their grids, the lowest its label, and a note below."""
+    """Draw the grids of panels, the abscissa's label at the lowest one, and a note below."""
     for panel in panels:
         panel.grid(True, color="0.9", lw=0.8)
         panel.set_axisbelow(True)
@@ -285,7 +284,7 @@ def finish_panels(
 
 
 def _find_spans(mask: Array) -> list[tuple[int, int]]:
-    """First and last place of every run of true values."""
+    """Return the first and last index of every run of true values."""
     # Edges are where the mask changes; a zero on both sides closes runs at the ends.
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]

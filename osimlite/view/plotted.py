@@ -1,4 +1,4 @@
-"""Pages of plots of results, which notebooks show and which can be written as PNG."""
+"""Pages of plots, which notebooks show and which can be written as PNG files."""
 
 from __future__ import annotations
 
@@ -100,6 +100,6 @@ def _plot_columns(table: StoTable, names: ColumnNames) -> Pages:
 
 
 def _require_times(count: int) -> None:
-    """Raise an error if there is nothing to draw."""
+    """Raise an error if a motion or table has no rows."""
     if not count:
         raise OsimliteError("the motion has no moments; nothing can be drawn")

@@ -1,4 +1,4 @@
-"""The contact forces of a motion, where they act."""
+"""Contact forces of a motion, with the points where they are drawn."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from osimlite.view.motion import ShownMotion, contact_forces, interpolate_column
 from osimlite.view.scene import Bodies, ForceAnchor, Scene
 
 LONGEST_ARROW = 0.4
-"""Length of the largest force's arrow as a part of the model's size."""
+"""Length of the arrow of the largest force, relative to the model's size."""
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnForce:
-    """A contact force at n moments, on a body of the scene."""
+    """Contact force at n times on a body of the scene."""
 
-    anchor: ForceAnchor  # the element, and the body
-    forces: Array  # (n, 3) in ground, N
-    # (n, 3) in ground about the body's origin, N·m, or None if they are not on record
+    anchor: ForceAnchor  # contact element and body
+    forces: Array  # forces on the body (n, 3) in ground, N
+    # moments (n, 3) in ground about the body's origin, N·m; None if they are not recorded
     torques: Array | None
 
     def locate_point(self, number: int, bodies: Bodies) -> Array:
         """Return the point (3,) in ground where the force is drawn.
 
-        It is the point of the line of action that is nearest to the middle of the contact surface.
-
-        A force F with the moment M about the origin acts along the line through F × M / F².
+        It is the point of the line of action nearest to the middle of the contact surface. A force
+        F with the moment M about the origin acts along the line through F × M / F². Without a
+        moment, or without a force, it is the middle of the surface.
         """
         surface_point: Array = bodies.transform_points(self.anchor.body, self.anchor.near[None, :])[
             0
@@ -55,9 +55,9 @@ class DrawnForces:
 
     @classmethod
     def from_motion(cls, scene: Scene, motion: ShownMotion, times: Array) -> DrawnForces:
-        """Return the recorded forces of a motion at other times (n,).
+        """Return the recorded forces of a motion, interpolated at times (n,), s.
 
-        Surfaces of one element on one body share a record, and are shown once.
+        Surfaces of one element on one body share a record, and have one force.
         """
         forces = {(force.element, force.frame): force for force in contact_forces(motion)}
         result: dict[tuple[str, str], DrawnForce] = {}
@@ -84,13 +84,13 @@ class DrawnForces:
 
     @property
     def largest(self) -> float:
-        """The largest component of any force, N."""
+        """Largest absolute component of any force, N; 0 without forces."""
         return max(
             (float(np.abs(push.forces).max(initial=0.0)) for push in self.forces), default=0.0
         )
 
     def locate_forces(self, number: int, bodies: Bodies) -> list[tuple[ForceAnchor, Array, Array]]:
-        """Return for each force at a moment where it acts, its point (3,) in ground and the force (3,), N."""
+        """Return anchor, point (3,), m, and vector (3,), N, in ground of each force at an index."""
         return [
             (push.anchor, push.locate_point(number, bodies), push.forces[number])
             for push in self.forces

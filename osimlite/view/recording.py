@@ -1,4 +1,4 @@
-"""Motions from files, with the contact forces that go with them."""
+"""Motions from files, with contact forces from another file or from the model."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from osimlite.view.motion import interpolate_columns
 
 
 class MeasuredMarkers(NamedTuple):
-    """Markers that were measured during a motion, and those of the model that go with them."""
+    """Measured positions of markers during a motion, and their stations in the model."""
 
-    names: Sequence[str]  # of the m markers
-    # the body of each (-1 for ground), and its place there (3,), m
+    names: Sequence[str]  # names of the m markers
+    # index of the body of each marker (-1 for ground), and its position in the body (3,), m
     stations: Sequence[tuple[int, Array]]
-    places: Array  # where they were measured (t, m, 3), m; NaN where one was not seen
+    places: Array  # measured positions (t, m, 3) in ground, m; NaN where a marker was not seen
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A motion from a file; the attributes are those of a :class:`osimlite.view.motion.ShownMotion`.
+    """Motion from a file, with the attributes of a :class:`osimlite.view.motion.ShownMotion`.
 
-    `remarks` are sentences on what the files do not say, `measured` the markers that it was found
-    from.
+    `remarks` are sentences about data that the files lack, `measured` the markers from which the
+    motion was computed.
     """
 
     times: Array
@@ -57,20 +57,20 @@ def read_recording(
 ) -> Recording:
     """Read the motion in a .sto or .mot file.
 
-    Coordinates that are not in it keep their default values, or follow others by their couplers.
-    Contact forces are those in the file `forces` (with the labels of OpenSim's ForceReporter);
-    without it they are computed, if the motion has speeds and osimlite knows the model's contacts.
+    Coordinates that the file lacks keep their default values, or follow others by their couplers.
+    Contact forces come from the file `forces` (with the labels of OpenSim's ForceReporter). Without
+    it they are computed if the file has speeds; forces that osimlite does not support are left out.
 
     Args:
-        model: what moves.
-        mechanism: of the same model.
-        path: of the motion.
-        forces: a file with forces, or None.
-        values: of coordinates by name that are to be the same all the time.
-        folder: where the model's file is, for the files that contact meshes name.
+        model: model that moves.
+        mechanism: mechanism of `model`.
+        path: motion file (.sto or .mot).
+        forces: file with forces; None to compute them.
+        values: coordinates by name (rad, m) that keep a constant value instead of that in the file.
+        folder: folder of the model's file, where the files of contact meshes are searched.
 
     Raises:
-        OsimliteError: a file is missing or no motion; see :meth:`.RecordedMotion.read`.
+        OsimliteError: a file is missing or is not a motion; see :meth:`.RecordedMotion.read`.
     """
     recorded_motion = RecordedMotion.read(mechanism, path)
     # The caller's values replace those of the file.
@@ -104,7 +104,7 @@ def read_recording(
 
 
 def _follow_couplers(mechanism: Mechanism, rows: Array, missing_names: set[str]) -> None:
-    """Give coordinates that are not on record the values that their couplers want; those may depend on each other."""
+    """Set coordinates that the file lacks, in place, by their couplers, which may form chains."""
     couplers = [
         constraint for constraint in mechanism.constraints if isinstance(constraint, Coupler)
     ]
@@ -113,7 +113,7 @@ def _follow_couplers(mechanism: Mechanism, rows: Array, missing_names: set[str])
         for constraint in couplers
         if mechanism.coordinates[constraint.dependent].name in missing_names
     ]
-    # A chain of couplers is complete after as many rounds as it is long.
+    # The values of a chain of couplers are complete after as many rounds as it has couplers.
     for coupler in couplers * len(couplers):
         arguments = list(coupler.independent)
         rows[:, coupler.dependent] = [coupler.function.evaluate(row[arguments])[0] for row in rows]
@@ -129,18 +129,18 @@ def compute_forces(
 ) -> dict[str, Array]:
     """Compute the values that OpenSim's ForceReporter would report at n states.
 
-    Forces that osimlite does not know are left out. No engine is needed.
+    Forces that osimlite does not support are left out. No engine is needed.
 
     Args:
-        model: whose forces.
-        mechanism: of the same model.
-        times: (n,), s.
-        values: of the coordinates (n, k).
+        model: model with the forces.
+        mechanism: mechanism of `model`.
+        times: times (n,), s.
+        values: coordinate values (n, k), rad or m.
         speeds: generalized speeds (n, k).
-        folder: where the model's file is, for the files that contact meshes name.
+        folder: folder of the model's file, where the files of contact meshes are searched.
 
     Returns:
-        Columns (n,) by label; empty if no force is supported.
+        Columns (n,) by label, in SI units; empty if no force is supported.
 
     Raises:
         OsimliteError: a file is missing or cannot be read.
@@ -159,7 +159,7 @@ def compute_forces(
 
 
 def _read_speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
-    """Generalized speeds (n, k) on record; None if those of a coordinate that is not locked are not."""
+    """Return generalized speeds (n, k) of a table; None if an unlocked coordinate lacks them."""
     speeds = np.zeros((len(table.times), len(mechanism.coordinates)))
     for index, coordinate in enumerate(mechanism.coordinates):
         label = f"{coordinate.path}/speed"

@@ -1,8 +1,8 @@
-"""A model, and how it moves, as a recording for Rerun (.rrd): bodies, meshes, paths, contact forces, and their curves.
+"""Export of a model and its motion as a recording for Rerun (.rrd), with bodies, forces and curves.
 
-Bodies are entities below ``model``, named by their component paths, with their shapes below them;
-lines and forces are in ground beside them. Everything is over the timeline ``time``, s. Curves are
-below ``coordinates`` (rad or m), ``activations`` and ``forces`` (N).
+Bodies are entities below ``model``, named by their component paths, with their shapes below them.
+Lines and forces are in ground. The timeline is ``time``, s. Curves are below ``coordinates`` (rad
+or m), ``activations`` and ``forces`` (N).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from osimlite.view.scene import Color, Scene
 
 
 def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Path) -> Path:
-    """Write what is shown of a model.
+    """Write the visible parts of a model, and their motion, as a .rrd file.
 
     Args:
-        scene: what there is to see.
-        q: coordinate values (n,), the pose of a model without motion.
-        motion: how it moves, or None.
-        path: the file to write.
+        scene: scene of the model.
+        q: coordinate values (n,), the pose of a model without motion; not used with a motion.
+        motion: motion of the model; None for a still scene.
+        path: file to write.
 
     Raises:
         MissingDependency: rerun-sdk is not installed.
@@ -46,7 +46,7 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     stream = recording.binary_stream()
 
     def make_entity(*path_parts: str) -> str:
-        # Paths of components begin with a slash, which would make an empty part.
+        # Component paths begin with a slash, which would give an empty part.
         return str(
             rr.new_entity_path(
                 [

@@ -1,7 +1,8 @@
-"""What there is to see of a model: surfaces, lines and frames, each fixed to bodies; the same for every kind of view.
+"""Drawable parts of a model (surfaces, lines and frames) for all kinds of view.
 
-Nothing here draws. The page in the browser, pictures and films are made of a :class:`Scene` and of
-coordinate values. Bodies are numbered as in the mechanism, -1 is ground.
+Each part is fixed to bodies. This module draws nothing: the page, pictures and animations are made
+from a :class:`Scene` and coordinate values. Bodies have their indices in the mechanism; -1 is
+ground.
 """
 
 from __future__ import annotations
@@ -24,34 +25,34 @@ Color = tuple[float, float, float]
 Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "frames"]
 
 LAYERS: tuple[Layer, ...] = ("geometry", "contact", "wrap", "markers", "paths", "springs", "frames")
-"""What can be shown or hidden as a whole."""
+"""Layers that can be shown or hidden."""
 
 SCENERY = 12.0
-"""How many times larger than the usual shape one may be and still be wanted whole in a picture; a long floor is not."""
+"""Size, relative to the median size of shapes, above which pictures may cut a shape off."""
 
 STEEPEST = 0.5
-"""Cosine between the vertical and the normal of a half space from which on it is ground, no wall."""
+"""Least cosine between the vertical and the normal of a half space that is a floor, not a wall."""
 
 _FEW = 1500
-"""So many points of a surface are no effort to follow."""
+"""Number of points of a surface up to which all are transformed; of others only a box is."""
 
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A surface in one colour, fixed to a body."""
+    """Surface in one colour, fixed to a body."""
 
     path: str  # absolute path of the component it shows
     layer: Layer  # what it belongs to
-    body: int  # that carries it
-    surface: int  # its place among the surfaces of the scene
-    matrix: Array  # (4, 4), of the surface in the body's frame; it may stretch and mirror
+    body: int  # index of the body that carries it, -1 for ground
+    surface: int  # index of the surface in the scene
+    matrix: Array  # (4, 4) from the surface to the body's frame, m; it may scale and mirror
     color: Color  # red, green, blue, 0 to 1
     opacity: float = 1.0  # 0 to 1
-    visible: bool = True  # whether the model wants it shown
+    visible: bool = True  # whether the model shows it
 
 
 class LinePoint(NamedTuple):
-    """A corner of a line: the body that carries it, and where it is (3,) in the body's frame, m."""
+    """Corner of a line: index of its body, and position (3,) in the body's frame, m."""
 
     body: int
     location: Array
@@ -59,19 +60,19 @@ class LinePoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Straight lines from corner to corner: the path of a muscle, a spring, a stick for a body without shape."""
+    """Polyline: the path of a muscle, a spring, or a stick that shows a body without geometry."""
 
     path: str  # absolute path of the component it shows
     layer: Layer  # what it belongs to
-    # two or more corners that are fixed to bodies, or the path whose corners they are
+    # Two or more corners that are fixed to bodies, or a path that computes its corners.
     course: tuple[LinePoint, ...] | TraceablePath
     color: Color  # red, green, blue, 0 to 1
-    radius: float = 0.004  # how thick to draw it, m
+    radius: float = 0.004  # radius of the drawn line, m
     visible: bool = True  # whether the model wants it shown
     wraps: tuple[str, ...] = ()  # paths of the wrap objects that it may bend around
     # radius of the drawn muscle fibers in their middle, m; 0 for lines without fibers
     fibers: float = 0.0
-    tendon: float = 0.0  # slack length of its tendon, m: half of it is at each end
+    tendon: float = 0.0  # tendon slack length, m; half of the tendon is drawn at each end
 
     @property
     def start(self) -> LinePoint:
@@ -80,14 +81,14 @@ class Line:
 
     @property
     def body(self) -> int | None:
-        """The body that all of it is fixed to, if there is one."""
+        """Index of the body to which all corners are fixed; None for several bodies or a path."""
         bodies = {point.body for point in self.course} if isinstance(self.course, tuple) else set()
         return bodies.pop() if len(bodies) == 1 else None
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """The three axes of a frame: its path, the body that carries it, its frame (4, 4) there, their length (m)."""
+    """Axes of a frame: component path, body, frame (4, 4) in the body, length of the axes (m)."""
 
     path: str
     body: int
@@ -97,9 +98,9 @@ class Axes:
 
 @dataclass(frozen=True, eq=False)
 class ForceAnchor:
-    """Where the force of a contact element is shown: its name, the body and the label in its record, and a point.
+    """Point where a contact force is shown: element, component path, body, labels of records.
 
-    `near` (3,) is a point of the body near which the force acts, in the body's frame.
+    `near` (3,) is the middle of the contact surface in the body's frame, m; `surface` is its path.
     """
 
     element: str
@@ -112,12 +113,12 @@ class ForceAnchor:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """A scene in a pose: where its bodies are, and its lines."""
+    """Pose of a scene: positions of its bodies and corners of its lines."""
 
-    scene: Scene  # that is posed
+    scene: Scene  # scene in this pose
     q: Array  # coordinate values (n,)
-    rotations: Array  # of the bodies in ground, (b + 1, 3, 3); the last one is ground itself
-    origins: Array  # of the bodies in ground, (b + 1, 3), m
+    rotations: Array  # rotations of the bodies to ground (b + 1, 3, 3); the last is ground itself
+    origins: Array  # origins of the bodies in ground (b + 1, 3), m
 
     @cached_property
     def lines(self) -> list[Array]:
@@ -134,13 +135,13 @@ class Bodies:
         ]
 
     def transform_points(self, body: int, points: Array) -> Array:
-        """Points (k, 3) of a body's frame, in ground."""
+        """Transform points (k, 3) from a body's frame to ground, m."""
         return cast("Array", points @ self.rotations[body].T + self.origins[body])
 
     def transform_frame(self, body: int, transform: Array) -> Array:
         """Return a transform (4, 4) from a body's frame to ground; it may contain a scale."""
         result = transform.copy()
-        # The scale in the upper part is kept.
+        # The rotation of the body keeps the scale in the upper part of the transform.
         result[:3, :3] = self.rotations[body] @ transform[:3, :3]
         result[:3, 3] = self.transform_points(body, transform[None, :3, 3])[0]
         return result
@@ -148,19 +149,19 @@ class Bodies:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What there is to see of a model."""
+    """Drawable parts of a model."""
 
-    mechanism: Mechanism  # moves it
-    surfaces: Sequence[Surface]  # that the items are made of
-    items: Sequence[Item]  # all surfaces in their places
+    mechanism: Mechanism  # mechanism that poses the bodies
+    surfaces: Sequence[Surface]  # surfaces of the items, which may share one
+    items: Sequence[Item]  # all surfaces with their bodies, frames and colours
     lines: Sequence[Line]  # all paths, springs and sticks
     axes: Sequence[Axes]  # all frames
-    force_anchors: Sequence[ForceAnchor] = ()  # where contact forces are shown
-    # the layers that the model wants to be shown at first
+    force_anchors: Sequence[ForceAnchor] = ()  # points where contact forces are shown
+    # Layers that the model shows at first.
     shown: frozenset[Layer] = frozenset(LAYERS)
-    # paths of the half spaces, whose items show a part of them
+    # Paths of the half spaces, whose items are squares of limited size.
     half_spaces: frozenset[str] = frozenset()
-    remarks: Sequence[tuple[str, str]] = ()  # what cannot be shown, as (component's path, sentence)
+    remarks: Sequence[tuple[str, str]] = ()  # path and reason of components that are not shown
 
     def compute_poses(self, q: Array) -> Bodies:
         """Return the poses of all bodies at coordinate values q (n,)."""
@@ -168,22 +169,23 @@ class Scene:
         return Bodies(self, state.q, state.rotations, state.origins)
 
     def compute_all_poses(self, rows: Array) -> list[Bodies]:
-        """Return the poses of all bodies and lines along a motion, and report how many are done.
+        """Return the poses of all bodies and lines along a motion, and report the progress.
 
         Args:
-            rows: coordinate values (t, n).
+            rows: coordinate values of t poses (t, n).
         """
         poses = []
         for row in watch_items("posing the model", rows):
             bodies = self.compute_poses(row)
-            # Tracing the paths takes most of the time; later it would be reported as no progress.
+            # Trace the paths here: they take most of the time, and later there would be no progress
+            # report.
             _ = bodies.lines
             poses.append(bodies)
         return poses
 
     @cached_property
     def polylines(self) -> Polylines:
-        """The paths among the lines."""
+        """Paths among the lines, to be traced together."""
         return Polylines(
             self.mechanism,
             [line.course for line in self.lines if not isinstance(line.course, tuple)],
@@ -197,7 +199,7 @@ class Scene:
         return -gravity / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
 
     def iterate_visible_items(self) -> Iterator[Item]:
-        """Return the items that the model does not hide."""
+        """Yield the items that the model and its layers show."""
         return (
             drawn_item
             for drawn_item in self.items
@@ -206,7 +208,7 @@ class Scene:
 
     @cached_property
     def large(self) -> frozenset[int]:
-        """Places of the items that are scenery: half spaces, and shapes far larger than most."""
+        """Indices of the scenery: half spaces, and items far larger than most."""
         sizes = np.array(
             [
                 float(np.linalg.norm(np.ptp(corners, axis=0)))
@@ -226,7 +228,7 @@ class Scene:
         )
 
     def compute_corners(self, drawn_item: Item) -> Array:
-        """Points (k, 3) around an item, in the body's frame: its own if they are few, else corners of a box."""
+        """Return points (k, 3) that bound an item in the body's frame: all, or corners of a box."""
         points = self.surfaces[drawn_item.surface].points
         # Eight corners of a box instead of all points: an outline is enough here.
         if len(points) > _FEW:
@@ -235,8 +237,11 @@ class Scene:
         return in_body
 
     def iterate_extents(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
-        """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
-        # -2 is no body: lines go from body to body.
+        """Yield body and points (k, 3) in ground of each visible item or line, without scenery.
+
+        A line that is not fixed to one body has the body -2.
+        """
+        # Lines between several bodies belong to none of them.
         for index, drawn_item in enumerate(self.items):
             if drawn_item.visible and drawn_item.layer in self.shown and index not in self.large:
                 yield (
@@ -273,11 +278,11 @@ class Scene:
         return lowest - margin, highest + margin
 
     def find_floor_height(self, q: Array) -> float:
-        """Height of the floor over ground's origin: 0, or under what is drawn if that reaches lower."""
+        """Return the floor's height above ground's origin, m: 0, or the lowest point if much lower."""
         box_minimum, box_maximum = self.compute_box(q)
         lowest = float((_box_corners(box_minimum, box_maximum) @ self.up).min())
         size = float(np.linalg.norm(box_maximum - box_minimum))
-        # A floor slightly below 0 is an effect of shapes that sink in.
+        # Shapes that reach slightly below 0 sink into the floor.
         return 0.0 if lowest >= -0.05 * size else lowest
 
 
@@ -295,10 +300,10 @@ def _box_corners(lower: Array, upper: Array) -> Array:
 def draw_sticks(
     mechanism: Mechanism, bodies: Iterable[int]
 ) -> Iterator[tuple[int, tuple[LinePoint, LinePoint]]]:
-    """Lines for bodies without shape, each as body and ends.
+    """Yield body and ends of sticks that show bodies without geometry.
 
-    They run from the body's own joint to the joints of what it carries, or to its mass centre if it
-    carries nothing.
+    A stick runs from the body's own joint to each joint of a body that it carries, or to its mass
+    centre if it carries none.
     """
     all_bodies = mechanism.bodies
 
@@ -308,7 +313,7 @@ def draw_sticks(
             index, (mobilizer.parent_frame if mobilizer.reversed else mobilizer.child_frame)[:3, 3]
         )
 
-    # Sticks go to the joints of all bodies that it carries.
+    # A body that carries several others has a stick to each joint.
     for index in bodies:
         ends = [
             find_joint(child_index)

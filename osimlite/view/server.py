@@ -1,4 +1,4 @@
-"""The page of a model served to the browser on this machine, with poses that fulfil the model's constraints."""
+"""Local web server for the page of a model, which computes poses that fulfil the constraints."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ _log = logging.getLogger(__name__)
 HOST = "127.0.0.1"
 _LONGEST = 1_000_000
 PATIENCE = 30.0
-"""A browser that says nothing for so long, in the middle of a question or between two, is hung up on (s)."""
+"""Time without data from the browser after which a connection is closed (s)."""
 
 
 class PageServer:
-    """Serves one page at ``http://127.0.0.1:<port>/`` until it is closed; use it in a ``with`` statement.
+    """Server of one page at ``http://127.0.0.1:<port>/``; a context manager that closes it.
 
-    Besides the page it answers ``POST /assemble`` with ``{"values": [...]}``, coordinate values in
-    the mechanism's order, by the nearest values that fulfil the constraints, or by ``{"error":
-    sentence}``; what is no such question, with the status 400.
+    Besides the page it answers ``POST /assemble`` with ``{"values": [...]}`` (coordinate values in
+    the mechanism's order). The answer has the nearest values that fulfil the constraints, or is
+    ``{"error": sentence}``. Other requests get an HTTP error status.
 
     Args:
         page: text of the page (HTML).
-        mechanism: whose constraints count.
-        port: to listen at; 0 for any that is free.
+        mechanism: mechanism whose constraints the poses fulfil.
+        port: port to listen at; 0 for any free port.
 
     Raises:
         OsimliteError: another program listens at the port.
@@ -86,7 +86,7 @@ class _QuietServer(ThreadingHTTPServer):
 
 
 class _BadQuestion(Exception):
-    """A question that cannot be answered, and with what status."""
+    """Request that cannot be answered, with its HTTP status."""
 
     def __init__(self, status: HTTPStatus, reason: str) -> None:
         super().__init__(reason)
@@ -115,7 +115,7 @@ def _make_handler(
             except _BadQuestion as problem:
                 status = problem.status
                 result = {"error": str(problem)}
-                # What is left of such a question is not the next one.
+                # The rest of a refused request is not the next request.
                 self.close_connection = True
             self._answer(status, json.dumps(result).encode(), "application/json")
 
@@ -123,7 +123,7 @@ def _make_handler(
             if not self._is_for_us() or self.path != "/assemble":
                 raise _BadQuestion(HTTPStatus.FORBIDDEN, "this server answers its own page only")
             length = self.headers.get("Content-Length", "")
-            # `int` would also accept signs, underscores and the digits of other scripts.
+            # `int` would also accept signs, underscores and digits of other scripts.
             if not (length.isascii() and length.isdigit() and len(length) < 20):
                 raise _BadQuestion(
                     HTTPStatus.BAD_REQUEST, "the question does not say how long it is"
@@ -133,31 +133,31 @@ def _make_handler(
             return self.rfile.read(int(length))
 
         def _is_for_us(self) -> bool:
-            # Pages of other origins may reach this port by a name of their own; they are not to
-            # read the model.
+            # Pages of other origins may reach this port by another host name; they may not read the
+            # model.
             return (self.headers.get("Host") or "").partition(":")[0] in (HOST, "localhost")
 
         def _answer(self, status: HTTPStatus, body: bytes, content_type: str) -> None:
             self.send_response(status)
             self.send_header("Content-Type", content_type)
             self.send_header("Content-Length", str(len(body)))
-            # The same address shows another model in the next run.
+            # The next run may show another model at the same address.
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
             self.wfile.write(body)
 
         def log_message(self, format: str, *args: Any) -> None:
-            """Say nothing of every request."""
+            """Write no log of requests."""
 
     return Handler
 
 
 def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
-    """Answer the request of the page for a pose that satisfies the constraints.
+    """Compute the pose nearest to the values of a request that fulfils the constraints.
 
     Args:
         mechanism: mechanism of the model.
-        question: JSON text of the request.
+        question: JSON text of the request, with one value per coordinate (rad, m).
 
     Returns:
         `values` of the coordinates, or `error` with a message.

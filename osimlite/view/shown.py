@@ -1,4 +1,4 @@
-"""A model made ready to be looked at: one scene for the page, the pictures and the server."""
+"""Model with scene, motion and findings, as the page, the pictures and the server show it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from osimlite.view.scene import Color, Scene
 from osimlite.view.server import PageServer
 
 HOME = (1.0, 0.35, 1.3)
-"""From where a picture is taken: so much to the front, up, and to the model's right."""
+"""Direction from the model to the viewer: components to the front, up, and to the right."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +46,12 @@ class Shown:
     """Model with its scene, motion and findings, ready to be shown.
 
     Attributes:
-        model: the model.
+        model: shown model, without parts that cannot be built.
         scene: drawable objects of the model.
-        q: coordinate values (n,) at first.
-        motion: how it moves, or None.
+        q: coordinate values (n,) of the first pose, rad or m.
+        motion: motion of the model; None for a still model.
         remarks: sentences about parts that cannot be shown.
-        checked: what the validator checks: the file of the model, or the model with all its parts.
+        checked: model or model file that the validator checks; None for `model`.
         mesh_folders: absolute paths of the folders with mesh files, for the validator.
     """
 
@@ -67,7 +67,7 @@ class Shown:
     def findings(self) -> Sequence[Finding]:
         """The findings of ``osimlite validate``, with the settings of the project.
 
-        The model is checked when they are first asked for, since pictures do without them.
+        The model is checked at the first access, since pictures do not need the findings.
         """
         config = Config(mesh_paths=self.mesh_folders)
         if isinstance(self.checked, Path):
@@ -90,35 +90,38 @@ class Shown:
         wrapping: str = OPENSIM,
         left_out: Sequence[tuple[str, str]] = (),
     ) -> Shown:
-        """Make a model ready.
+        """Build the scene of a model, read its motion, and describe parts that cannot be shown.
 
         Args:
-            model: which.
-            mechanism: of the same model, if it is at hand.
-            folders: where its mesh files are looked for besides the folder of `file`, as of
+            model: model to show.
+            mechanism: mechanism of `model`; built by default, without the parts that cannot be
+                built.
+            folders: further folders with mesh files, besides the folder of `file`, as for
                 `to_urdf`.
-            file: that the model was read from, so that findings know their lines; None: the model
-                itself is checked.
-            motion: how it moves, or the file (.sto, .mot) that says so.
-            forces: a file with contact forces, for a motion from a file.
-            values: of coordinates by name (rad, m); over a motion from a file they stay so.
-            wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-            left_out: paths of the parts that were taken out of `model` since they cannot be built,
-                with the reasons.
+            file: file of the model, which gives findings their lines; None to check the model
+                itself.
+            motion: motion, or path of its file (.sto, .mot); None for a still model.
+            forces: file with contact forces, used with a motion from a file.
+            values: coordinate values by name (rad, m); they replace those of a motion from a file.
+            wrapping: method of wrapping paths around surfaces, see
+                :class:`osimlite.simulation.Options`.
+            left_out: paths of the parts that were removed from `model` because they cannot be
+                built, with the reasons; not used without `mechanism`.
 
         Raises:
-            OsimliteError: a file is missing or not what it should be; no pose fulfils the
+            OsimliteError: a file is missing or invalid, or no pose fulfils the
                 constraints.
             SettingError: there is no such wrapping.
         """
-        # Parts that cannot be built are missing in the model that is shown, and have findings.
+        # The validator checks the complete model: parts that cannot be built are not shown, but
+        # have findings.
         checked: Model | Path = model if file is None else file
         if mechanism is None:
             model, mechanism, left_out = build_showable(model)
         mesh_folders = MeshFolders(None if file is None else file.parent, folders)
         scene = build_scene(model, mechanism, mesh_folders, wrapping)
         searched = tuple(str(folder.resolve()) for folder in mesh_folders.searched)
-        # What could not be built is said before what could not be drawn.
+        # Reasons why parts cannot be built precede those why parts cannot be drawn.
         if left_out:
             scene = replace(scene, remarks=[*left_out, *scene.remarks])
         remarks = [*describe_left_out(scene.remarks)]
@@ -137,7 +140,7 @@ class Shown:
         )
 
     def write_page(self, path: str | Path, story: Story | None = None) -> Path:
-        """Write one self-contained page (HTML), which may tell something of the motion and play it at once."""
+        """Write one self-contained HTML page; with a story it plays the motion at once."""
         write_atomically(path, self.page_text(story))
         return Path(path)
 
@@ -146,26 +149,30 @@ class Shown:
         return write_glb(self.scene, self.q, self.motion, path)
 
     def write_rrd(self, path: str | Path) -> Path:
-        """Write a recording for Rerun (.rrd), with the motion if there is one; MissingDependency without rerun-sdk."""
+        """Write a recording for Rerun (.rrd), with the motion if there is one.
+
+        Raises:
+            MissingDependency: rerun-sdk is not installed.
+        """
         return write_rrd(self.scene, self.q, self.motion, path)
 
     def server(self, port: int = 0) -> PageServer:
-        """Serve the page at a port of this machine; 0 takes any that is free."""
+        """Return a server of the page at a port of this machine; 0 selects any free port."""
         data = page_data(self.model, self.scene, self.motion, self.findings, self.q, server=True)
         return PageServer(page_text(data), self.scene.mechanism, port)
 
     def write_picture(
         self, path: str | Path, size: tuple[int, int] = (1200, 900), time: float | None = None
     ) -> Path:
-        """Write a picture (PNG, or any form that pillow knows by its ending).
+        """Write a picture (PNG, or another format that pillow knows by the suffix).
 
         Args:
-            path: the file to write.
+            path: file to write.
             size: width and height in pixels.
-            time: the moment of the motion, s; the first one if left out.
+            time: time of the motion, s; by default the first one.
 
         Raises:
-            OsimliteError: the time is not in the motion, or the form is not known.
+            OsimliteError: the time is outside of the motion, or the format is unknown.
             MissingDependency: pillow is not installed.
         """
         scene, up = self.scene, self.scene.up
@@ -175,9 +182,9 @@ class Shown:
             *(p for _, p in scene.iterate_extents(bodies) if len(p)),
             *(arrow.point[None] for arrow in arrows),
         ]
-        # Of a model without bodies there is ground to see.
+        # Without bodies the picture shows ground.
         points = np.concatenate(visible_points or [np.array(scene.compute_box(q))])
-        # Any direction across the vertical will do if it is the X axis.
+        # Any horizontal direction will do if the X axis is vertical.
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
         camera = Camera.from_points(points, up, direction, size[0] / size[1])
@@ -195,7 +202,7 @@ class Shown:
     def _describe_moment(
         self, time: float | None
     ) -> tuple[Array, list[ForceArrow], frozenset[str], dict[str, Color]]:
-        """Coordinate values (n,), arrows, surfaces under load, and colours of muscles, at a time of the motion."""
+        """Return coordinate values (n,), arrows, loaded surfaces and muscle colours at a time."""
         motion = self.motion
         if motion is None:
             if time is not None:
@@ -209,8 +216,7 @@ class Shown:
         moment = np.array([first if time is None else time])
         values = get_values(motion, self.scene.mechanism)
         q = interpolate_columns(motion, values, moment)[0]
-        # The scale of arrows follows the largest force of the whole motion, so that pictures
-        # compare.
+        # Arrows are scaled by the largest force of the complete motion, so that pictures compare.
         largest_force = DrawnForces.from_motion(
             self.scene, motion, np.asarray(motion.times, dtype=float)
         ).largest

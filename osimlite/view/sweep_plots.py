@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.panels import COLORS, MAX_COLUMNS, MAX_PANELS, make_figure, write_pages
 
 MAX_VARIABLES = 12
-"""Variables over which a measure is drawn: those with the largest correlation."""
+"""Number of variables over which a measure is drawn: those with the largest correlation."""
 
 MEASURE_UNITS = {"distance": "m", "largest_force": "N", "energy": "J"}
 """Units of the measures that have names."""
@@ -131,12 +131,12 @@ def _draw_pages(
 
 
 def _draw_map(figure: Any, panel: Any, x: Array, y: Array, color: Array) -> None:
-    """Draw a measure over two quantities: cells of a grid, or points; runs without it are crosses."""
+    """Draw a measure over two quantities as grid cells or points; crosses are runs without it."""
     xs, ys = np.unique(x), np.unique(y)
-    # Every combination was run: cells of a grid.
+    # All combinations were run: draw the cells of a grid.
     if len(xs) * len(ys) == len(x) and len(xs) > 1 and len(ys) > 1:
         cells = np.full((len(ys), len(xs)), np.nan)
-        # By values, since runs may finish in any order.
+        # Cells are placed by values, since runs may finish in any order.
         cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = color
         mappable = panel.pcolormesh(xs, ys, cells, shading="nearest", cmap="viridis")
     else:

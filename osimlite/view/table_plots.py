@@ -34,10 +34,10 @@ from osimlite.view.panels import draw_pages, has_cycles, write_pages
 
 FORCE, MOMENT, POWER = "N", "N·m", "W"
 FORCE_OR_MOMENT = "N or N·m"
-"""Unit of an actuator about which nothing is known."""
+"""Unit of an actuator of unknown type."""
 
 SPEED = "m/s or rad/s"
-"""Unit of the speed of an actuator about which nothing is known."""
+"""Unit of the speed of an actuator of unknown type."""
 
 ACTIVATIONS = "Static Optimization"
 """First line of tables of activations, which have the controls of other actuators too."""
@@ -145,7 +145,7 @@ _RATES = {
 
 
 class ColumnNames(NamedTuple):
-    """What a model says about the columns of tables."""
+    """Units, groups and limits of table columns that follow from a model."""
 
     coordinates: Mapping[str, CoordinateInfo]  # coordinates by name
     units: Mapping[str, str]  # units of the forces of actuators by name
@@ -155,11 +155,11 @@ class ColumnNames(NamedTuple):
 
     @classmethod
     def from_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> ColumnNames:
-        """Return the names of a model; without a model or a mechanism theirs are missing.
+        """Return the names of a model; those that need a missing model or mechanism are left out.
 
         Args:
-            model: the model, with the actuators that a tool has added.
-            mechanism: mechanism of the model, for the coordinates.
+            model: model with the actuators that a tool has added; None if it is unknown.
+            mechanism: mechanism of the model, for the coordinates; None if it is unknown.
         """
         infos = (
             {coordinate.name: coordinate for coordinate in mechanism.coordinates}
@@ -210,8 +210,8 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
     """Return the columns of a table with their units and groups; angles are in degrees.
 
     Args:
-        table: the table.
-        names: what the model says about them.
+        table: table to describe.
+        names: names and units from the model.
     """
     columns: dict[str, list[Column]] = {}
     for label, values in table.table[1].items():
@@ -375,13 +375,13 @@ def plot_tables(
     Args:
         tables: tables by the names of their files, such as ``ik.mot``.
         folder: folder to write into; it is made if it does not exist.
-        names: what the model says about the columns.
-        steps: steps of the feet by side, if they are known.
+        names: names and units from the model.
+        steps: steps of the feet by side; None if they are unknown.
         report: called with the number of finished tables and the number of all.
         bands: reference bands by the title of their panel, drawn over the gait cycle.
 
     Returns:
-        The PNG files; a table in which nothing changes has none.
+        The PNG files; a table with fewer than two rows, or of constant columns only, has none.
 
     Raises:
         MissingDependency: matplotlib is not installed.

@@ -92,7 +92,7 @@ def lay_tube(
         corner_count: number of corners; without any there are no rings.
         thin: radius of the line and of tendons, m.
         thick: radius of the fibers in their middle, m; 0 for a line without fibers.
-        tendon: slack length of the tendon, m.
+        tendon: tendon slack length, m.
         growth: factor of all radii.
         rings: filled with `RING` records, at most `corner_count` + `MORE_RINGS`.
     """
@@ -115,7 +115,7 @@ def _place_rings(
     growth: float,
     rings: Floats,
 ) -> int:
-    """Write centres, radii and parts of the rings without those of the ends, and return the index after the last."""
+    """Write centres, radii and parts of rings except the ends; return the index after the last."""
     length = 0.0
     for k in range(1, corner_count):
         length += norm(minus(vector(corners, 3 * k), vector(corners, 3 * k - 3)))
@@ -244,7 +244,7 @@ def build_tube(line: Line, corners: Array) -> tuple[Surface, NDArray[np.bool_]]:
 
     Args:
         line: the line, with radius, fibers and tendon.
-        corners: its corners in ground (k, 3), m; at least one.
+        corners: corners of the line in ground (k, 3), m; at least one.
 
     Returns:
         The closed surface in ground, and which of its points (n,) belong to tendons.
