@@ -179,9 +179,9 @@ class _JavaScriptWriter(Kernel):
     """Writer of one function.
 
     Attributes:
-        functions: functions that it calls or passes on.
-        records: classes of named tuples that it makes.
-        written: its text.
+        functions: functions that the written function calls or passes on.
+        records: classes of the named tuples that it makes.
+        written: text of the function in JavaScript; empty until `write` has run.
     """
 
     written = ""
@@ -298,7 +298,7 @@ class _JavaScriptWriter(Kernel):
 
         Args:
             name: name of the counter.
-            iterated: what the loop is over.
+            iterated: expression that the loop iterates over: a call of range() or a tuple.
         """
         if not (isinstance(iterated, ast.Call) and self.value(iterated.func) is range):
             if not isinstance(iterated, ast.Tuple):

@@ -28,13 +28,13 @@ class TranslationError(UnsupportedError, NotImplementedError):
 
 
 class Kernel:
-    """One function as writers see it.
+    """Function of the package as the writers of C++ and JavaScript see it.
 
     Attributes:
-        function: the function.
-        tree: its syntax tree.
-        body: its statements without the docstring.
-        given: names of its arguments.
+        function: function of the package.
+        tree: syntax tree of the function.
+        body: statements of the function without the docstring.
+        given: names of the arguments of the function.
 
     Args:
         function: function of the package.
@@ -90,8 +90,9 @@ class Kernel:
         """Return the error for a part of the function without a counterpart in the language.
 
         Args:
-            node: the part of the function.
-            reason: what is wrong with it, as a clause; empty if it is not supported at all.
+            node: syntax tree of the part.
+            reason: clause that explains the error; empty if the language has nothing like this
+                part.
         """
         text = " ".join(ast.unparse(node).split())
         text = text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}..."

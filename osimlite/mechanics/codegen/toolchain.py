@@ -195,7 +195,7 @@ def find_cross_compiler(platform: str) -> Compiler | None:
     """Return the compiler of the variable CXX, which compiles for another platform.
 
     Args:
-        platform: as in the tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64" or
+        platform: platform tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64" or
             "win_amd64".
     """
     compiler = find_compiler()

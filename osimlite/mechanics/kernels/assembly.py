@@ -98,16 +98,16 @@ def assemble_poses(
 
     Args:
         model: integers of a model, all of whose coordinates are degrees of freedom.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
-        y: workspace of a state.
-        f: workspace of its rates.
+        y: workspace for a state.
+        f: workspace for the rates of a state.
         p: integers of the assembly.
-        c: numbers of the assembly.
+        c: parameters of the assembly.
         w: workspace, see `assembly_work_size`.
-        frames: per pose the time (s) and the values of all degrees of freedom (n,).
-        solutions: filled per pose with the values that fulfil the constraints (n,), and its
-            `POSE_STATUS`.
+        frames: time (s), then values of all degrees of freedom, of each pose (count, 1 + n).
+        solutions: filled with the values that fulfil the constraints, then a `POSE_STATUS`, of each
+            pose (count, n + 1).
         count: number of poses.
     """
     a = Assembly(model, reals, data, y, f, p, c, w)

@@ -47,7 +47,7 @@ def chain_dynamics(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: filled with the mass matrix.
         y: state.
         f: rates of the coordinates, then the generalized forces, from which the bias is subtracted.
@@ -136,7 +136,7 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: filled at `CHAIN.WORK_JOINTS` and `CHAIN.WORK_SHARES`.
         y: state.
         f: rates of the coordinates.

@@ -164,11 +164,12 @@ def linearise_state(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         y: state.
-        f: workspace for its rates.
-        work: filled, see `condensation_size`.
+        f: workspace for the rates of the state.
+        work: filled with the matrices and the records of contacts and springs, see
+            `condensation_size`.
         is_evaluated: not 0 if the last evaluation was at this state.
 
     Returns:

@@ -155,7 +155,7 @@ def evaluate_series(terms: Floats, count: int, square: float) -> tuple[float, fl
 
     Args:
         terms: coefficients by rising powers.
-        count: their number.
+        count: number of coefficients.
         square: argument θ².
 
     Returns:

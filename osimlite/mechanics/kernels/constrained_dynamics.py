@@ -41,7 +41,7 @@ def constrained_dynamics(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results with the mass matrix.
         y: state.
         f: rates of the coordinates, then the generalized forces, which the accelerations replace.
@@ -75,7 +75,7 @@ def evaluate_constraints(model: Ints, reals: Floats, data: Floats, y: Floats, f:
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation up to velocities; the equations are filled.
         y: state.
         f: rates of the coordinates.

@@ -281,7 +281,7 @@ def differentiate_vector(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         vector_ints: integers of the vector.
         p: numbers of the vector.

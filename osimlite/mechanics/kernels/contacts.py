@@ -381,7 +381,7 @@ def apply_contact_force(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         item: offset of the contact's item.
         d: depth (m).
@@ -419,14 +419,14 @@ def contact_places(
 
     Args:
         model: integers of the model.
-        vectors: its numbers, in one row or several.
+        vectors: numbers of the model, in one row or several (rows, number_count).
         data: workspace of an evaluation.
         number_count: length of a row of numbers.
-        rows: number of the row of each state (k,).
+        rows: index in `vectors` of the row of each state (k,).
         states: states (k, y).
-        rates: workspace of a derivative (y,).
-        positions: filled per state and contact with the centre of surface 1, its normal, and the centre
-            of surface 2, in ground (k, P, 9).
+        rates: workspace for the rates of a state (y,).
+        positions: filled with the centre of surface 1, its normal, and the centre of surface 2, in
+            ground, of each state and contact (k, P, 9).
         count: number k of states.
 
     Returns:

@@ -76,7 +76,8 @@ class CRITERION_NUMBERS(metaclass=Record):
         START, STOP: times between which it is active (s).
         FACTOR, LOW, HIGH: of a range, factor of the number, smallest and largest value.
         LINEAR, SQUARED: of a range, penalties of the excess and of its square.
-        HEIGHT: of a gait or jump, smallest height of the mass centre relative to that at the start.
+        HEIGHT: of a gait or jump, smallest height of the mass centre, as a multiple of its height
+            at the start.
         LOAD, SHORTEST: of a gait, load of a foot in contact, and shortest duration of a step (s).
         PREPARE, AT_PEAK: of a jump, time to prepare (s), and whether it ends at the peak.
         SLOW, MASSES: of Wang's effort, part of slow fibers, and the masses of the muscles (kg).
@@ -108,7 +109,7 @@ class GAIT_WORK(metaclass=Record):
         BEFORE, HERE: distance of the walker at the last step, and now (m).
         HEIGHT: height of the mass centre at the start (m).
         FALLEN, COUNT: whether the walker has fallen, and the number of steps.
-        TOUCHES: per foot whether it is in contact, -1 if unknown.
+        TOUCHES: contact of each foot (2,): 1 if it touches the ground, 0 if not, -1 if unknown.
         STEPS: offset of the steps.
     """
 

@@ -47,18 +47,19 @@ SMALLEST_PIVOT = 1e-13
 
 
 def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
-    """Compute the derivative f of the state y = (q, u, z): coordinates, speeds, auxiliary states.
+    """Compute the rates f of the state y = (q, u, z): coordinates, speeds, auxiliary states.
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: filled with all intermediate results.
         y: state.
-        f: filled with the derivative.
-        stage: how far the evaluation goes, see `STAGE`.
+        f: filled with the rates of the state.
+        stage: last stage to evaluate, see `STAGE`.
 
     Returns:
-        `OUTCOME.OK` or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom without mass.
+        `OUTCOME.OK`, or the outcome of the law that failed; with SINGULAR_MASS, f[0] is the degree
+        of freedom without mass.
     """
     place_links(model, reals, data, y, f)
     if stage == STAGE.POSITION:
@@ -113,7 +114,7 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
         y: state.
         f: udot after the rates; replaced by the generalized forces (N, N m).
@@ -149,11 +150,12 @@ def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         reals: numbers of the model.
         data: filled with the results of the evaluation.
         y: state; auxiliary states of forces are changed.
-        f: workspace for its rates.
-        stage: how far the evaluation before goes, see `STAGE`.
+        f: workspace for the rates of the state.
+        stage: last stage to evaluate before, see `STAGE`.
 
     Returns:
-        `OUTCOME.OK` or what went wrong; with UNSOLVED, f[0] is the number of the first item that failed.
+        `OUTCOME.OK`, or the outcome of the evaluation that failed; with UNSOLVED, f[0] is the index
+        of the first item that failed.
     """
     status = call(model[MODEL.LAWS], model, reals, data, y, f, stage)
     if status != OUTCOME.OK:

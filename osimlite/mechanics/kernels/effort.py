@@ -95,12 +95,14 @@ def least_effort(
     """Distribute generalized forces over actuators with the least effort, frame by frame.
 
     Args:
-        sizes: see `EFFORT_SIZES`.
+        sizes: numbers of frames, equations and unknowns, see `EFFORT_SIZES`.
         numbers: exponent and bounds, see `EFFORT_NUMBERS`.
-        problems: per frame the columns of A (n, m) and the right side b (m,); scaled in place.
-        solutions: filled per frame with x (n,), the residual b - A x (m,) and 1.0 if solved, else 0.0.
-        work: workspace of `effort_size` numbers: zeros before the first frame; what it holds after a
-            call belongs to the frames that follow.
+        problems: columns of A (n, m), then right-hand side b (m,), of each frame (frames, n + 1,
+            m); scaled in place.
+        solutions: filled with x (n,), the residual b - A x (m,), and 1.0 if solved or 0.0 if not,
+            of each frame (frames, n + m + 1).
+        work: workspace of `effort_size` numbers: zeros before the first frame; after a call it
+            holds multipliers from which the next frames start.
 
     Returns:
         `OUTCOME.OK`.

@@ -150,7 +150,7 @@ def project_by_law(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t: time (s).
         y: state; changed.
@@ -192,7 +192,7 @@ def project_and_measure(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t1: time at the end of the step (s).
         y0: state at the start.

@@ -36,7 +36,7 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, off
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
@@ -85,7 +85,7 @@ def take_half_steps(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t0: time at the start (s).
         t1: time at the end (s).
@@ -128,12 +128,12 @@ def advance_state(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t: time at the end of the step (s).
         h: step (s).
         y: state at the start.
-        f: its derivative.
+        f: rates of the state y.
         new: filled with the state at the end.
         rates: workspace of a state.
 

@@ -278,9 +278,10 @@ class COORDINATE(metaclass=Record):
     """Integers of a coordinate in a constraint.
 
     Attributes:
-        DOF: its degree of freedom, -1 for a locked one.
-        BALL: offset of the degrees of freedom of its ball, or -1.
-        PART: its number among the angles of the ball.
+        DOF: degree of freedom, -1 for a locked coordinate.
+        BALL: offset of the degrees of freedom of the ball joint that the coordinate belongs to, or
+            -1.
+        PART: index of the coordinate among the angles of this ball joint.
     """
 
     DOF, BALL, PART, SIZE = range(4)
@@ -328,10 +329,10 @@ class JOINT(metaclass=Record):
     """Integers of a joint of another program.
 
     Attributes:
-        KIND: what it follows, see `JOINT_KIND`.
-        SOURCE: number of the degree of freedom or operation that it follows.
-        PART: component of that, or offset in reals of a factor.
-        FIRST_SHARE: its first share.
+        KIND: source type, see `JOINT_KIND`.
+        SOURCE: index of the degree of freedom or operation that the joint follows.
+        PART: component of the operation, or offset in reals of the factor of a degree of freedom.
+        FIRST_SHARE: index of the first share of the joint.
     """
 
     KIND, SOURCE, PART, FIRST_SHARE, SIZE = range(5)
@@ -519,13 +520,13 @@ class OUTCOME(metaclass=Record):
 
 
 class STAGE(metaclass=Record):
-    """How far an evaluation goes.
+    """Last stage of an evaluation.
 
     Attributes:
-        ACCELERATION: to the accelerations.
-        POSITION: to the poses of the links.
-        FORCE: to the forces; f then holds the generalized forces that items apply directly.
-        VELOCITY: to the velocities.
+        ACCELERATION: all stages, up to the accelerations.
+        POSITION: the poses of the links.
+        FORCE: positions, velocities and forces; f then holds the generalized forces.
+        VELOCITY: positions and velocities.
     """
 
     ACCELERATION, POSITION, FORCE, VELOCITY = range(4)

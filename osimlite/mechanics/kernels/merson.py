@@ -34,7 +34,7 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, off
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
@@ -71,7 +71,7 @@ def compute_stages(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t0: time at the start (s).
         t1: time at the end (s).

@@ -58,7 +58,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: filled with the poses.
         y: state; only the coordinates are used.
         f: scratch that laws may use.
@@ -159,10 +159,10 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: filled with velocities, accelerations and columns.
         y: state.
-        f: its first part is filled with the rates of the coordinates.
+        f: first part (n,) filled with the rates of the coordinates.
 
     Returns:
         `OUTCOME.OK`, or the outcome of a law that failed.

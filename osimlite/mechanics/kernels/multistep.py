@@ -165,7 +165,7 @@ def try_multistep(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end, then its derivative.
@@ -321,7 +321,7 @@ def iterate_newton(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t: time at the end of the step (s).
         c: coefficient of the formula (s).

@@ -118,10 +118,10 @@ def interpolate_cubic(
         size: length of a state.
         t0: time at the start of the step (s).
         y0: state at the start.
-        f0: its rates.
+        f0: rates of the state at the start.
         t1: time at the end of the step (s).
         y1: state at the end.
-        f1: its rates.
+        f1: rates of the state at the end.
         t: time within the step (s).
         y: filled with the state at t.
     """

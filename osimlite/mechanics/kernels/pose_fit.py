@@ -84,18 +84,19 @@ def fit_frames(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
-        y: state with the pose to start from, then the last pose.
-        f: workspace of a derivative.
+        y: state with the pose to start from; filled with the last pose.
+        f: workspace for the rates of a state.
         p: integers of the fit.
-        c: numbers of the fit.
+        c: parameters of the fit.
         v: workspace of the fit.
-        frames: per frame the positions of the markers (m, 3) in ground, the rotations of the sensors
-            (k, 3, 3), the values of the goals, and the prescribed values.
-        results: filled per frame with the values of all degrees of freedom, the fitted positions of the
-            markers (m, 3), the rotation vectors of the sensors from their measurements (k, 3), the cost,
-            the number of steps, and the status.
+        frames: positions of the markers (m, 3) in ground, rotation matrices of the sensors (k, 3,
+            3), values of the goals, and prescribed values, of each frame.
+        results: filled with the values of all degrees of freedom (n,), the fitted positions of the
+            markers (m, 3) in ground, the rotation vectors of the sensors from their measurements
+            (k, 3), the cost, the number of steps, and the status, of each frame (count, n + 3 m + 3
+            k + 3).
         count: number of frames.
 
     Returns:
@@ -284,11 +285,11 @@ def descend_from_start(
     """Descend from another start, and keep the better pose.
 
     Args:
-        m: the fit.
-        start: other start.
-        y: best pose so far; changed.
-        value: its cost.
-        status: its status.
+        m: inputs and workspace of the fit.
+        start: pose to start from (n,); overwritten.
+        y: best pose so far (n,); replaced if the other one is better.
+        value: cost of the best pose so far.
+        status: status of the best pose so far.
         damping: damping of the first step.
         lightest: smallest damping.
 
@@ -317,11 +318,11 @@ def try_opposite_limits(
     """Try each angle at an end of its range at the other end, and keep the best pose.
 
     Args:
-        m: the fit.
-        start: workspace of a start.
-        y: best pose so far; changed.
-        value: its cost.
-        status: its status.
+        m: inputs and workspace of the fit.
+        start: workspace for a pose (n,).
+        y: best pose so far (n,); replaced by a better one.
+        value: cost of the best pose so far.
+        status: status of the best pose so far.
         lightest: smallest damping.
 
     Returns:

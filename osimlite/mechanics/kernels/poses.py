@@ -27,7 +27,7 @@ def evaluate_states(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
         f: workspace of its derivative.
@@ -80,7 +80,7 @@ def push_each_actuator(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
         f: workspace of its derivative.
@@ -160,7 +160,7 @@ def evaluate_items(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
         f: workspace of its derivative.

@@ -34,7 +34,8 @@ def run_program(
     """Run a program and return its result.
 
     Args:
-        steps: per step its operation and two registers (count, 3); for a number its index in the constants.
+        steps: operation and two registers of each step (count, 3); for the operation "number" the
+            index in the constants instead of the first register.
         count: number of steps.
         constants: numbers of the formula.
         registers: the variables, then one register for the result of each step.

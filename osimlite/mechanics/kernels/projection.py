@@ -34,7 +34,7 @@ def project(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results; SCRATCH holds the tolerance, and the largest error to start from.
         y: state; changed.
         state_errors: estimated error of each entry of the state, whose normal component is removed.
@@ -105,7 +105,7 @@ def project_values(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results with the equations.
         y: state; its coordinates are changed.
         state_errors: estimated errors of the coordinates (n,), whose normal component is removed.
@@ -236,17 +236,17 @@ def normal_component(
     work: Floats,
     normal: Floats,
 ) -> None:
-    """Compute the component of some errors normal to factorised equations.
+    """Compute the component of a vector of errors normal to factorised equations.
 
     Args:
         model: integers of the model.
         count: number of equations.
-        rows: left sides of the equations (count, n).
-        factor: their factor.
-        state_errors: errors (n,).
+        rows: coefficients of the equations (count, n).
+        factor: factorisation of `rows`.
+        state_errors: vector of errors (n,).
         values: workspace (count,).
         work: workspace (count,).
-        normal: filled with the component (n,).
+        normal: filled with the normal component (n,).
     """
     size = model[MODEL.DOFS]
     for i in range(count):

@@ -129,11 +129,11 @@ def evaluate_state(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int
     """Evaluate a state at a time.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         t: time (s).
         y: state.
         f: filled with the rates.
-        stage: how far the evaluation goes, see `STAGE`.
+        stage: last stage to evaluate, see `STAGE`.
 
     Returns:
         Outcome of the evaluation, see `OUTCOME`.
@@ -156,13 +156,13 @@ def interpolate_state(
     """Compute the state at a time within a step, projected onto the constraints where possible.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         t0: time at the start of the step (s).
         y0: state at the start.
-        f0: its rates.
+        f0: rates of the state at the start.
         t1: time at the end of the step (s).
         y1: state at the end.
-        f1: its rates.
+        f1: rates of the state at the end.
         t: time within the step (s).
         y: filled with the state.
     """
@@ -203,10 +203,10 @@ def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     """Append a step to the log.
 
     Args:
-        m: the run, whose last evaluation was at time t.
+        m: inputs and records of the run, whose last evaluation was at time t.
         t: time at the end of the step (s).
-        y: state.
-        f: its rates.
+        y: state at the end of the step.
+        f: rates of the state y.
     """
     size, row = m.model[MODEL.STATE_SIZE], m.counts[COUNTS.LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
@@ -259,16 +259,16 @@ def note_events(
     previous_levels: Floats,
     next_levels: Floats,
 ) -> float:
-    """Record what began and ended within a step.
+    """Record the contacts and watches that began or ended within a step.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         t0: time at the start of the step (s).
         y0: state at the start.
-        f0: its rates.
+        f0: rates of the state at the start.
         t1: time at the end of the step (s).
         y1: state at the end.
-        f1: its rates.
+        f1: rates of the state at the end.
         previous_levels: levels at the start.
         next_levels: levels at the end, then workspace for levels.
 

@@ -77,7 +77,7 @@ class REFLEXES(metaclass=Record):
         KEPT, SENSORS: number of control steps that are remembered, and of sensors.
         HAS_STATES: whether legs have states.
         SWINGS_FROM_STANCE: whether a leg may go from stance to swing directly.
-        NUMBERS, WORKSPACE: lengths of the numbers and of the memory of a candidate.
+        NUMBERS, MEMORY_SIZE: lengths of the numbers and of the memory of a candidate.
         FIRST, ROWS: number of the first control step that is recorded, and of rows of the record.
         IS_NOISY: whether there is noise.
     """
@@ -249,13 +249,13 @@ def next_leg_state(
     """Return the next state of a leg.
 
     Args:
-        state: its present state.
+        state: present state of the leg, see `LEG_STATE`.
         limits: numbers of the leg, see `LIMITS`.
-        load: load on the leg over the weight.
+        load: ratio of the load on the leg to the body weight.
         other_stands: whether the other leg stands.
-        foot_offset: how far its foot is ahead (m).
-        other_foot_offset: how far the foot of the other leg is ahead (m).
-        is_direct: whether it may go from stance to swing directly.
+        foot_offset: distance of the foot of this leg ahead of the pelvis (m).
+        other_foot_offset: distance of the foot of the other leg ahead of the pelvis (m).
+        is_direct: whether the leg may go from stance to swing directly.
     """
     stands = load > limits[LIMITS.STANDS]
     swings = load <= limits[LIMITS.SWINGS]

@@ -108,7 +108,7 @@ def rosenbrock(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
@@ -184,7 +184,7 @@ def compute_stages(
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: results of an evaluation.
         t0: time at the start (s).
         step: step (s).

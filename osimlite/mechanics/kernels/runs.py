@@ -54,23 +54,24 @@ def run_several(
         data: workspace of an evaluation and of the method, shared.
         number_count: length of a row of numbers, 0 if all runs share one.
         sizes: sizes and settings, see `RUN_SIZES`.
-        clocks: per run time and next step to try (s).
-        counts: per run the counts, see `COUNTS`.
-        states: per run the state; changed.
+        clocks: time and next step to try of each run (s) (runs, 2); changed.
+        counts: counts of each run (runs, `COUNTS.SIZE`), see `COUNTS`; changed.
+        states: state of each run (runs, y); changed.
         times: times of the reports (s).
-        reports: per run the states at these times.
+        reports: filled with the states of each run at these times (runs, r, y).
         log: log of the steps, shared.
         forces: forces of contacts at the steps of the log, shared.
-        events: per run the events.
-        peaks: per run the largest forces of contacts.
-        watches: watches, see `Motion`.
-        levels: numbers of the watches.
+        events: filled with the events of each run, see `record.insert_event`.
+        peaks: filled with the largest force of each contact (N) and its time (s), for each run
+            (runs, P, 2).
+        watches: integers of the watches, see `record.Motion`.
+        levels: numbers of the watches, see `record.Motion`.
         endings: filled with the ending of each run, see `ENDING`.
         first: number of the first run.
-        stop: end of the runs.
+        stop: number after that of the last run.
 
     Returns:
-        `OUTCOME.OK`; how each run ended is in `endings`.
+        `OUTCOME.OK`; `endings` has the ending of each run.
     """
     runs = Motion(
         model,

@@ -101,19 +101,20 @@ def hold_several(
 
     Args:
         model: integers of the model.
-        reals: its numbers, shared; the controls are written to it.
+        reals: numbers of the model, shared by all copies; the controls are written to them.
         data: workspace of an evaluation and of the method, shared.
-        sizes: sizes and settings, see `record.MOST_TRIES`.
-        clocks: per copy time and next step to try (s).
-        counts: per copy the counts, see `record.TAKEN`.
-        states: per copy the state; changed.
-        peaks: per copy the largest forces of contacts.
+        sizes: sizes and settings, see `record.RUN_SIZES`.
+        clocks: time and next step to try of each copy (s) (copies, 2); changed.
+        counts: counts of each copy (copies, `COUNTS.SIZE`), see `record.COUNTS`; changed.
+        states: state of each copy (copies, y); changed.
+        peaks: largest force of each contact (N) and its time (s), for each copy (copies, P, 2);
+            changed.
         control_offsets: offsets in reals of the controls.
-        controls: per copy the controls.
+        controls: controls of each copy (copies, held_by).
         held_by: number of controls.
         running: filled with 1 for a copy that reaches the end of the step, else 0.
         first: number of the first copy.
-        stop: end of the copies.
+        stop: number after that of the last copy.
 
     Returns:
         `OUTCOME.OK`.
@@ -146,10 +147,10 @@ def select_motion(
         model: integers of the model.
         reals: numbers of the model.
         data: workspace of an evaluation and of the method.
-        sizes: sizes and settings, see `record.MOST_TRIES`.
-        clocks: per copy time and next step to try (s).
-        counts: per copy the counts, see `record.TAKEN`.
-        peaks: per copy the largest forces of contacts.
+        sizes: sizes and settings, see `record.RUN_SIZES`.
+        clocks: time and next step to try of each copy (s) (copies, 2).
+        counts: counts of each copy (copies, `COUNTS.SIZE`), see `record.COUNTS`.
+        peaks: largest force of each contact (N) and its time (s), for each copy (copies, P, 2).
         unused: any vector, in place of watches.
         k: number of the copy.
     """
@@ -206,37 +207,42 @@ def walk_several(
     first: int,
     stop: int,
 ) -> int:
-    """Carry out an order for the walks `first` to `stop` - 1, see `ORDER`.
+    """Carry out an order, or a number of control steps, for the walks `first` to `stop` - 1.
 
-    The first of all is recorded.
+    Control steps of the walk 0 are recorded.
 
     Args:
         model: integers of the model.
-        reals: its numbers, shared; the excitations are written to it.
+        reals: numbers of the model, shared by all walks; the excitations are written to them.
         data: workspace of an evaluation and of the method, shared.
-        sizes: sizes and settings, see `record.MOST_TRIES`.
-        clocks: per walk time and next step to try (s).
-        counts: per walk the counts, see `record.TAKEN`.
-        states: per walk the state; changed.
-        peaks: per walk the largest forces of contacts.
+        sizes: sizes and settings, see `record.RUN_SIZES`.
+        clocks: time and next step to try of each walk (s) (walks, 2); changed.
+        counts: counts of each walk (walks, `COUNTS.SIZE`), see `record.COUNTS`; changed.
+        states: state of each walk (walks, y); changed.
+        peaks: largest force of each contact (N) and its time (s), for each walk (walks, P, 2);
+            changed.
         senses: plan of the sensor rows, see `sensors.SENSES`.
         sensor_numbers: numbers of the sensor rows, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
-        numbers: per walk the numbers of the reflexes, see `reflexes.LIMITS`.
+        numbers: numbers of the reflexes of each walk (walks, `REFLEXES.NUMBERS`), see
+            `reflexes.LIMITS`.
         criteria: integers of the criteria, see `criteria.CRITERION`.
         bounds: numbers of the criteria.
-        work: per walk the memory of the reflexes and the criteria, see LEGS.
-        rows: per walk the sensor row.
-        excitations: per walk the excitations.
-        record: filled per control step of the first walk with state, excitations and loads.
-        progress: per walk the progress, see `PROGRESS`.
-        order: ORDER.FEEL, ORDER.BEGIN, ORDER.START, or a number of control steps.
+        work: memory of the reflexes and workspace of the criteria of each walk (walks,
+            `REFLEXES.MEMORY_SIZE`), see LEGS; changed.
+        rows: sensor row of each walk (walks, `SENSES.SIZE`); changed.
+        excitations: excitations of each walk (walks, c); changed.
+        record: filled with state, excitations, and ratios of leg loads to the body weight, of each
+            control step of the walk 0.
+        progress: progress of each walk (walks, `PROGRESS.SIZE`), see `PROGRESS`; changed.
+        order: FEEL, BEGIN or START of `ORDER`, or largest number of control steps.
         first: number of the first walk.
-        stop: end of the walks.
+        stop: number after that of the last walk.
 
     Returns:
-        The worst outcome of the evaluations of FEEL, BEGIN and START of `ORDER`.
+        Worst outcome of the evaluations of FEEL, BEGIN and START of `ORDER`; `OUTCOME.OK` for
+        control steps.
     """
     size = model[MODEL.STATE_SIZE]
     status = OUTCOME.OK
@@ -426,41 +432,45 @@ def run_by_reflexes(
     first: int,
     stop: int,
 ) -> int:
-    """Integrate the runs `first` to `stop` - 1, as `run_several` does, each controlled by its reflexes.
+    """Integrate the runs `first` to `stop` - 1 as `run_several` does, each controlled by reflexes.
 
     Args:
         model: integers of the model.
         reals: numbers of the runs, in rows of `number_count`.
         data: workspace of an evaluation and of the method, shared.
         number_count: length of a row of numbers.
-        sizes: sizes and settings, see `record.MOST_TRIES`.
-        clocks: per run time and next step to try (s).
-        counts: per run the counts, see `record.TAKEN`.
-        states: per run the state; changed.
+        sizes: sizes and settings, see `record.RUN_SIZES`.
+        clocks: time and next step to try of each run (s) (runs, 2); changed.
+        counts: counts of each run (runs, `COUNTS.SIZE`), see `record.COUNTS`; changed.
+        states: state of each run (runs, y); changed.
         times: times of the reports (s).
-        reports: per run the states at these times.
+        reports: filled with the states of each run at these times (runs, r, y).
         log: log of the steps, shared.
         forces: forces of contacts at the steps of the log, shared.
-        events: per run the events.
-        peaks: per run the largest forces of contacts.
-        watches: watches, see `record.Motion`.
-        levels: numbers of the watches.
-        endings: filled with the ending of each run, see `record.ENDING.DONE`.
+        events: filled with the events of each run, see `record.insert_event`.
+        peaks: filled with the largest force of each contact (N) and its time (s), for each run
+            (runs, P, 2).
+        watches: integers of the watches, see `record.Motion`.
+        levels: numbers of the watches, see `record.Motion`.
+        endings: filled with the ending of each run, see `record.ENDING`.
         senses: plan of the sensor rows, see `sensors.SENSES`.
-        sensor_numbers: per run the numbers of the sensor row, see `sensors.SENSOR_NUMBERS`.
+        sensor_numbers: numbers of the sensor row of each run (runs, `SENSES.KNOWN`), see
+            `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
-        numbers: per run the numbers of the reflexes, see `reflexes.LIMITS`.
-        work: per run the memory of the reflexes.
-        rows: per run the sensor row.
-        excitations: per run the excitations.
-        record: per run the record of control steps, see `begin_control_step`.
-        progress: per run the progress, see `PROGRESS`.
+        numbers: numbers of the reflexes of each run (runs, `REFLEXES.NUMBERS`), see
+            `reflexes.LIMITS`.
+        work: memory of the reflexes of each run (runs, `REFLEXES.MEMORY_SIZE`); changed.
+        rows: sensor row of each run (runs, `SENSES.SIZE`); changed.
+        excitations: excitations of each run (runs, c); changed.
+        record: filled with the control steps of each run (runs, `REFLEXES.ROWS`,
+            `control_record_size`), see `begin_control_step`.
+        progress: progress of each run (runs, `PROGRESS.SIZE`), see `PROGRESS`; changed.
         first: number of the first run.
-        stop: end of the runs.
+        stop: number after that of the last run.
 
     Returns:
-        `OUTCOME.OK`; how each run ended is in `endings`.
+        `OUTCOME.OK`; `endings` has the ending of each run.
     """
     runs = Motion(
         model,
@@ -521,7 +531,7 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
         y: state; changed.
 
     Returns:
-        The ending, see `record.ENDING.DONE`.
+        Ending of the run, see `record.ENDING`.
     """
     m, progress = a.m, a.progress
     h = at(m.data, m.sizes[RUN_SIZES.METHOD_AT])

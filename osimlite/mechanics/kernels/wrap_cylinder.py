@@ -63,7 +63,7 @@ def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         item: offset of the surface in the model.
 
     Returns:
-        WRAPPING.INSIDE, WRAPPING.NONE, WRAPPED or WRAPPING.MANDATORY.
+        WRAPPING.INSIDE, WRAPPING.NONE, WRAPPING.WRAPPED or WRAPPING.MANDATORY.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second = vector(e, WRAP_WORK.FIRST_END), vector(e, WRAP_WORK.SECOND_END)
@@ -92,17 +92,17 @@ def bend_around_cylinder(
     """Bend a segment around a cylinder.
 
     Args:
-        first: first end.
-        second: second end.
+        first: first end of the segment in the frame of the cylinder (m).
+        second: second end of the segment in this frame (m).
         radius: radius of the cylinder (m).
         length: length of the cylinder (m).
-        axis: axis of the quadrant.
-        side: its sign, 0.0 for the complete surface.
+        axis: axis of the quadrant: 0 for x, 1 for y, 2 for z.
+        side: sign of the quadrant along this axis, 0.0 for the complete surface.
         alone: whether the path has no other PathWrap.
         e: record of the law; filled with tangent points and length.
 
     Returns:
-        WRAPPING.INSIDE, WRAPPING.NONE, WRAPPED or WRAPPING.MANDATORY.
+        WRAPPING.INSIDE, WRAPPING.NONE, WRAPPING.WRAPPED or WRAPPING.MANDATORY.
     """
     px, py, pz = first
     qx, qy, qz = second
@@ -208,8 +208,8 @@ def set_height(point: Vector, height: float) -> Vector:
     """Return a point moved to another height.
 
     Args:
-        point: point.
-        height: its new z component (m).
+        point: point in the frame of the cylinder (m).
+        height: new z component (m).
     """
     x, y, _ = point
     return x, y, height
@@ -228,8 +228,8 @@ def starts_at_a(
         a2: first candidate of the second end.
         b2: second candidate of the second end.
         wide: whether the path from a1 to b2 is the wider one.
-        axis: axis of the quadrant.
-        side: its sign.
+        axis: axis of the quadrant: 0 for x, 1 for y, 2 for z.
+        side: sign of the quadrant along this axis.
     """
     a_active = is_on_side(a1, axis, side)
     if a_active != is_on_side(b1, axis, side):

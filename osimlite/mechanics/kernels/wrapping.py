@@ -297,8 +297,8 @@ def pair_on_side(
         b1: second candidate of the first end.
         a2: first candidate of the second end.
         b2: second candidate of the second end.
-        axis: axis of the quadrant.
-        side: its sign.
+        axis: axis of the quadrant: 0 for x, 1 for y, 2 for z.
+        side: sign of the quadrant along this axis.
 
     Returns:
         The points of the first and second end, and whether the arc between them is the longer one.

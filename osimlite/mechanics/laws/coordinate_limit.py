@@ -23,12 +23,13 @@ def limit_constants(
     """Return the parameters of the law in SI units from the properties in a file.
 
     Args:
-        upper_stiffness: N m/deg for a rotational coordinate, else N/m (N m/rad for a coupled one).
-        upper_limit: deg, else m (rad).
-        lower_stiffness: in the unit of `upper_stiffness`.
-        lower_limit: in the unit of `upper_limit`.
-        damping: N m/(deg/s), else N/(m/s) (N m/(rad/s)).
-        transition: width of the transition zone, deg, else m (rad).
+        upper_stiffness: stiffness beyond the upper limit, N m/deg for a rotational coordinate, else
+            N/m (N m/rad for a coupled one).
+        upper_limit: upper limit, deg for a rotational coordinate, else m (rad).
+        lower_stiffness: stiffness beyond the lower limit, in the unit of `upper_stiffness`.
+        lower_limit: lower limit, in the unit of `upper_limit`.
+        damping: damping, N m/(deg/s) for a rotational coordinate, else N/(m/s) (N m/(rad/s)).
+        transition: width of the transition zone, deg for a rotational coordinate, else m (rad).
         rotational: whether the motion type of the coordinate is Rotational; Translational and Coupled
             are not converted.
 
@@ -59,7 +60,7 @@ def limit_force(
 
     Args:
         q: coordinate, rad (m).
-        u: its speed, rad/s (m/s).
+        u: speed of the coordinate, rad/s (m/s).
         Ku: stiffness beyond the upper limit, N m/rad (N/m). With stiffness 0 the damper still acts;
             OpenSim 4.6 divides 0 by 0 there.
         qu: upper limit, rad (m).
@@ -99,7 +100,7 @@ def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: flo
 
     Args:
         q: coordinate, rad (m).
-        u: its speed, rad/s (m/s).
+        u: speed of the coordinate, rad/s (m/s).
         qu: upper limit, rad (m).
         ql: lower limit, rad (m).
         D: damping, N m/(rad/s) (N/(m/s)).

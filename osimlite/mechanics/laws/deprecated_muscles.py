@@ -94,7 +94,7 @@ def rigid_cos(path_length: float, m: OldMuscle) -> float:
 
     Args:
         path_length: length of the path (m).
-        m: muscle.
+        m: parameters of the muscle.
     """
     length_along = path_length / m.optimal - m.slack
     return cos_pennation_of_fibers(
@@ -111,7 +111,7 @@ def generic_velocity_factor(rate: float, m: OldMuscle) -> float:
 
     Args:
         rate: lengthening speed of the path (m/s).
-        m: muscle.
+        m: parameters of the muscle.
     """
     sin = m.height / m.optimal
     velocity = -sqrt(1.0 - sin * sin) * rate / (m.fastest * m.optimal)
@@ -293,7 +293,7 @@ def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
     Args:
         path_length: length of the path (m).
         length: fiber length to try (m).
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Guess. Where the tendon would be shorter than slack, the fibers span what remains of the
@@ -333,7 +333,7 @@ def next_length(
         fibers: fiber force at the present activation.
         fully: fiber force, fully activated.
         tendon: tendon force.
-        m: muscle.
+        m: parameters of the muscle.
     """
     # A change of sign brackets the equilibrium: regula falsi. Without it, take a damped Newton
     # step.

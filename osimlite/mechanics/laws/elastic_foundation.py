@@ -50,7 +50,7 @@ def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, V
 
     Args:
         center: centre of the sphere (m).
-        r: its radius (m).
+        r: radius of the sphere (m).
         middle: middle of the spring (m).
 
     Returns:
@@ -96,8 +96,8 @@ def spring_load(
         middle: middle of the spring (m).
         end: nearest point of the other surface (m).
         about: reference point of torque and velocity (m).
-        v: velocity of the other surface relative to the mesh there (m/s).
-        turning: its angular velocity relative to the mesh (1/s).
+        v: velocity relative to the mesh of the other surface's point at `about` (m/s).
+        turning: angular velocity of the other surface relative to the mesh (rad/s).
 
     Returns:
         Force (N), torque about `about` (N m), and energy (J).

@@ -73,11 +73,11 @@ def ellipsoid_ellipsoid(
 
     Args:
         c1: centre of the ellipsoid that is surface 1 (m).
-        axes1: its axes.
-        radii1: its half axes (m).
+        axes1: directions of the half axes of surface 1.
+        radii1: lengths of the half axes of surface 1 (m).
         c2: centre of the ellipsoid that is surface 2 (m).
-        axes2: its axes.
-        radii2: its half axes (m).
+        axes2: directions of the half axes of surface 2.
+        radii2: lengths of the half axes of surface 2 (m).
         a: part of the depth in surface 1.
 
     Returns:

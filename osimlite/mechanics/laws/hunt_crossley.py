@@ -117,9 +117,9 @@ def sphere_sphere(
 
     Args:
         c1: centre of the sphere that is surface 1 (m).
-        r1: its radius (m).
+        r1: radius of surface 1 (m).
         c2: centre of the sphere that is surface 2 (m).
-        r2: its radius (m).
+        r2: radius of surface 2 (m).
         a: part of the depth in surface 1, from `combine_materials`.
 
     Returns:

@@ -95,7 +95,7 @@ def evaluate_dynamics(
     See calcAccelerationMuscleInfo and calcMuscleDynamicsInfo of OpenSim's class.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         active: activation.
         fiber: fiber length (m).
         velocity: fiber velocity (m/s).
@@ -191,7 +191,7 @@ def millard2012_acceleration(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
 
     Returns:
@@ -234,7 +234,7 @@ def millard2012_acceleration_rigid(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
     """
     # Fibers clamped to their smallest length bear no force along a rigid tendon.
@@ -259,7 +259,7 @@ def millard2012_acceleration_equilibrium(
 
     Args:
         inputs: inputs of the muscle; only length, rate, activation and fiber velocity are used.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
 
     Returns:
@@ -310,7 +310,7 @@ def millard2012_acceleration_energy(
     """Return the potential energy, without the kinetic energy of the mass (J).
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         length: length of the path (m).
         fiber_length: fiber length (m).
         cos: cosine of pennation.

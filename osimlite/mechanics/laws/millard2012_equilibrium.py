@@ -109,7 +109,7 @@ def millard2012_equilibrium(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
 
     Returns:
@@ -145,7 +145,7 @@ def millard2012_at_velocity(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
         fiber_velocity: known fiber velocity (m/s).
 
@@ -182,7 +182,7 @@ def evaluate_length_curves(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
 
     Returns:
@@ -216,7 +216,7 @@ def fibers_at(inputs: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Fibers, where `by_length` and `elastic` are the normalized fiber length and `tendon` the
@@ -273,7 +273,7 @@ def combine_length_curves(
 
     Args:
         fibers: fibers from `fibers_at`.
-        m: muscle.
+        m: parameters of the muscle.
         by_length: value of the active force-length curve.
         elastic: value of the passive force-length curve.
         tendon: value of the tendon force-length curve.
@@ -305,7 +305,7 @@ def request_velocity_curve(
 
     Args:
         fibers: fibers after `combine_length_curves`.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Number of the curve (0 for the factor by velocity, 1 for its inverse), factors of its value
@@ -323,7 +323,7 @@ def combine_velocity_curve(
 
     Args:
         fibers: fibers after `combine_length_curves`.
-        m: muscle.
+        m: parameters of the muscle.
         value: value of the curve.
         missed: residual of the search.
 
@@ -351,7 +351,7 @@ def make_muscle_results(
 
     Args:
         fibers: fibers with the values of all curves.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         The results of `millard2012_equilibrium`.
@@ -376,7 +376,7 @@ def compute_muscle_results(
 
     Args:
         fibers: fibers; activation, length, cosine and rate of activation are used.
-        m: muscle.
+        m: parameters of the muscle.
         is_found: whether a fiber velocity exists.
         velocity: normalized fiber velocity.
         by_velocity: factor of the active force by velocity.
@@ -427,7 +427,7 @@ def millard2012_rigid(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
     """
     fiber = fiber_length_along(inputs.length - m.slack, m.height, m.shortest, m.least_cos)
@@ -456,7 +456,7 @@ def find_damped_velocity(
     OpenSim uses Newton's method with a tolerance of 1e-10; here the search is that on a curve.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         active: activation.
         by_length: factor of the active force by length.
         elastic: passive force.
@@ -484,7 +484,7 @@ def check_damped_velocity(
     """Return whether a search for the velocity converged, and the velocity.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         isometric: active isometric force.
         velocity_force: force of the fibers without their elastic passive force.
         factor: factor of the active force by velocity.
@@ -505,7 +505,7 @@ def millard2012_energy(
     curves.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         length: length of the path (m).
         fiber_length: fiber length (m).
         cos: cosine of pennation.
@@ -527,7 +527,7 @@ def millard2012_equilibrium_length(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         curves: curves of the muscle.
 
     Returns:
@@ -570,7 +570,7 @@ def force_imbalance(
     """Return the force of resting fibers along the tendon less the tendon force, and its derivative.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         length: length of the path (m).
         fiber: fiber length (m).
         active: activation.

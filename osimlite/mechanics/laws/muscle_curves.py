@@ -310,7 +310,7 @@ def _complete_properties(
 
     Args:
         values: properties, None where omitted.
-        defaults: their defaults.
+        defaults: default of each property.
         first_name: name of the first property, for the message.
 
     Raises:

@@ -186,7 +186,7 @@ def degroote(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         tendon: further parameters.
 
     Returns:
@@ -244,7 +244,7 @@ def degroote_rigid(inputs: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) 
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         tendon: further parameters, without effect.
     """
     fiber_length, velocity = rigid_fibers(inputs, m)
@@ -256,7 +256,7 @@ def rigid_fibers(inputs: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Length and velocity.
@@ -277,7 +277,7 @@ def degroote_equilibrium(
 
     Args:
         inputs: inputs of the muscle; the tendon force is not used.
-        m: muscle.
+        m: parameters of the muscle.
         tendon: further parameters.
 
     Returns:
@@ -308,7 +308,7 @@ def degroote_residual(
     Args:
         force: normalized tendon force.
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
         tendon: further parameters.
     """
     # A constant tendon force: the velocity of the fibers is that of the path, not that of the
@@ -374,7 +374,7 @@ def meyer(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
@@ -405,7 +405,7 @@ def meyer_rigid(inputs: MuscleInputs, m: SmoothMuscle) -> float:
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
     """
     fiber_length, velocity = rigid_fibers(inputs, m)
     return m.strength * meyer_active(fiber_length, m.scale) * meyer_factor(velocity)

@@ -18,7 +18,7 @@ def coordinate_spring_force(q: float, u: float, k: float, q0: float, c: float) -
 
     Args:
         q: coordinate, rad (m).
-        u: its speed, rad/s (m/s).
+        u: speed of the coordinate, rad/s (m/s).
         k: stiffness, N m/rad (N/m).
         q0: rest value of the coordinate, rad (m).
         c: viscosity, N m/(rad/s) (N/(m/s)).

@@ -66,21 +66,21 @@ class ThelenFibers(NamedTuple):
     """Fibers of a given length in a muscle: forces of fibers and tendon, and their slopes."""
 
     length: float  # m
-    cos: float  # of pennation
+    cos: float  # cosine of the pennation angle
     is_taut: bool  # whether the tendon is longer than slack
-    tendon: float  # tendon force
-    tendon_slope: float  # over its normalized length
-    active: float  # force at rest, fully activated
-    active_slope: float  # over the normalized length
-    passive: float  # passive force
-    passive_slope: float  # over the normalized length
+    tendon: float  # normalized tendon force
+    tendon_slope: float  # derivative of it by the tendon strain
+    active: float  # normalized active force at full activation and zero velocity
+    active_slope: float  # derivative of it by the normalized fiber length
+    passive: float  # normalized passive force
+    passive_slope: float  # derivative of it by the normalized fiber length
 
 
 def fibers_at(m: Thelen2003, path_length: float, length: float) -> ThelenFibers:
     """Evaluate the curves for a path length and a fiber length (m).
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         path_length: length of the path (m).
         length: fiber length (m).
     """
@@ -217,10 +217,11 @@ def fiber_velocity(
     lengthening fibers.
 
     Args:
-        m: muscle.
-        force: active force of the fibers.
+        m: parameters of the muscle.
+        force: active force of the fibers over the maximum isometric force.
         activation: activation within its bounds.
-        isometric: their isometric force.
+        isometric: active force at this activation and fiber length and at rest, over the maximum
+            isometric force.
 
     Returns:
         Velocity and derivative by the force.
@@ -246,10 +247,11 @@ def force_at_velocity(
     """Return the active force at a velocity over the isometric force: the inverse of `fiber_velocity`.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         velocity: normalized fiber velocity.
         activation: activation within its bounds.
-        isometric: isometric force of the fibers.
+        isometric: active force at this activation and fiber length and at rest, over the maximum
+            isometric force.
         enough: tolerance of the velocity.
 
     Returns:
@@ -286,7 +288,7 @@ def thelen2003(
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
@@ -326,7 +328,7 @@ def thelen2003_rigid(inputs: MuscleInputs, m: Thelen2003) -> float:
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
     """
     fiber = fiber_length_along(inputs.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
@@ -346,7 +348,7 @@ def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: fl
     that fibers below 1 m store nothing. This function does the same.
 
     Args:
-        m: muscle.
+        m: parameters of the muscle.
         length: length of the path (m).
         fiber_length: fiber length (m).
         cos: cosine of pennation.
@@ -367,7 +369,7 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
 
     Args:
         inputs: inputs of the muscle.
-        m: muscle.
+        m: parameters of the muscle.
 
     Returns:
         Whether there is one, and the fiber length (m).
@@ -412,12 +414,12 @@ def fiber_balance(m: Thelen2003, fibers: ThelenFibers, active: float) -> tuple[f
     """Return the force of the fibers, and its component along the tendon less the tendon force (N).
 
     Args:
-        m: muscle.
-        fibers: its fibers.
-        active: activation times the factor by velocity.
+        m: parameters of the muscle.
+        fibers: fiber length and normalized forces, from `fibers_at`.
+        active: product of activation and force-velocity factor.
 
     Returns:
-        Force and residual.
+        Force of the fibers and residual (N).
     """
     fiber_force = (active * fibers.active + fibers.passive) * m.strength
     return fiber_force, fiber_force * fibers.cos - fibers.tendon * m.strength
@@ -429,13 +431,13 @@ def force_stiffnesses(
     """Return the derivatives of both forces along the tendon by the fiber length (N/m).
 
     Args:
-        m: muscle.
-        fibers: its fibers.
-        active: activation times the factor by velocity.
+        m: parameters of the muscle.
+        fibers: fiber length and normalized forces, from `fibers_at`.
+        active: product of activation and force-velocity factor.
         fiber_force: force of the fibers (N).
 
     Returns:
-        Derivatives of the fiber force and of the tendon force.
+        Derivatives of the fiber force and of the tendon force along the tendon (N/m).
     """
     length = fibers.length
     # Fibers no longer than high have no pennation angle.
@@ -458,8 +460,8 @@ def find_velocity_factor(
     the path, where k are stiffnesses along the tendon.
 
     Args:
-        m: muscle.
-        fibers: its fibers.
+        m: parameters of the muscle.
+        fibers: fiber length and normalized forces, from `fibers_at`.
         activation: activation within its bounds.
         rate: lengthening speed of the path (m/s).
         stiffness: stiffness of the fibers, see `force_stiffnesses` (N/m).

@@ -237,7 +237,7 @@ class _Builder:
 
         Args:
             coordinate: coordinate.
-            path: its path, for messages.
+            path: path of the coordinate in the model, for messages.
         """
         # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one
         # is locked too.
@@ -440,7 +440,7 @@ def mass_properties(body: Body, path: str) -> MassProperties:
 
     Args:
         body: body.
-        path: its path, for messages.
+        path: path of the body in the model, for messages.
 
     Raises:
         ModelError: mass, mass centre or inertia is impossible.

@@ -43,8 +43,8 @@ def _evaluate_law(law: str, *numbers: float | None) -> float:
     """Return the result of a law for numbers.
 
     Args:
-        law: sign or name of a law.
-        numbers: its arguments.
+        law: operator, or name of a function of `formulas`.
+        numbers: arguments of the law.
     """
     return float((_SIGNS.get(law) or getattr(formulas, law))(*numbers))
 

@@ -17,7 +17,7 @@ def function_table(function: f.SmoothFunction, where: str) -> list[float]:
 
     Args:
         function: the function.
-        where: its description for messages.
+        where: description of the function, for messages.
 
     Raises:
         UnsupportedError: the kernels cannot evaluate it.
@@ -31,7 +31,7 @@ def _has_table(table: list[float], function: f.SmoothFunction, where: str) -> li
     Args:
         table: table of the function.
         function: function.
-        where: its description for messages.
+        where: description of the function, for messages.
     """
     if not table:
         name = type(function).__name__
@@ -46,7 +46,7 @@ def table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
 
     Args:
         function: the function.
-        where: its description for messages.
+        where: description of the function, for messages.
 
     Raises:
         ModelError: a number of the function is not finite.
@@ -64,7 +64,7 @@ def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
 
     Args:
         function: function.
-        where: its description for messages.
+        where: description of the function, for messages.
     """
     if isinstance(function, f.ScaledFunction):
         function_type, factor, *remainder = _table_of_one(function.function, where)

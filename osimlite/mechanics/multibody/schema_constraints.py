@@ -53,9 +53,10 @@ class ConstraintReader:
         """Return the point of a constraint on a body.
 
         Args:
-            owner: the constraint.
-            socket: its socket to the body.
-            location: its property with the location, m.
+            owner: constraint of the model.
+            socket: name of the constraint's socket that refers to the body.
+            location: name of the constraint's property with the location of the point in the body
+                (m).
         """
         # OpenSim applies the location to the body itself, even where the socket refers to an offset
         # frame.
@@ -77,9 +78,9 @@ class ConstraintReader:
         """Return the index in the mechanism of a coordinate that a constraint refers to.
 
         Args:
-            owner: constraint.
+            owner: constraint of the model.
             field: name of the property, for messages.
-            value: its value: a name or path, or the coordinate.
+            value: value of the property: name or path of a coordinate, or the coordinate itself.
 
         Raises:
             ModelError: no joint moves by the coordinate.
@@ -100,7 +101,7 @@ class ConstraintReader:
 
         Args:
             item: constraint of the model.
-            path: its path.
+            path: path of the constraint in the model.
         """
         names = item.independent_coordinate_names
         function = convert_function(
@@ -127,7 +128,7 @@ class ConstraintReader:
 
         Args:
             item: constraint of the model.
-            path: its path.
+            path: path of the constraint in the model.
         """
         return b.PointEquations(
             self._read_station(item, "socket_body_1", "location_body_1"),
@@ -142,7 +143,7 @@ class ConstraintReader:
 
         Args:
             item: constraint of the model.
-            path: its path.
+            path: path of the constraint in the model.
         """
         if not 0.0 < item.constant_distance < np.inf:
             raise ModelError(
@@ -162,7 +163,7 @@ class ConstraintReader:
 
         Args:
             item: constraint of the model.
-            path: its path.
+            path: path of the constraint in the model.
         """
         return b.PointOnLineEquations(
             self._read_station(item, "socket_line_body", "point_on_line"),
@@ -178,7 +179,7 @@ class ConstraintReader:
 
         Args:
             item: constraint of the model.
-            path: its path.
+            path: path of the constraint in the model.
         """
         return b.RollingConstraint(
             self._find_base(item, "socket_surface_body"),
@@ -193,7 +194,7 @@ class ConstraintReader:
 
         Args:
             item: constraint of the model.
-            path: its path.
+            path: path of the constraint in the model.
         """
         return b.WeldEquations(
             self._find_frame(item, "socket_frame1"), self._find_frame(item, "socket_frame2"), path

@@ -82,7 +82,7 @@ class Placements:
 
         Args:
             frame: frame.
-            path: its path, for messages.
+            path: path of the frame in the model, for messages.
 
         Returns:
             Path of the body, and transform of the frame in the body (4, 4).
@@ -160,7 +160,7 @@ class Placements:
 
         Args:
             frame: frame.
-            path: its path, for messages.
+            path: path of the frame in the model, for messages.
 
         Returns:
             Path of the body, and transform of the frame in the body (4, 4).

@@ -49,7 +49,7 @@ def joint_motions(
 
     Args:
         joint: joint of the model.
-        path: its path, for messages.
+        path: path of the joint in the model, for messages.
         opensim_derivatives: see `build_mechanism`.
 
     Returns:
@@ -114,7 +114,7 @@ def _build_custom_motions(
 
     Args:
         joint: joint.
-        path: its path, for messages.
+        path: path of the joint in the model, for messages.
         opensim_derivatives: whether accelerations have Simbody's error, see `make_custom_motions`.
 
     Returns:

@@ -78,10 +78,10 @@ class ExpressionWriter:
 
         Args:
             kind: type of the variable.
-            text: its value.
+            text: text of its initial value.
 
         Returns:
-            Its name.
+            Name of the variable.
         """
         name = self.new_name("temporary")
         self.pending.append(f"const {self.names.name_type(kind)} {name} = {text};")
@@ -106,8 +106,8 @@ class ExpressionWriter:
         Variables that it needs are defined within it, in a lambda expression.
 
         Args:
-            write: returns the text.
-            arguments: its arguments.
+            write: function that returns the text of the expression.
+            arguments: arguments of `write`.
         """
         before, self.pending = self.pending, []
         try:
@@ -151,8 +151,8 @@ class ExpressionWriter:
         """Return the text of a value as one of another type.
 
         Args:
-            text: the value.
-            have: its type.
+            text: text of the value.
+            have: type of the value.
             want: type that is needed; numbers convert implicitly.
         """
         if have is want or (is_number(have) and is_number(want)) or isinstance(have, Callee):
@@ -167,8 +167,8 @@ class ExpressionWriter:
         """Return the text of a value whose type is exactly the one that is needed.
 
         Args:
-            text: the value.
-            have: its type.
+            text: text of the value.
+            have: type of the value.
             want: type that is needed.
         """
         if have is want:
@@ -182,8 +182,8 @@ class ExpressionWriter:
         """Return the text of an item of a tuple.
 
         Args:
-            text: the tuple.
-            kind: its type.
+            text: text of the tuple.
+            kind: type of the tuple.
             index: index of the item; negative ones count from the end.
         """
         index %= len(kind.parts)
@@ -197,8 +197,8 @@ class ExpressionWriter:
         """Return the text of a new tuple.
 
         Args:
-            kind: its type.
-            texts: the items.
+            kind: type of the tuple.
+            texts: texts of the items.
             types: types of the items.
         """
         parts = [
@@ -541,7 +541,7 @@ class ExpressionWriter:
         Args:
             node: the call.
             function: the function that is called.
-            nodes: its arguments.
+            nodes: syntax trees of the arguments.
         """
         texts, kinds = self.arguments(nodes)
         if (intrinsic := self.function.intrinsic(function)) is not None:

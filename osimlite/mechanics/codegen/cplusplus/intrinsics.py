@@ -72,7 +72,7 @@ def cast_to(code: str, have: Type, want: Type) -> str:
 
     Args:
         code: text of the number.
-        have: its type.
+        have: type of the number.
         want: type that is needed.
     """
     if have is want:
@@ -89,7 +89,7 @@ def _convert_to_floats(codes: Sequence[str], kinds: Types) -> list[str]:
 
     Args:
         codes: texts of the numbers.
-        kinds: their types.
+        kinds: types of the numbers.
 
     Returns:
         Texts of floats and dual numbers.

@@ -82,9 +82,10 @@ class Library:
         """Write a function with all that it calls, and make it visible outside of the library.
 
         Args:
-            symbol: the name that it is loaded by.
-            function: the function.
-            directions: how many derivatives its numbers carry; 0 for plain numbers.
+            symbol: name under which the library exports the function.
+            function: kernel to export.
+            directions: number of derivatives that each float of the function carries; 0 for plain
+                floats.
 
         Raises:
             TranslationError: the function, or one that it calls, uses something that has no

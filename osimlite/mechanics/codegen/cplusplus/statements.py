@@ -40,7 +40,7 @@ class FunctionWriter(ExpressionWriter):
         """Return the text of the function.
 
         Args:
-            name: its name in C++.
+            name: name of the function in C++.
         """
         function = self.function
         copies, parameters = [], []
@@ -153,8 +153,8 @@ class FunctionWriter(ExpressionWriter):
         Args:
             node: the statement.
             name: name of the loop variable.
-            iterated: what the loop is over.
-            body: statements of the loop.
+            iterated: expression that the loop iterates over: a call of range() or a tuple.
+            body: statements in the loop.
         """
         is_own = name == "_" or name in self._places.loop_variables.get(node, ())
         # A variable that is used after the loop, or assigned in it, needs a counter besides.
@@ -323,8 +323,8 @@ class FunctionWriter(ExpressionWriter):
         Args:
             node: the assignment.
             target: variable, item of a vector, or tuple of these.
-            text: the value, which costs nothing to evaluate again.
-            kind: its type.
+            text: text of the value, which costs nothing to evaluate again.
+            kind: type of the value.
         """
         if isinstance(kind, Callee):
             return []
@@ -369,9 +369,9 @@ class FunctionWriter(ExpressionWriter):
 
         Args:
             node: the statement.
-            target: its target.
-            op: its operator.
-            value: its right side.
+            target: variable or item of a vector that is changed.
+            op: operator of the assignment.
+            value: expression on the right side.
         """
         kinds = [self.function.require_type(to_load(target)), self.function.require_type(value)]
         is_written = bool(self.function.effects_of(value) & WRITES)
