@@ -146,8 +146,8 @@ class AssigningBranch:
     """Branch (`if`) whose sides only assign.
 
     Args:
-        part: part of the code, for messages and identity.
-        test: condition.
+        code_part: part of the code with the branch, for messages and for recognizing the branch.
+        test: condition of the branch, a number or a symbol.
 
     Attributes:
         ends: values of the variables at the end of each side that was run.

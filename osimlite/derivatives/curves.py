@@ -186,8 +186,8 @@ def _select_section(curve: Any, is_beyond_knot: Sequence[Any]) -> list[Any]:
     """Return start, scale and coefficients of the section behind the last knot that is exceeded.
 
     Args:
-        curve: curve.
-        is_beyond_knot: for each inner knot, the test whether the argument is beyond it.
+        curve: packed Bezier curve.
+        is_beyond_knot: condition that the argument exceeds a knot, for each inner knot.
     """
     first_section = HEAD + len(is_beyond_knot) + 1
     entry_offsets = [START, SCALE, *range(X, Y + 6)]

@@ -123,7 +123,7 @@ class DifferentiableModel:
 
         Args:
             model: the model.
-            mechanism: its mechanism.
+            mechanism: mechanism of the model.
 
         Returns:
             Forces; probes give their values without their operation over time.

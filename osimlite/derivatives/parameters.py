@@ -37,7 +37,8 @@ class Parameters:
         names: paths of the parameters.
         values: values of the parameters in the model (p,), in the units of the file.
         base: numbers (k,) of the kernels for zero parameters.
-        slopes: for each index in these numbers, pairs of a parameter's index and its factor.
+        slopes: pairs of the index of a parameter and its factor, by the index in the numbers of the
+            kernels.
 
     Raises:
         SettingError: a parameter does not exist, or stands for numbers that differ.

@@ -202,8 +202,8 @@ class _SensitivityRun:
         tangent_model: tangents of the model with its parameters.
         simulation: simulation of the model with the controls of the motion.
         initial: indices of the states whose initial values count.
-        held: indices in the mechanism of the coordinates with prescribed initial values, and of
-            those with prescribed initial speeds.
+        fixed_coordinates: indices in the mechanism of the coordinates with prescribed initial
+            values, and of those with prescribed initial speeds.
     """
 
     def __init__(
@@ -299,7 +299,8 @@ class _SensitivityRun:
 
         Args:
             x: initial state (x,).
-            slopes: its derivatives (x, m), which are changed.
+            slopes: derivatives of the initial state by parameters and initial values (x, m);
+                changed.
         """
         tangent_model = self._tangent_model
         size = len(self._tangent_model.coordinates)
@@ -439,11 +440,11 @@ def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> 
 
     Args:
         model: the model.
-        tangent_model: its tangents.
+        tangent_model: tangents of this model.
         name: path of the parameter.
 
     Raises:
-        SettingError: it is one.
+        SettingError: the parameter is one.
     """
     for location in find_properties(model, name):
         property_name = str(location.steps[0])
@@ -472,7 +473,7 @@ def _find_index(noun: str, names: Sequence[str], name: str) -> int:
     """Return the index of a name.
 
     Args:
-        noun: what is named, for messages.
+        noun: noun for the named thing, such as "output", for messages.
         names: all names.
         name: the name.
 

@@ -73,7 +73,7 @@ def _call_law(address: int, *arguments: Any) -> int:
 
     Args:
         address: number of the law.
-        arguments: its arguments; the last one is the offset of the item.
+        arguments: arguments of the law; the last one is the offset of the item.
 
     Returns:
         Outcome of the law.

@@ -85,7 +85,7 @@ class SymbolicModel(DifferentiableModel):
 
         Args:
             model: the model.
-            mechanism: its mechanism.
+            mechanism: mechanism of the model.
         """
         from osimlite.derivatives.wrapped_paths import WrappedPaths
 

@@ -99,7 +99,7 @@ class BranchWideningSignal(Exception):
     A wider part of the code must then be run for both sides.
 
     Attributes:
-        part: part of the code that merged the value.
+        code_part: part of the code that merged the value.
     """
 
     def __init__(self, code_part: Any) -> None:
@@ -113,7 +113,7 @@ class UnmergeableValue:
     Any use of it raises `BranchWideningSignal`.
 
     Args:
-        part: part of the code that merged the value.
+        code_part: part of the code that merged the value.
     """
 
     def __init__(self, code_part: Any) -> None:

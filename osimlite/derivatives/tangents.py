@@ -430,7 +430,7 @@ class TangentSteps:
     Args:
         packed: packed model with the controls of the motion.
         forces: forces of the model.
-        places: indices of the states in the packed order.
+        state_indices: index in the packed order of each state of the model.
     """
 
     def __init__(self, packed: PackedModel, forces: Forces, state_indices: Sequence[int]) -> None:
@@ -455,8 +455,8 @@ class TangentSteps:
         """Set the numbers of the model and their derivatives.
 
         Args:
-            numbers: numbers (k,).
-            changes: their derivatives along all directions (k, m).
+            numbers: numbers of the model (k,).
+            changes: derivatives of the numbers along all directions (k, m).
         """
         self._count = changes.shape[1]
         self._number = -1
@@ -470,14 +470,14 @@ class TangentSteps:
             block[:, column_slice] = changes[:, direction_slice]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
-        """Return the blocks of a state with its derivatives.
+        """Return the blocks of a state with the derivatives of the state.
 
         Args:
             y: state (x,) in the order of the model.
-            slopes: its derivatives (x, m).
+            slopes: derivatives of the state along all directions (x, m).
 
         Returns:
-            Blocks (b, x, 1 + DIRECTIONS).
+            Blocks of at most DIRECTIONS directions each (b, x, 1 + DIRECTIONS).
         """
         result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
         result[:, self.state_indices, 0] = y

@@ -380,9 +380,9 @@ class _NumericCallback(casadi.Callback):  # type: ignore[misc]
     """CasADi callback of a function in machine code.
 
     Args:
-        name: name, for messages.
+        name: name of the function, for messages.
         sizes: sizes of the columns of the arguments.
-        out: sparsity of the result.
+        output_sparsity: sparsity of the result.
         function: function of the arguments.
         slopes: derivative by the first argument, as another callback; differences if None.
     """

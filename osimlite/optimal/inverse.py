@@ -48,9 +48,10 @@ def build_inverse_problem(
     Args:
         tool: settings.
         file: setup file of the settings; None for settings that were not read from a file.
-        folder: folder of the files that settings without a file name.
+        folder: folder of the files that the settings name, for settings without a file; the current
+            folder if None.
         more: function that changes the study before the problem is built: goals, bounds, solver.
-        scaled: as for :func:`osimlite.moco.solve`.
+        scaled: column of a table for each scale factor of a goal, see :func:`osimlite.moco.solve`.
 
     Returns:
         Problem whose functions are a :class:`~osimlite.optimal.prescribed_motion.PrescribedMotion`.
@@ -124,8 +125,8 @@ def solve_inverse(
         folder: folder of the files that the settings name; the current folder if None.
         more: function that changes the study before it is solved: goals, bounds, solver.
         tell: function that is called with the progress after each iteration.
-        refine: as for :func:`osimlite.moco.solve`.
-        scaled: as for :func:`osimlite.moco.solve`.
+        refine: accuracy or settings of mesh refinement, see :func:`osimlite.moco.solve`.
+        scaled: column of a table for each scale factor of a goal, see :func:`osimlite.moco.solve`.
 
     Returns:
         Solution, whose states include the values and speeds of the prescribed motion.
@@ -149,7 +150,7 @@ def solve_inverse_problem(
     Args:
         problem: problem of :func:`build_inverse_problem`.
         tell: function that is called with the progress after each iteration.
-        refine: as for :func:`osimlite.moco.solve`.
+        refine: accuracy or settings of mesh refinement, see :func:`osimlite.moco.solve`.
 
     Returns:
         Solution, whose states include the values and speeds of the prescribed motion.

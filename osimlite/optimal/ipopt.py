@@ -414,7 +414,7 @@ class _SearchCallbacks:
 
     # ---------------------------------------------------------------------------------------- after an iteration
     def _record_iteration(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
-        """Keep the best iterate, report the progress, and tell Ipopt whether to stop.
+        """Store the best iterate, report the progress, and return whether Ipopt is to stop.
 
         Args:
             x: scaled variables (n,).

@@ -383,9 +383,9 @@ class PrescribedDynamics(Dynamics):
         """Return the function of a point for the load of a joint in the motion, (6, 1).
 
         Args:
-            path: as for :meth:`Dynamics.make_joint_load`.
-            side: as for :meth:`Dynamics.make_joint_load`.
-            frame: as for :meth:`Dynamics.make_joint_load`.
+            path: path of the joint.
+            side: "parent" or "child", the body on which the load acts.
+            frame: path of the frame along whose axes the load is expressed.
         """
         load = self.functions.force_model.joint_load(path, side)
         compute_frame = self.functions.force_model.frames([frame])
@@ -406,8 +406,8 @@ class PrescribedDynamics(Dynamics):
         """Return the function of a point for the generalized forces that the motion needs, (k, 1).
 
         Args:
-            pushing: as for :meth:`Dynamics.make_generalized_forces`.
-            coordinates: as for :meth:`Dynamics.make_generalized_forces`.
+            pushing: paths of the forces that act; gravity acts as well.
+            coordinates: paths of the coordinates.
         """
         compute_forces = self.functions.force_model.generalized_forces(pushing)
         rows = [self.functions.force_model.coordinates.index(path) for path in coordinates]
@@ -421,8 +421,8 @@ class PrescribedDynamics(Dynamics):
         """Return the function of a point for a column (size, 1) that depends linearly on forces.
 
         Args:
-            function: as for :meth:`PrescribedMotion.compute_linear_response`.
-            size: number k of its results.
+            function: function for :meth:`PrescribedMotion.compute_linear_response`.
+            size: number k of results of the function.
         """
         entries = self._add_series(
             cache_last(partial(self.functions.compute_linear_response, function))

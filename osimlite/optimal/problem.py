@@ -189,7 +189,7 @@ class Problem(StudyContext):
             by_name: weights by name.
             by_pattern: weights by pattern; None if the goal has no such property.
             names: names that need a weight.
-            noun: what the names stand for, for messages.
+            noun: noun for the named things, such as "state", for messages.
 
         Returns:
             Weight of each name.

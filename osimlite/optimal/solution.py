@@ -104,7 +104,7 @@ def solve(
         folder: folder of the files that a study without a file names; the current folder if None.
         tell: function that is called with the progress after each iteration. Ctrl-C stops the
             search, and the solution is then the best iterate.
-        refine: split intervals of the mesh until the error of each is below this, see
+        refine: error below which each interval of the mesh is to be brought by splitting, see
             :class:`Refinement`; None to keep the mesh.
         scaled: column of the goal's table that each scale factor of a goal multiplies, by the
             factor's name: what OpenSim's ``addScaleFactor`` receives, and no file contains.
@@ -131,7 +131,7 @@ def build_problem(
     Args:
         study: study file or study.
         folder: folder of the files that a study without a file names; the current folder if None.
-        scaled: as for :func:`solve`.
+        scaled: column of a table for each scale factor of a goal, see :func:`solve`.
 
     Returns:
         Problem, which :func:`evaluate` can evaluate for several trajectories.
@@ -158,9 +158,9 @@ def solve_program(
 
     Args:
         program: nonlinear program.
-        guess: as for :func:`solve`.
-        tell: as for :func:`solve`.
-        refine: as for :func:`solve`.
+        guess: initial guess, see :func:`solve`.
+        tell: function that is called with the progress after each iteration; None for none.
+        refine: accuracy or settings of mesh refinement, see :func:`solve`.
 
     Returns:
         Solution on the last mesh, with its violations and, if the goals say how it continues, its
@@ -240,8 +240,8 @@ def evaluate(
         study: study file or study; also a problem of :func:`build_problem` or its nonlinear program.
         trajectory: trajectory, or a file that Moco or :func:`solve` wrote. Its columns are
             interpolated by splines where its times differ from those of the study's grid.
-        folder: as for :func:`solve`.
-        scaled: as for :func:`solve`.
+        folder: folder of the files that a study without a file names; the current folder if None.
+        scaled: column of a table for each scale factor of a goal, see :func:`solve`.
 
     Returns:
         Parts of the objective by goal, and the largest violations.

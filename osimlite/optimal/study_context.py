@@ -105,7 +105,7 @@ class StudyContext:
 
         Args:
             study_object: part of the study.
-            reason: what osimlite does not support, and what to do.
+            reason: clause with the unsupported thing and the next step for the user.
         """
         name = f" '{study_object.name}'" if study_object.name else ""
         return UnsupportedError(
@@ -117,7 +117,7 @@ class StudyContext:
 
         Args:
             study_object: part of the study.
-            reason: what is wrong, and what to do.
+            reason: clause with the error and the next step for the user.
         """
         name = f" '{study_object.name}'" if study_object.name else ""
         return DocumentError(
@@ -138,7 +138,7 @@ class StudyContext:
             study_object: part of the study with the name, for the message.
             name: name to check.
             known_names: known names.
-            noun: what the name stands for, for the message.
+            noun: noun for the named thing, such as "control", for the message.
             owner: owner of the known names, for the message.
 
         Raises:
@@ -222,7 +222,7 @@ def _describe_invalid_value(spec: FieldSpec, value: Any) -> str:
 
     Args:
         spec: property.
-        value: its value, or one of its values.
+        value: value of the property, or one value of a list.
     """
     value_type = spec.kind
     if not isinstance(value_type, Value) or value is None:

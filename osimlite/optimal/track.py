@@ -41,9 +41,10 @@ def build_track_problem(
     Args:
         tool: settings.
         file: setup file of the settings; None for settings that were not read from a file.
-        folder: folder of the files that settings without a file name.
+        folder: folder of the files that the settings name, for settings without a file; the current
+            folder if None.
         more: function that changes the study before the problem is built: goals, bounds, solver.
-        scaled: as for :func:`osimlite.moco.solve`.
+        scaled: column of a table for each scale factor of a goal, see :func:`osimlite.moco.solve`.
 
     Returns:
         The problem, and the guess; None for the middle between the bounds.
@@ -141,8 +142,8 @@ def solve_track(
         folder: folder of the files that the settings name; the current folder if None.
         more: function that changes the study before it is solved: goals, bounds, solver.
         tell: function that is called with the progress after each iteration.
-        refine: as for :func:`osimlite.moco.solve`.
-        scaled: as for :func:`osimlite.moco.solve`.
+        refine: accuracy or settings of mesh refinement, see :func:`osimlite.moco.solve`.
+        scaled: column of a table for each scale factor of a goal, see :func:`osimlite.moco.solve`.
 
     Returns:
         Solution with the motion and the controls.

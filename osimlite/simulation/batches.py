@@ -149,8 +149,8 @@ class BatchEngine(Engine, Protocol):
 
         Args:
             model: the engine's model, whose numbers will change.
-            folder: folder of its file.
-            wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+            folder: folder of the model's file.
+            wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         """
 
 
@@ -257,7 +257,7 @@ class Runs:
     Attributes:
         times: times at which the runs ended (W,), s.
         states: states at the end (W, y), in the engine's order.
-        endings: how each run ended, see `ENDINGS` (W,).
+        endings: reason why each run ended (W,), one of `ENDINGS`.
         counts: accepted steps, attempted steps, evaluations (W, 3).
         reports: states at the report times (W, r, y); NaN after the end of a run.
         events: events of each run in order of time: time (s), name, whether it begins or rises.

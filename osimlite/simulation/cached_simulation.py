@@ -40,8 +40,8 @@ def simulate(
     Args:
         model: the model.
         to: end of the motion, s.
-        engine: what computes the accelerations: "compiled" (the default) or "bullet". A window
-            (`show`) needs "bullet", which is the default there.
+        engine: engine that computes the accelerations: "compiled" (the default) or "bullet". A
+            window (`show`) needs "bullet", which is the default there.
         choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`,
             `fixed_step`, `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and
             others.

@@ -39,7 +39,7 @@ class Gain(NamedTuple):
 
     Attributes:
         name: name of the gain.
-        value: its present value.
+        value: present value of the gain.
         low: lower bound.
         high: upper bound.
     """
@@ -224,12 +224,12 @@ class ControllerRuns:
     """Workspace and record of runs with a controller.
 
     Args:
-        helds: controllers of the models of all runs, which differ in numbers only.
+        controllers: controllers of the models of all runs, which differ in numbers only.
         engine: engine of one of the models, driven by `controls`.
         controls: controls that have a constant for each control of the controller, see
             :meth:`KernelController.add_constants`.
         to: end of a single run, which is recorded, s.
-        before: record of the earlier run that a single run continues.
+        earlier_record: record of the earlier run that a single run continues.
 
     Attributes:
         next_step: step with which the earlier run ended, s; None without one.

@@ -89,7 +89,7 @@ class Copies:
 
         Args:
             which: indices or slice of the copies.
-            states: their states (k, y).
+            states: states of these copies (k, y).
         """
         self.batch.states[which] = states
         # The step size of the old motion says nothing about the new one, and the result must not

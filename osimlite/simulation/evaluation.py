@@ -46,7 +46,7 @@ class StateEvaluator:
         mechanism: the mechanism.
         forces: forces on it besides gravity.
         chain: joints whose mass matrix another program computes; None if the kernels compute it.
-        code: what runs the kernels; by default the fastest that is installed.
+        code: backend that runs the kernels; None for the fastest that is installed.
         apart: whether a body that never moves in its parent is a link of its own.
 
     Attributes:
@@ -105,8 +105,8 @@ class StateEvaluator:
 
         Args:
             mechanism: the mechanism.
-            forces: its forces.
-            numbers: its numbers in the layout of the kernels.
+            forces: forces on the mechanism besides gravity.
+            numbers: numbers of the model in the layout of the kernels.
         """
         self.mechanism, self.forces, self.numbers = mechanism, forces, numbers
         self.state = StateLayout(mechanism, self.order, forces.elements)
@@ -122,8 +122,8 @@ class StateEvaluator:
 
         Args:
             mechanism: mechanism of the other model.
-            forces: its forces.
-            numbers: its numbers.
+            forces: forces of the other model.
+            numbers: numbers of the other model in the layout of the kernels.
         """
         # The ordinary copy would construct a new engine.
         evaluator = object.__new__(type(self))

@@ -60,8 +60,8 @@ def describe_suspect_value(info: CoordinateInfo, name: str, value: float | str) 
 
     Args:
         info: the coordinate.
-        name: its name in the message.
-        value: rad or m, or a text with a unit.
+        name: name of the coordinate in the message.
+        value: value in rad or m, or a text with a unit.
 
     Returns:
         A sentence, or "" if the value is plausible.

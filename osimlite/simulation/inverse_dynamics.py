@@ -111,15 +111,15 @@ def inverse_dynamics(
         external_loads: measured loads or their file; with `applied_to` a table (.mot, .sto, .c3d)
             in the axes of ground.
         times: times of arrays (t,), s.
-        applied_to: for a table of loads, by the names of bodies: for each load the beginnings of
-            the labels of its force, point and moment, such as ``{"calcn_r": [("f1_", "p1_",
-            "m1_")]}``.
+        applied_to: names of the bodies on which a table of loads acts; for each body and load the
+            beginnings of the labels of force, point and moment, such as ``{"calcn_r": [("f1_",
+            "p1_", "m1_")]}``.
         exclude: forces that are ignored: names of forces or groups, "All", "Actuators" or
             "Muscles".
         lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.
         start: first time, s.
         end: last time, s.
-        wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         opensim_derivatives: whether the errors of OpenSim's CustomJoints are reproduced.
         folder: folder of the model's file, in which named files are searched; the current folder if
             None.

@@ -174,7 +174,7 @@ def muscle_curves(
             the last varies fastest.
         muscles: names or paths; all if empty.
         activation: activation of all muscles, 0 to 1.
-        wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         folder: folder of the model's file, in which named files are searched.
         progress: called with the number of finished poses and the total.
 

@@ -144,7 +144,7 @@ def static_optimization(
         lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.
         start: first time, s.
         end: last time, s.
-        wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         opensim_derivatives: whether the errors of OpenSim's CustomJoints are reproduced.
         folder: folder of the model's file, in which named files are searched; the current folder if
             None.
@@ -194,8 +194,8 @@ def _compute_states(
 
     Args:
         model: the model.
-        mechanism: its mechanism.
-        recorded: the motion.
+        mechanism: mechanism of the model.
+        recorded: motion of the mechanism.
 
     Returns:
         Values (rad, m), generalized speeds and accelerations of all coordinates, (t, n) each.

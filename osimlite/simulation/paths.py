@@ -68,8 +68,8 @@ class Paths:
 
     Args:
         model: the model.
-        wrapping: how paths wrap.
-        code: what runs the kernels; by default the fastest that is installed.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
+        code: backend that runs the kernels; None for the fastest that is installed.
         left_out: paths of owners that are ignored.
         mechanism: mechanism of the model; built if None.
 
@@ -125,8 +125,8 @@ class Paths:
 
         Args:
             model: the model of the paths.
-            wrapping: how paths wrap.
-            code: what runs the kernels; by default the fastest that is installed.
+            wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
+            code: backend that runs the kernels; None for the fastest that is installed.
         """
         builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
         routes = self.routes.items()

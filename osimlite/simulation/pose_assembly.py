@@ -34,8 +34,8 @@ def assemble_motion(
         mechanism: the mechanism.
         times: times of the poses (t,), s.
         values: values of all coordinates (t, n), rad and m.
-        code: what runs the kernels; by default machine code, for a few poses only if it is compiled
-            already.
+        code: backend that runs the kernels; None for machine code, or for Python if the poses are
+            few and no machine code is compiled yet.
 
     Returns:
         The assembled values (t, n).

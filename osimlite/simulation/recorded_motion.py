@@ -322,8 +322,10 @@ class RecordedMotion(Movement):
         """Return a part of the motion, at least one row.
 
         Args:
-            first: the part begins with the row at or before this time, s.
-            last: it ends with the row at or before this time, s.
+            first: time at or before which the part begins, s: with the last such row, or the first
+                of all.
+            last: time at or before which the part ends, s: with the last such row, or the first of
+                all.
 
         Returns:
             The part, which remembers the rest for its derivatives.

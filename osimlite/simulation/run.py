@@ -86,8 +86,8 @@ class Simulation:
 
     Args:
         model: the model.
-        engine: what computes the accelerations: "compiled" (the default) or "bullet". A window
-            (`show`) needs "bullet", which is the default there.
+        engine: engine that computes the accelerations: "compiled" (the default) or "bullet". A
+            window (`show`) needs "bullet", which is the default there.
         choices: attributes of :class:`osimlite.simulation.Options`. Those in `RUN_OPTIONS` are
             defaults, which each run may override.
 
@@ -304,7 +304,7 @@ class Simulation:
             start: start time, s.
             y: initial state in the engine's order; it must fulfil the constraints.
             to: end of the motion, s.
-            settings: how to step.
+            settings: settings of the integration.
 
         Returns:
             Times (s), the states at the start and at the end of each step, and the error that ended
@@ -369,7 +369,7 @@ class Simulation:
 
         Args:
             y: initial state (y,).
-            settings: how to step.
+            settings: settings of the integration.
             times: times of the rows, s; the first one is the start.
             progress: called during the motion.
 

@@ -70,7 +70,7 @@ def add_controls(
             actuator; or a table with such columns; or the file of a table or of a ControlSet.
         to: end of the motion, s.
         start: start of the motion, s.
-        description: what is added, for messages.
+        description: plural noun for the added controls, for messages.
 
     Returns:
         The combined controls; as in OpenSim, those of several controllers of an actuator are

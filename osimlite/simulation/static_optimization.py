@@ -52,10 +52,10 @@ class StaticOptimization:
 
     Args:
         model: the model.
-        mechanism: its mechanism.
+        mechanism: mechanism of the model.
         exponent: p, greater than 1.
         muscles: force of a muscle at an activation of 1, one of `MUSCLES`.
-        wrapping: how paths wrap.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         external_loads: measured loads or their file.
         folder: folder of the model's file.
         early_return: whether Simbody's defect in contacts of several surfaces is reproduced.
@@ -157,7 +157,8 @@ class StaticOptimization:
             times: times (t,), s.
             values: values of all coordinates (t, n), rad and m.
             speeds: generalized speeds (t, n).
-            accelerations: their derivatives (t, n); those of constrained coordinates are ignored.
+            accelerations: derivatives of the generalized speeds (t, n); those of constrained
+                coordinates are ignored.
 
         Returns:
             The distribution, with what is missing at times without a solution.
@@ -195,7 +196,8 @@ class StaticOptimization:
             times: times (t,), s.
             values: values of all coordinates (t, n).
             speeds: generalized speeds (t, n).
-            accelerations: their derivatives (t, n), which the constraints allow.
+            accelerations: derivatives of the generalized speeds (t, n), which fulfil the
+                constraints.
             directions: motion D of all coordinates with each free one (t, n, m).
 
         Returns:
@@ -256,7 +258,7 @@ class StaticOptimization:
             times: times (t,), s.
             values: values of all coordinates (t, n).
             speeds: generalized speeds (t, n).
-            accelerations: their derivatives (t, n).
+            accelerations: derivatives of the generalized speeds (t, n).
 
         Returns:
             Forces (t, a), N or N m.
@@ -281,7 +283,7 @@ class StaticOptimization:
             times: times (t,), s.
             values: values of all coordinates (t, n).
             speeds: generalized speeds (t, n).
-            accelerations: their derivatives (t, n).
+            accelerations: derivatives of the generalized speeds (t, n).
 
         Returns:
             Required generalized forces (t, f), contributions of each actuator per 1 N (t, f, a),

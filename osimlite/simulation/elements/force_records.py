@@ -107,8 +107,8 @@ class ForceElement(Protocol):
         """Return one row of the columns.
 
         Args:
-            records: its output records after an evaluation.
-            origins: origin of each body in ground, m; ground's origin is the last.
+            records: output records of the force after an evaluation.
+            origins: origin of each body in ground, m; the last one is that of ground.
 
         Returns:
             One number for each of `columns`, SI units.
@@ -125,7 +125,7 @@ class ForceElement(Protocol):
         """Return the potential energy of the force.
 
         Args:
-            records: its output records after an evaluation.
+            records: output records of the force after an evaluation.
 
         Returns:
             Energy, J.

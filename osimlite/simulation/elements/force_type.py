@@ -85,7 +85,7 @@ class ForceType:
 
     Attributes:
         component: class of the forces.
-        geometry: where the forces act.
+        geometry: geometry of the forces, which computes inputs of the law and applies its results.
         law: function that computes the outputs.
         outputs: names of the results of the law: loads that the geometry applies, rates of states,
             recorded quantities.
@@ -100,8 +100,8 @@ class ForceType:
         equilibrium: function with the arguments of the law that returns whether there is an
             equilibrium, and the values of `solved_states`.
         solved_states: names of the states in equilibrium.
-        rigid_law: of muscles: function with the arguments of the law that returns the force (N) of
-            fully active fibers along a rigid tendon.
+        rigid_law: muscles only: function with the arguments of the law that returns the force (N)
+            of fully active fibers along a rigid tendon.
         law_from_record: cheaper form of the law for derivatives at the last evaluation; its
             additional parameters are names of recorded quantities.
         contact_response: name of the kernel with the derivatives of a contact force along its
@@ -369,8 +369,8 @@ class DeclaredForce:
         """Return one row of the columns; see :class:`osimlite.simulation.elements.force_records.ForceElement`.
 
         Args:
-            records: its output records after an evaluation.
-            origins: origin of each body in ground, m; ground's origin is the last.
+            records: output records of the force after an evaluation.
+            origins: origin of each body in ground, m; the last one is that of ground.
         """
         force_type = self.force_type
         if force_type.labels is None:
@@ -390,10 +390,10 @@ class DeclaredForce:
         return [force_type.record_offsets[output] for output in force_type.labels.values()]
 
     def list_named_values(self, record: Sequence[float]) -> dict[str, float]:
-        """Return its scalar parameters and the values of its record, by name.
+        """Return the scalar parameters of the force and the values of a record, by name.
 
         Args:
-            record: its record after an evaluation.
+            record: output record of the force after an evaluation.
 
         Returns:
             Values by the names of properties and of recorded quantities.
@@ -408,10 +408,10 @@ class DeclaredForce:
         return numbers | {name: record[place] for name, place in force_type.record_offsets.items()}
 
     def describe_failure(self, record: Sequence[float]) -> str:
-        """Return the words for a message about a law without a solution.
+        """Return the words for a message about a force whose law has no solution.
 
         Args:
-            record: its record after an evaluation.
+            record: output record of the force after an evaluation.
 
         Returns:
             The path of the force, and what its type adds.

@@ -63,7 +63,7 @@ def force_elements(
         simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
         own_activation_times: do not reproduce OpenSim's defect in the activation of several
             DeGrooteFregly2016Muscles.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         external_loads: measured loads or their file; their elements follow the forces of the model.
         folder: folder of the model's file and of the files that it names; the working directory if
             None.

@@ -152,8 +152,8 @@ class DeclaredProbe(Silent):
         gain: factor of the reported results.
         initial: initial values of integrals.
         reading: inputs.
-        places: for each subject and each input, the element whose record has it, and the offset
-            there.
+        places: path of the element whose record has the input, and offset of the input in this
+            record, for each subject and each input.
         numbers: last argument of the law for each subject.
     """
 

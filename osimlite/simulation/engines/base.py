@@ -91,7 +91,8 @@ class KernelEngine(System):
         Args:
             t: time, s.
             y: state (y,).
-            settings: how to step: with error control, or by fixed steps of semi-implicit Euler.
+            settings: settings of the integration: error control, or fixed steps of semi-implicit
+                Euler.
             observe: called with time and state after each step.
         """
         if settings.fixed_step is not None:
@@ -141,7 +142,7 @@ class KernelEngine(System):
 
         Args:
             q: values of the coordinates in the state.
-            u: their generalized speeds.
+            u: generalized speeds in the state.
         """
         y = q + u + [0.0] * len(self.state.variables)
         status = self.realize(0.0, y, STAGE.VELOCITY)

@@ -49,7 +49,8 @@ class BatchWorkspace:
         clocks: time and next step of each run, s (W, 2).
         counts: see :mod:`osimlite.mechanics.kernels.record` (W, 6).
         states: states at the end (W, y).
-        endings: how each run ended (W,).
+        endings: reason why each run ended, one of :class:`osimlite.mechanics.kernels.record.ENDING`
+            (W,).
         reports: states at the report times (W, r, y), NaN after the end of a run.
         events: time, index, 1 for a begin, and the state if it is recorded (W, e, 3 or 3 + y).
         peaks: largest force of each contact and its time (W, P, 2).
@@ -168,7 +169,7 @@ class BatchWorkspace:
         """Call a kernel of :mod:`osimlite.mechanics.kernels.walks`.
 
         Args:
-            law: its name.
+            law: name of the kernel.
             workspace: workspace, see :meth:`make_workspace`.
             numbers: numbers of the model (x,), which the kernel changes.
             parts: further arguments of the kernel.

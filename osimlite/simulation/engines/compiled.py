@@ -254,8 +254,8 @@ class CompiledEngine(KernelEngine):
 
         Args:
             model: the engine's model, whose numbers will change.
-            folder: folder of its file.
-            wrapping: how paths wrap.
+            folder: folder of the model's file.
+            wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         """
         from osimlite.simulation.engines.model_update import NumberUpdater
 

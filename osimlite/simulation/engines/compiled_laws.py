@@ -48,7 +48,7 @@ def load_function(symbol: str, function: Function, directions: int) -> int | Non
     """Return the address of a function that was compiled earlier.
 
     Args:
-        symbol: its name in the library.
+        symbol: name of the function in the library.
         function: the function it was compiled from.
         directions: number of derivatives of its dual numbers; 0 for floats.
 
@@ -103,7 +103,7 @@ def compile_function(symbol: str, function: Function, directions: int) -> int:
     """Compile a function, and save it if a folder allows that.
 
     Args:
-        symbol: its name in the library.
+        symbol: name of the function in the library.
         function: a function in the restricted Python of kernels.
         directions: number of derivatives of its dual numbers; 0 for floats.
 

@@ -64,8 +64,8 @@ class DualNumber:
     """Number with its derivatives along several directions.
 
     Args:
-        value: the number.
-        slopes: its derivatives.
+        value: value of the number.
+        slopes: derivatives along the directions.
     """
 
     __array_ufunc__ = None
@@ -130,7 +130,8 @@ def _apply_chain_rule(
 
     Args:
         function: function of floats.
-        slopes: its derivative by each argument, as functions of the arguments and the value.
+        slopes: derivative of the function by each argument, as functions of the arguments and the
+            value.
 
     Returns:
         Function that returns a float if all arguments are floats.

@@ -38,8 +38,8 @@ class KernelLibrary:
 
     Attributes:
         path: path of the shared library.
-        table: its table: "version", "target", "compiler", "sources" and "laws"; for a native
-            library also "features" and "times".
+        table: description that the library contains: "version", "target", "compiler", "sources" and
+            "laws"; for a native library also "features" and "times".
 
     Raises:
         OSError: the library cannot be loaded.

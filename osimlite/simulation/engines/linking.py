@@ -314,7 +314,7 @@ class Program:
 
     Args:
         packed: the packed model.
-        code: what runs it.
+        code: backend that runs the kernels.
         entries: names of the functions that are called from outside; they are prepared with the
             rest.
 
@@ -396,11 +396,11 @@ class Program:
         exceptions cannot pass through machine code.
 
         Args:
-            function: the kernel.
-            parts: its arguments.
+            function: kernel to call.
+            parts: arguments of the kernel.
 
         Returns:
-            Its outcome.
+            Outcome of the kernel.
         """
         # Without Python kernels no signal handler can run inside the call.
         if not any(self._kept):

@@ -39,10 +39,10 @@ class NumberUpdater:
     many a motion, so the numbers are replaced where the structure stays the same.
 
     Args:
-        model: the model; nothing else in it changes.
+        model: the model, in which only forces, masses and gravity change.
         engine: engine of the model before the change.
-        folder: folder of its file.
-        wrapping: how its paths wrap.
+        folder: folder of the model's file.
+        wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
     """
 
     def __init__(self, model: Model, engine: CompiledEngine, folder: Path, wrapping: str) -> None:
@@ -191,8 +191,8 @@ class NumberUpdater:
         """Return the numbers of a newly packed model.
 
         Args:
-            mechanism: its mechanism.
-            forces: its forces.
+            mechanism: mechanism of the model.
+            forces: forces of the model.
 
         Returns:
             The numbers (m,); None if the structure differs from the engine's.

@@ -30,7 +30,8 @@ class EngineSettings(IntegrationOptions):
 
     Attributes:
         fixed_step: length (s) of fixed steps, which replace error control.
-        route: how the accelerations are computed, in the engine's terms; "auto" lets it choose.
+        route: method that computes the accelerations, one of the engine's routes; "auto" lets the
+            engine select it.
         show: whether a window shows the motion meanwhile.
         visuals: shapes of the bodies in the window.
         held: controllers of the runs.
@@ -52,7 +53,7 @@ class Engine(Protocol):
     Attributes:
         name: name of the engine.
         version: version of the program that computes.
-        route: how the accelerations are computed.
+        route: method that computes the accelerations, one of the engine's routes.
         order: index in the mechanism of each coordinate of the state.
         state: layout of the state.
         contacts: names of the contacts, by index.
@@ -144,7 +145,7 @@ class Engine(Protocol):
         Args:
             t: time, s.
             y: state (y,).
-            settings: how to step.
+            settings: settings of the integration.
             observe: called with time and state after each step.
         """
 

@@ -32,8 +32,8 @@ class MeshCopy:
 
     Attributes:
         file: path relative to the robot's own file.
-        source: file that was found.
-        converted: what was converted, or "".
+        source: mesh file that the model refers to.
+        converted: phrase that describes the conversion, or "".
         misspelt: whether the name of the file differs from that in the model in capitals or
             slashes.
     """
@@ -108,7 +108,7 @@ class MeshFiles:
         """Return the name of a mesh file, and add the file if it is new.
 
         Args:
-            key: what the file depends on; equal keys give the same file.
+            key: properties that determine the content; equal keys share one file.
             stem: name without suffix.
             kind: suffix.
             content: content of the file.
@@ -135,8 +135,8 @@ def _convert_mesh(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
     """Return the content of a converted mesh file.
 
     Args:
-        source: the file.
-        kind: its suffix.
+        source: mesh file to convert.
+        kind: suffix of the file.
         signs: signs of the scale factors.
 
     Returns:

@@ -69,7 +69,7 @@ class RobotJoint:
 
     Attributes:
         name: name, unique among links and joints.
-        kind: how the joint moves.
+        kind: type of the joint: "fixed", "revolute" or "prismatic".
         parent: name of the parent link.
         child: name of the child link.
         origin: frame of the joint in the parent link (4, 4).
@@ -276,7 +276,7 @@ class Visual:
 
     Attributes:
         shape: the shape.
-        origin: its frame (4, 4) in the frame of the link or body that it belongs to.
+        origin: frame of the shape (4, 4) in the frame of the link or body that it belongs to.
         color: red, green, blue and opacity, 0 to 1.
         source: absolute path of the model's geometry.
     """

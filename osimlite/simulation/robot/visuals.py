@@ -38,13 +38,13 @@ class NoteWriter(Protocol):
     def __call__(
         self, kind: str, component: str, cannot_say: str, done: str, detail: str = ""
     ) -> None:
-        """Record it; the arguments are those of a record of the translation.
+        """Record a loss; the arguments are those of a record of the translation.
 
         Args:
             kind: kind of the loss.
             component: path of the component.
-            cannot_say: what the format cannot express.
-            done: what was done instead.
+            cannot_say: property that the format cannot express.
+            done: replacement of this property in the output.
             detail: details.
         """
 
@@ -142,7 +142,7 @@ class _Collector:
 
         Args:
             geometry: the geometry.
-            path: its path.
+            path: path of the geometry in the model.
 
         Returns:
             Shape and frame (4, 4); None if it cannot be drawn, which is noted.
@@ -207,7 +207,7 @@ class _Collector:
 
         Args:
             path: path of the geometry.
-            sizes: its sizes, m.
+            sizes: sizes of the shape, m.
         """
         if all(0.0 < size < GREATEST for size in sizes):
             return True

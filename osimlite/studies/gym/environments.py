@@ -178,9 +178,10 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
 
     Args:
         task: task, or a function that returns it.
-        model: instead of a task, a model or its file.
-        reward: with `model`, function of the observations before and after a step
-            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,).
+        model: model, or file of a model, in place of a task.
+        reward: function of the observations before and after a step
+            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,); for `model`
+            only.
         render_mode: "rgb_array" or None.
         options: further attributes of :class:`osimlite.studies.gym.tasks.Task`.
 
@@ -264,8 +265,10 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     Args:
         num_envs: number of copies w.
         task: task, or a function that returns it.
-        model: instead of a task, a model or its file.
-        reward: with `model`, function of the observations before and after a step.
+        model: model, or file of a model, in place of a task.
+        reward: function of the observations before and after a step
+            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,); for `model`
+            only.
         render_mode: "rgb_array" or None.
         options: further attributes of :class:`osimlite.studies.gym.tasks.Task`.
 

@@ -78,7 +78,7 @@ class Reflexes:
 
     Args:
         node: node of the controller.
-        kind: class of the controller, from `CONTROLLERS`.
+        controller_type: name of the controller's class, one of `CONTROLLERS`.
         walkers: model with its actuators, legs and sensors.
         parameters: values of the parameters of all candidates.
 

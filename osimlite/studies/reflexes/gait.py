@@ -101,8 +101,8 @@ def measure_gait(scenario: Scenario, walked: WalkResult) -> GaitMeasures | None:
     """Return the gait of the first candidate of a walk; None for a model without two legs.
 
     Args:
-        scenario: scenario that has been simulated.
-        walked: its result.
+        scenario: scenario whose candidates were simulated.
+        walked: result of the simulation.
     """
     walkers = scenario.get_walkers(1)
     if len(walkers.legs) != 2:

@@ -94,8 +94,8 @@ class Measure(ABC):
     Args:
         node: node of the measure.
         walkers: candidates to score.
-        criteria: criteria to which it adds its own.
-        above: composite measure that it is part of.
+        criteria: criteria of the scenario, to which the measure adds those that it needs.
+        parent: composite measure that this one is a part of; None if there is none.
         side: ending of names of one side, or "" for a measure of both.
 
     Attributes:

@@ -46,15 +46,16 @@ class Parameters:
     """Values of the parameters of some candidates, and a register of the parameters that were read.
 
     Args:
-        values: per name one value for all candidates, or an array (w,) with one value each. A
-            parameter that is not named has its mean.
+        values: value of each parameter by name: one for all candidates, or an array (w,) with one
+            for each. A parameter that is not named has its mean.
         count: number of candidates w.
 
     Attributes:
-        requested: per name the parameters that a scenario has asked for.
-        values_used: per name all numbers that a scenario has asked for, fixed ones too, of the
-            first candidate.
-        auto_std_factor: standard deviation over the absolute mean of a parameter that states none.
+        requested: parameters that a scenario has read, by name.
+        values_used: numbers of the first candidate that a scenario has read, by name, including
+            fixed ones.
+        auto_std_factor: ratio of the standard deviation to the absolute mean for a parameter that
+            states no deviation.
     """
 
     def __init__(self, values: Mapping[str, Array | float], count: int = 1) -> None:

@@ -76,11 +76,12 @@ class WalkResult:
         results: score of each candidate (w,), smaller is better; a measure to be maximized has its
             sign changed.
         times: time at which each walk ended (w,) (s).
-        terms: per name of a measure its weighted contribution to the results (w,).
-        report: per name a further quantity of a measure (w,), for example the speed (m/s).
+        terms: weighted contribution of each measure to the results (w,), by the name of the
+            measure.
+        report: further quantities of the measures (w,), for example the speed (m/s), by name.
         states: states of the first candidate at each control step.
-        excitations: excitations of its muscles.
-        loads: ground reaction force on each of its legs over the body weight.
+        excitations: excitations of the muscles of the first candidate.
+        loads: ground reaction force on each leg of the first candidate over the body weight.
     """
 
     results: Array
@@ -104,7 +105,8 @@ class Scenario:
         model: model that walks.
         controller: class name and node of the controller.
         measure: class name and node of the measure.
-        initial: per parameter the best value, mean and standard deviation from the `init` files.
+        initial: best value, mean and standard deviation of each parameter from the `init` files, by
+            name.
         duration: longest duration of a walk (s).
         step: duration of a control step (s).
         population: candidates per generation of a search.
@@ -244,8 +246,8 @@ class Scenario:
         """Simulate candidates until they fall or the duration ends.
 
         Args:
-            values: per name of a parameter one value for all candidates, or an array (w,) with one
-                each. Others have their means.
+            values: value of each parameter by name: one for all candidates, or an array (w,) with
+                one for each. Others have their means.
             count: number of candidates w.
             duration: longest duration (s); by default that of the scenario.
 

@@ -71,7 +71,7 @@ class SensedModel:
     Attributes:
         names: names of the actuators, muscles first.
         paths: paths of the actuators in the same order.
-        order: per actuator the index of its control among those of the model.
+        order: index of each actuator's control among the controls of the model.
         muscles: muscles of the model, in the order of `names`.
         optimal: optimal fiber lengths of the muscles (m).
         strengths: maximum isometric forces of the muscles (N).
@@ -286,7 +286,7 @@ class Walkers(SensedModel):
         legs: names of the legs, see :class:`SensedModel`.
 
     Attributes:
-        offsets: per path of a state variable its offset in the state.
+        offsets: offset in the state of each state variable, by path.
         rows: sensor row of each candidate (w, r).
         excitations: excitations that are held over a control step (w, c).
         progress: counts of each walk (w, p), see `PROGRESS` in

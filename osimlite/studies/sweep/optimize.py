@@ -309,11 +309,11 @@ def _open_history(
 
 
 class _Evaluations:
-    """Cost function of a search: from the history as far as it goes, then by simulation.
+    """Cost function of a search: costs come from earlier sessions first, then from simulations.
 
     Args:
         plan: plan with the objective as its first measure.
-        free: indices of the variables that vary.
+        free_indices: indices of the variables that vary.
         sign: factor that makes a cost of the objective.
         is_bounded: whether points are clipped to the ranges.
         budget: number of evaluations that are allowed.

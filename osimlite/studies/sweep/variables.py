@@ -104,11 +104,11 @@ class Property:
 
 @dataclass(frozen=True)
 class FunctionParameter:
-    """Argument of the function that makes the model.
+    """Argument of the user's function that makes the model.
 
     Attributes:
         name: name of the argument.
-        default: its default, or None.
+        default: default value of the argument; None if it has none.
     """
 
     name: str
@@ -143,7 +143,7 @@ class Variable:
 
     Attributes:
         name: name as the user wrote it.
-        target: what it changes.
+        target: number that the variable changes.
         low: smallest value (rad, m or the unit of the property).
         high: largest value.
         count: number of values in a grid, or None.
@@ -400,7 +400,7 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
 
     Args:
         name: name of the variable.
-        target: what it changes.
+        target: number that the variable changes.
         unit: unit of the number.
         value_range: range as the user wrote it.
     """

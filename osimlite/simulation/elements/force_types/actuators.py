@@ -38,11 +38,11 @@ def define_actuator(component: type, geometry: ForceGeometry, output: str) -> Fo
 
     Args:
         component: class of the actuator.
-        geometry: where the output acts.
+        geometry: geometry that applies the output.
         output: name of the output that the geometry applies.
 
     Returns:
-        The declaration, which still has to be registered.
+        Declaration of the class, which still has to be registered.
     """
     return ForceType(
         component,

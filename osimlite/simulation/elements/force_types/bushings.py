@@ -31,7 +31,7 @@ def compute_linear_bushing(
 
     Args:
         deviations: three angles (rad) and a translation (m) (6,).
-        rates: their rates (6,).
+        rates: rates of the deviations, rad/s and m/s (6,).
         loads: receives moments (N.m) and forces (N) (6,).
         stiffness: k of each deviation (6,), N.m/rad and N/m.
         damping: d of each deviation (6,), N.m.s/rad and N.s/m.
@@ -90,9 +90,9 @@ def compute_function_bushing(
 
     Args:
         deviations: three angles (rad) and a translation (m) (6,).
-        rates: their rates (6,).
+        rates: rates of the deviations, rad/s and m/s (6,).
         loads: receives moments (N.m) and forces (N) (6,).
-        damping: damping of each deviation (6,).
+        damping: damping of each deviation (6,), N.m.s/rad and N.s/m.
         mx: table of the resisting moment over the first angle.
         my: table over the second angle.
         mz: table over the third angle.
@@ -157,11 +157,11 @@ def compute_expression_bushing(
 
     Args:
         deviations: three angles (rad) and a translation (m) (6,).
-        rates: their rates (6,).
+        rates: rates of the deviations, rad/s and m/s (6,).
         loads: receives moments (N.m) and forces (N) (6,).
-        damping: damping of each deviation (6,).
+        damping: damping of each deviation (6,), N.m.s/rad and N.s/m.
         steps: steps of the six expressions.
-        constants: their constants.
+        constants: constants of the six expressions.
         registers: registers of the expressions; the first six are the deviations.
     """
     for k in range(6):

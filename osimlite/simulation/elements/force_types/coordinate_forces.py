@@ -26,7 +26,7 @@ def compute_coordinate_spring(
 
     Args:
         q: coordinate, rad or m.
-        u: its speed, rad/s or m/s.
+        u: speed of the coordinate, rad/s or m/s.
         k: stiffness, N.m/rad or N/m.
         q0: rest value, rad or m.
         c: viscosity, N.m.s/rad or N.s/m.
@@ -71,7 +71,7 @@ def compute_linear_stop(
 
     Args:
         q: coordinate, rad or m.
-        u: its speed, rad/s or m/s.
+        u: speed of the coordinate, rad/s or m/s.
         k: stiffness, N.m/rad or N/m.
         d: damping, s/rad or s/m.
         upper: upper limit, rad or m.
@@ -119,13 +119,13 @@ def compute_exponential_limit(
 
     Args:
         q: coordinate, rad or m.
-        u: its speed, which has no effect.
+        u: speed of the coordinate, which has no effect.
         lower: lower limit, rad or m.
         upper: upper limit, rad or m.
         a: force at the lower limit, N.m or N.
-        b: growth rate below it, 1/rad or 1/m.
+        b: growth rate of the force below the lower limit, 1/rad or 1/m.
         c: force at the upper limit, N.m or N.
-        d: growth rate above it, 1/rad or 1/m.
+        d: growth rate of the force above the upper limit, 1/rad or 1/m.
 
     Returns:
         Generalized force (N.m, N) and energy (J).

@@ -22,13 +22,13 @@ def compute_coordinate_limit(
 
     Args:
         q: coordinate, rad or m.
-        u: its speed, rad/s or m/s.
+        u: speed of the coordinate, rad/s or m/s.
         Ku: stiffness at the upper limit, N.m/rad or N/m.
         qu: upper limit, rad or m.
         Kl: stiffness at the lower limit, N.m/rad or N/m.
         ql: lower limit, rad or m.
         D: damping, N.m.s/rad or N.s/m.
-        t: transition, rad or m.
+        t: width of the transition zone, rad or m.
 
     Returns:
         Generalized force (N.m, N), dissipated power (W), and energy (J).

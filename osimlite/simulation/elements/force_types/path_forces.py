@@ -222,8 +222,8 @@ def compute_expression_tension(
         l0: resting length, m.
         clamped: above 0 if a negative stretch counts as 0.
         steps: steps of the expression.
-        constants: its constants.
-        registers: its registers.
+        constants: constants of the expression.
+        registers: workspace of the expression: two variables and the result of each step.
 
     Returns:
         Tension, N.

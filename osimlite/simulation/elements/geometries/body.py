@@ -331,9 +331,9 @@ class NamedStation(NamedTuple):
     """Station of the model.
 
     Attributes:
-        name: its name.
-        body: index of its body.
-        point: its position in the body, m.
+        name: name of the station.
+        body: index of the body that the station is fixed to.
+        point: position of the station in this body, m.
     """
 
     name: str

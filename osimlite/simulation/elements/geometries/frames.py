@@ -104,8 +104,8 @@ def mask_undamped_rate(rate: float, damping: float) -> float:
     """Return the rate, or 0 without damping, because rates of angles may be infinite.
 
     Args:
-        rate: rate of a deviation.
-        damping: its damping.
+        rate: rate of a deviation, rad/s or m/s.
+        damping: damping of this deviation, N.m.s/rad or N.s/m.
     """
     return rate if damping != 0.0 else 0.0
 
@@ -126,9 +126,9 @@ class Frame(NamedTuple):
     """Frame of a bushing.
 
     Attributes:
-        name: its name.
-        body: index of its body.
-        placed: its placement in the body (4, 4).
+        name: name of the frame.
+        body: index of the body that the frame is fixed to.
+        placed: transform of the frame in this body (4, 4).
     """
 
     name: str

@@ -103,8 +103,8 @@ class ForceGeometry:
 
         Args:
             force: the element.
-            record: its part of the record.
-            origins: origin of each body in ground, m; ground's origin is the last.
+            record: part of the output record that the geometry fills.
+            origins: origin of each body in ground, m; the last one is that of ground.
         """
         return list(record[: self.record_size(force.location)])
 

@@ -58,7 +58,7 @@ def evaluate_load(g: Ints, gp: Floats, work: Floats, t: float) -> None:
 
     Args:
         g: integers of the load, see :func:`apply_load`.
-        gp: its numbers.
+        gp: numbers of the load, see :func:`apply_load`.
         work: receives the values (9,).
         t: time, s.
     """

@@ -220,7 +220,8 @@ class BulletEngine(KernelEngine):
         Args:
             t: time, s.
             y: state (y,).
-            settings: how to step; Bullet takes fixed steps itself if its joints are coordinates.
+            settings: settings of the integration; Bullet itself takes fixed steps if its joints are
+                coordinates.
             observe: called with time and state after each step.
         """
         window = self.window
@@ -256,7 +257,7 @@ def _has_own_coordinates(mechanism: Mechanism, robot: Robot) -> bool:
 
     Args:
         mechanism: the mechanism.
-        robot: its robot.
+        robot: robot form of the mechanism.
     """
     places = [joint.coordinates[0] for joint in robot.moving]
     return (

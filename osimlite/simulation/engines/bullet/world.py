@@ -190,7 +190,7 @@ class World:
 
         Args:
             q: values of the joints, rad or m.
-            rates: their rates.
+            rates: rates of the joints, rad/s or m/s.
         """
         bullet.resetJointStatesMultiDof(
             self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client
@@ -229,8 +229,8 @@ class World:
         They are the change of the rates in a step of one second.
 
         Args:
-            q: values of the joints.
-            rates: their rates.
+            q: values of the joints, rad or m.
+            rates: rates of the joints, rad/s or m/s.
             forces: forces on the joints, N or N m.
         """
         # A step of 1 s from these rates changes them by the acceleration (semi-implicit Euler).
