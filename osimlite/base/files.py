@@ -28,7 +28,7 @@ They are searched after the folders of OpenSim's search.
 """
 
 MESH_FOLDER_HINT = f"in the environment variable {GEOMETRY_VARIABLE}, or with --geometry"
-"""How users name a folder of meshes; part of messages."""
+"""Sentence part of messages that says how users name a folder of meshes."""
 
 
 def list_mesh_folders() -> tuple[Path, ...]:
@@ -125,11 +125,11 @@ def expect_size(size: int, path: str | Path) -> int:
 
 
 def get_relative_path(path: str | Path, folder: str | Path) -> str:
-    """Return a path relative to a folder, with slashes; on another drive of Windows the absolute path.
+    """Return a path relative to a folder, with slashes; on another Windows drive the absolute path.
 
     Args:
-        path: the path.
-        folder: the folder.
+        path: path of a file or folder.
+        folder: folder that the result starts from.
     """
     try:
         return Path(os.path.relpath(path, folder)).as_posix()

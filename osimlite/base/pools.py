@@ -59,7 +59,7 @@ class Pool(Protocol):
 
         Args:
             tag: identifies the task in `result`.
-            values: argument of the work; in a sweep samples (k, d).
+            values: argument of the work; in a sweep, samples (k, d).
         """
 
     def result(self, timeout: float | None = None) -> tuple[Any, Any]:
@@ -139,7 +139,7 @@ class LocalPool:
 
         Args:
             tag: value that is returned with the result.
-            values: input of the work.
+            values: argument of the work.
         """
         # Processes that start now inherit the blocked signal, so that Ctrl-C does not reach them.
         with _delay_interrupts(), _report_lost_workers():
@@ -238,7 +238,7 @@ class ClusterPool:
 
         Args:
             tag: value that is returned with the result.
-            values: input of the work.
+            values: argument of the work.
         """
         self._submit_task(tag, values, 0)
 
@@ -288,7 +288,7 @@ class ClusterPool:
                 ) from error
 
     def _make_lost_error(self) -> ClusterLostError:
-        """Return the error for a scheduler that has gone."""
+        """Return the error for a scheduler that does not answer any more."""
         return ClusterLostError(
             f"the Dask scheduler at '{self._address}' does not answer any more; continue with --resume"
         )
@@ -349,7 +349,7 @@ def run_remote_task(work: Callable[[Any], Any], values: Any, version: str) -> An
 
     Args:
         work: function of the task.
-        values: its argument.
+        values: argument of the function.
         version: version of osimlite that submitted the task.
 
     Returns:

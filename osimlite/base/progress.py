@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar
 
 Listener = Callable[[str, float, float, str], object]
-"""Function that receives what is done, how much of it is done, of how much, and the unit."""
+"""Function that receives the name of the work, the finished and the total amount, and the unit."""
 
 FIRST_ROWS = 8
 """Number of rows in the first call of a kernel, whose speed is unknown."""
@@ -27,12 +27,12 @@ class SizedIterable(Sized, Iterable[_T], Protocol[_T]):
 
 
 def report_progress(title: str, done: float, total: float, unit: str = "") -> None:
-    """Tell the listeners how far a piece of work is; without any this costs nothing.
+    """Report the finished amount of some work to the listeners; without any this costs nothing.
 
     Args:
-        title: what is done, such as "tracking the motion".
-        done: how much is done.
-        total: how much there is to do; 0 if that is unknown.
+        title: name of the work, such as "tracking the motion".
+        done: finished amount, in `unit`.
+        total: total amount, in `unit`; 0 if it is unknown.
         unit: unit of the amounts, with a blank before it.
     """
     for listener in _listeners:
@@ -40,17 +40,17 @@ def report_progress(title: str, done: float, total: float, unit: str = "") -> No
 
 
 def report_stage(title: str) -> None:
-    """Tell the listeners which work of unknown duration begins now.
+    """Report to the listeners that work of unknown duration begins.
 
     Args:
-        title: what is done.
+        title: name of the work, such as "building the model".
     """
     report_progress(title, 0.0, 0.0)
 
 
 @contextmanager
 def listen_to_progress(listener: Listener) -> Iterator[None]:
-    """Call a function with all progress that is reported within the context."""
+    """Call a function with all progress reports within the context."""
     _listeners.append(listener)
     try:
         yield
@@ -60,7 +60,7 @@ def listen_to_progress(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def mute_progress() -> Iterator[None]:
-    """Report nothing within the context: for the steps of work that reports its progress itself."""
+    """Suppress reports within the context, for steps of work that reports its progress itself."""
     listeners = _listeners[:]
     _listeners.clear()
     try:
@@ -76,9 +76,9 @@ def divide_rows(title: str, count: int, unit: str = " frames") -> Iterator[slice
     duration of the call before, so that each call takes about `CALL_S`.
 
     Args:
-        title: what is done.
+        title: name of the work.
         count: number of rows.
-        unit: what the rows are, with a blank before it.
+        unit: name of the rows in the plural, with a blank before it.
 
     Yields:
         Slices that cover all rows; one empty slice if there is no row.
@@ -99,12 +99,12 @@ def divide_rows(title: str, count: int, unit: str = " frames") -> Iterator[slice
 
 
 def watch_items(title: str, items: SizedIterable[_T], unit: str = " frames") -> Iterator[_T]:
-    """Yield items, and report how many are done.
+    """Yield items, and report the number of finished ones after each.
 
     Args:
-        title: what is done.
-        items: the items.
-        unit: what the items are, with a blank before it.
+        title: name of the work.
+        items: items with a known count.
+        unit: name of the items in the plural, with a blank before it.
     """
     count = len(items)
     for number, item in enumerate(items, start=1):

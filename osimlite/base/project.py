@@ -50,7 +50,7 @@ def parse_max_file_size(file: Path, table: dict[str, Any]) -> int:
 
     Args:
         file: settings file, for messages.
-        table: its content.
+        table: settings in the file, by key.
 
     Raises:
         OsimliteError: the setting `largest-file` is invalid.

@@ -63,7 +63,7 @@ def read_at_most(path: str | Path, limit: int) -> bytes:
     """Return the first `limit` bytes of a regular file, or all of it if it is shorter.
 
     Args:
-        path: the file.
+        path: path of the file.
         limit: number of bytes.
 
     Raises:

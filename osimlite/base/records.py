@@ -55,7 +55,7 @@ def field(
         init: whether ``__init__`` has a parameter for the attribute.
         repr: whether ``__repr__`` shows it.
         compare: whether ``__eq__`` compares it.
-        option: its description as an option, see :mod:`osimlite.base.options`.
+        option: declaration of the attribute as an option, see :mod:`osimlite.base.options`.
     """
     return _Field(default, default_factory, init=init, repr=repr, compare=compare, option=option)
 

@@ -33,7 +33,7 @@ def require(module: str, *, extra: str, purpose: str, alternative: str = "") -> 
     Args:
         module: name to import, e.g. ``"numpy"`` or ``"matplotlib.pyplot"``.
         extra: extra of osimlite that installs it, e.g. ``"sim"``.
-        purpose: what needs it, as the subject of a sentence: ``"the PyBullet engine"``.
+        purpose: subject of the message "... needs numpy", such as ``"the PyBullet engine"``.
         alternative: alternative that works without it, if any.
 
     Returns:

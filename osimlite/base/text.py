@@ -80,7 +80,7 @@ def _escape_match(match: re.Match[str], starts_line: bool) -> str:
 
 
 def _escape_character(character: str) -> str:
-    """Return the escape of a character, of a lone surrogate that of its byte."""
+    """Return the escape of a character; for a lone surrogate, the escape of its byte."""
     if "\udc80" <= character <= "\udcff":
         return f"\\x{ord(character) - 0xDC00:02x}"
     return character.encode("unicode_escape").decode("ascii")
@@ -111,8 +111,8 @@ def find_nearest(word: str, candidates: Iterable[str], *, cutoff: float = 60.0) 
     Case and a namespace before a colon are ignored.
 
     Args:
-        word: the unknown name.
-        candidates: known names; of several that are equally similar the first one counts.
+        word: unknown name.
+        candidates: known names; of equally similar ones the first is returned.
         cutoff: smallest similarity (%).
     """
     names = list(candidates)
@@ -211,8 +211,8 @@ def format_count(number: int, noun: str) -> str:
     """Return a number with a noun: ``"1 step"``, ``"2 steps"``, ``"2 bodies"``.
 
     Args:
-        number: the number.
-        noun: the noun in the singular.
+        number: count of things.
+        noun: noun in the singular.
     """
     plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
     return f"{number} {noun if number == 1 else plural}"
@@ -259,11 +259,11 @@ def make_unique_name(name: str, used_names: Container[str | None], first_number:
 
 
 def join_words(words: Iterable[str], *, max_count: int = 8) -> str:
-    """Return words as ``"a, b and c"``; those after the first `max_count` are counted only.
+    """Return words as ``"a, b and c"``; after the first `max_count` the number of the others.
 
     Args:
-        words: the words.
-        max_count: number of words to list; all by default.
+        words: words to join.
+        max_count: largest number of words to list.
     """
     texts = list(words)
     if len(texts) > max_count:

@@ -73,8 +73,8 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     """Write a file under a temporary name, then rename it.
 
     Args:
-        path: the file.
-        content: its content; text is written in UTF-8.
+        path: file to write.
+        content: content of the file; text is encoded as UTF-8.
 
     Raises:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
@@ -125,7 +125,7 @@ def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
     The new file replaces a regular file or a link; the target of the link stays unchanged.
 
     Args:
-        folder: the folder.
+        folder: existing folder.
         name: name of the file.
 
     Raises:
@@ -143,15 +143,15 @@ def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
     """Write a file in a folder under a name that the program chose, and return its path.
 
     Args:
-        folder: the folder.
+        folder: existing folder.
         name: name of the file.
-        content: its content.
+        content: content of the file; text is encoded as UTF-8.
 
     Returns:
         Path of the file.
 
     Raises:
-        OsimliteError: as of :func:`open_into`.
+        OsimliteError: the file cannot be written, see :func:`open_into`.
     """
     path = Path(folder) / name
     with open_into(folder, name) as stream:
@@ -187,7 +187,7 @@ def write_cached(path: Path, content: str | bytes) -> None:
 
     Args:
         path: path of the entry.
-        content: its content.
+        content: content of the entry; text is encoded as UTF-8.
     """
     with suppress(OSError, OsimliteError):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -399,7 +399,7 @@ def make_folder(path: str | Path) -> Path:
 def prepare_folder(path: str | Path) -> Iterator[Path]:
     """Make a folder before long work begins, and remove it if the work fails without a file.
 
-    Args:
+    path: folder to make, if it does not exist.
         path: the folder.
 
     Yields:

@@ -90,8 +90,8 @@ def make_default(cls: type[Object], **values: Any) -> Any:
 
     Args:
         cls: class of the object.
-        values: its properties. A function is called for every new object, so that no two defaults
-            share a part.
+        values: values of its properties by name. A function is called for every new object, so that
+            defaults share no part.
     """
     return Field(
         default_factory=lambda: cls.build(

@@ -15,8 +15,8 @@ def describe_unknown_property(cls: type[Object], name: str) -> str:
     """Return the message for a property that a class does not have, with the nearest names.
 
     Args:
-        cls: the class.
-        name: the unknown name.
+        cls: class without the property.
+        name: unknown name.
     """
     from osimlite.base.text import suggest_name
 
@@ -35,8 +35,8 @@ def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
     """Return the message for a value that pydantic rejects, in one line.
 
     Args:
-        cls: the class.
-        error: pydantic's error.
+        cls: class of the component.
+        error: error of pydantic.
     """
     first_error = error.errors()[0]
     location = ".".join(str(part) for part in first_error["loc"]) or "?"
@@ -50,11 +50,11 @@ def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
 
 
 def describe_unnamed_value(cls: type[Object], value: object) -> str:
-    """Return the message for a positional argument.
+    """Return the message for a positional argument, which classes of components do not accept.
 
     Args:
-        cls: the class.
-        value: the argument.
+        cls: class of the component.
+        value: value of the argument.
     """
     example = repr(value) if isinstance(value, str) else "..."
     return f"{cls.__name__} takes its properties by name, as in {cls.__name__}(name={example})"

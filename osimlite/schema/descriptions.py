@@ -54,7 +54,7 @@ def add_properties(cls: type[Object], docstring: str) -> str:
 
     Args:
         cls: the class.
-        docstring: its docstring.
+        docstring: docstring of the class.
     """
     rows = [
         inspect.cleandoc(docstring),

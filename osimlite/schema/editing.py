@@ -27,9 +27,9 @@ def rename_component(model: Model, component: Component, name: str) -> None:
     component.
 
     Args:
-        model: the model.
-        component: the component.
-        name: its new name.
+        model: model that contains the component.
+        component: component to rename.
+        name: new name of the component.
 
     Raises:
         ModelError: the component is not in the model, the name is illegal, or a sibling has it.
@@ -66,8 +66,8 @@ def remove_component(model: Model, component: Component) -> None:
     """Remove a component and everything below it from the model.
 
     Args:
-        model: the model.
-        component: the component.
+        model: model that contains the component.
+        component: component to remove.
 
     Raises:
         ModelError: the component is not in the model, is required (the ground, a set), or others name
@@ -100,8 +100,8 @@ def find_named_component(tree: Tree, use: Use) -> Component | None:
     """Return the component that a reference names; for an input, the one that has the output.
 
     Args:
-        tree: the tree of the model.
-        use: the reference.
+        tree: tree of the model.
+        use: reference in the model.
     """
     if use.reference.rule in _NAME_NOTHING:
         return None

@@ -48,21 +48,21 @@ class Facts(NamedTuple):
             ``name?flag`` is a state if the property `flag` is true, ``name?!flag`` if it is false.
         outputs: outputs beyond those of the base, as OpenSim lists them: ``[]`` marks an output with
             channels, and a type follows the name unless it is a number.
-        domains: by property, the numbers that OpenSim accepts in this class, where the range is
-            narrower than the declaration of the property.
+        domains: numbers that OpenSim accepts in this class, by property, where the range is
+            narrower than in the declaration of the property.
         refused: properties for which OpenSim rejects the model if a number is outside its domain.
         outside: other consequences of a number outside its domain, with the properties they apply to.
         zero: consequences of the number 0, which take precedence; an empty text means that OpenSim
             computes with 0.
         missing: consequences of a missing number that has no default.
-        doubts: by property, why a number outside its domain is doubtful although OpenSim computes
-            with it.
-        mujoco: of a muscle, the properties from which numbers of MuJoCo's muscle are read, by
-            MuJoCo's names (vmax, fvmax) or rise and fall, the time constants; a dot leads into the
+        doubts: reasons to doubt a number outside its domain with which OpenSim computes, by
+            property.
+        mujoco: properties of a muscle from which the numbers of MuJoCo's muscle are read, by
+            MuJoCo's names (vmax, fvmax) or rise and fall, the time constants. A dot leads into the
             object that a property holds. Missing entries are taken from the base.
-        scales: by property, the factor that scaling a model multiplies it by. It is the factor of a
-            body along its axes: OWN of the frame itself, HOLDER of the frame that holds the object,
-            or that of a socket or coordinate, followed by the axis (x, y, z; MEAN; ALONG and ACROSS
+        scales: factors by which scaling a model multiplies numbers, by property. A factor is that
+            of a body along its axes: OWN of the frame itself, HOLDER of the frame that holds the
+            object, or that of a socket or coordinate, followed by the axis (x, y, z; MEAN; ALONG and ACROSS
             the Z axis of a surface; AXES for all three). PATH is the ratio of path lengths, and an
             empty text stands for no scaling. Missing entries are taken from the base.
     """

@@ -39,10 +39,10 @@ class FieldType:
     __slots__ = ()
 
     def check(self, value: Any, accepts: type | None) -> Any:
-        """Return a value in its stored form.
+        """Return a value of the property in the form in which objects store it.
 
         Args:
-            value: the value.
+            value: value to convert.
             accepts: class of the objects that the property holds; None for text.
 
         Raises:
@@ -96,7 +96,7 @@ class Value(FieldType):
         """Return the number, switch or text, or a tuple of them.
 
         Args:
-            value: the value.
+            value: value to convert.
             accepts: not used.
 
         Raises:
@@ -155,8 +155,8 @@ class Reference(FieldType):
         required: whether OpenSim rejects an empty property.
         legacy: whether the property belongs to OpenSim's first property system.
         words: words that are accepted besides names.
-        consequence: what OpenSim does in a setup with a name that leads to nothing: reject it, leave
-            it out, or ignore the property.
+        consequence: consequence in OpenSim of a name in a setup that leads to nothing: it rejects
+            the setup, leaves the name out, or ignores the property.
         any_case: whether `words` are accepted in any letter case.
     """
 
@@ -177,7 +177,7 @@ class Reference(FieldType):
         """Return the text or the component, or a tuple of them.
 
         Args:
-            value: the value.
+            value: value to convert.
             accepts: not used.
 
         Raises:
@@ -222,7 +222,7 @@ class ObjectField(FieldType):
         """Return the object, or a list that reports its changes.
 
         Args:
-            value: the value.
+            value: value to convert.
             accepts: class of the objects.
 
         Raises:
@@ -299,10 +299,10 @@ class ObjectList(list[T]):
         return type(self), (list(self),)
 
     def index(self, value: T, *limits: Any) -> int:
-        """Return the position of this very object.
+        """Return the index of an object, compared by identity.
 
         Args:
-            value: the object.
+            value: object to find.
             limits: start and end of the search, as of ``list.index``.
 
         Raises:
@@ -443,10 +443,10 @@ def maybe(unit: str | None = None, domain: str = "") -> Value:
 
 
 def word(*choices: str, legacy: bool = False) -> Value:
-    """Return the marker of a text for which only some words have a meaning.
+    """Return the marker of a text property that has a fixed set of valid words.
 
     Args:
-        choices: the words.
+        choices: valid words.
         legacy: whether it belongs to the first property system.
     """
     return Value("string", choices=choices, legacy=legacy)

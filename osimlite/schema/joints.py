@@ -66,21 +66,22 @@ class Joint(ModelComponent, abstract=True):
         child_at: Vec3 = _ORIGIN,
         child_turned: Vec3 = _ORIGIN,
     ) -> Self:
-        """Connect `child` to `parent` through offset frames named ``<frame>_offset``, and return the joint.
+        """Connect `child` to `parent` through frames named ``<frame>_offset``; return the joint.
 
         Args:
-            parent: the frame the joint starts from.
-            child: the frame the joint moves.
-            at: where the joint is in the parent frame (m).
-            turned: how the joint is turned in the parent frame (body-fixed X-Y-Z angles, rad).
-            child_at: where the joint is in the child frame (m).
-            child_turned: how the joint is turned in the child frame (rad).
+            parent: frame relative to which the joint moves.
+            child: frame that the joint moves.
+            at: position of the joint in the parent frame (m).
+            turned: orientation of the joint in the parent frame (body-fixed X-Y-Z angles, rad).
+            child_at: position of the joint in the child frame (m).
+            child_turned: orientation of the joint in the child frame (body-fixed X-Y-Z angles,
+                rad).
 
         Returns:
             The joint itself.
 
         Raises:
-            ModelError: what is to be connected is no frame.
+            ModelError: `parent` or `child` is not a frame.
         """
         for frame in (parent, child):
             if not isinstance(frame, PhysicalFrame):
@@ -104,7 +105,7 @@ class Joint(ModelComponent, abstract=True):
 
 
 def make_coordinates_field(count: int) -> Any:
-    """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out.
+    """Return a list property whose default is `count` coordinates with OpenSim's default names.
 
     Returns:
         A field whose default is a new list for each joint.

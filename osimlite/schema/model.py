@@ -143,8 +143,8 @@ class Model(ModelComponent):
         """Rename a component, and update every reference to it or to components below it.
 
         Args:
-            component: the component.
-            name: its new name.
+            component: component of the model to rename.
+            name: new name of the component.
 
         Raises:
             ModelError: the component is not in the model, the name is illegal, or a sibling has it.

@@ -171,7 +171,7 @@ class GeometryPath(AbstractGeometryPath):
 
         Args:
             surface: wrap object of a frame of the model, or its name.
-            method: how the wrap over an ellipsoid is found.
+            method: method for wrapping over an ellipsoid: hybrid, midpoint or axial.
 
         Returns:
             The entry for the surface.

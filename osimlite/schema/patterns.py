@@ -229,13 +229,16 @@ class _Compiler:
         return first, last
 
     def _repeat_part(self, begin: int, start: int, end: int) -> tuple[int, int]:
-        """Return a part as often as the quantifier that comes next says.
+        """Repeat a part as often as the quantifier after it says.
 
         Args:
             begin: index of the part in the text, from which it is compiled again for each
                 repetition.
-            start: its first state.
-            end: its last state.
+            start: first state of the part.
+            end: last state of the part.
+
+        Returns:
+            The first and the last state of all repetitions.
         """
         part_end = self.index
         min_count, max_count = self._read_quantifier()

@@ -113,7 +113,7 @@ def make_name_list(
         words: words that are accepted besides names.
         any_case: whether the words are accepted in any letter case.
         legacy: whether it belongs to the first property system.
-        consequence: what OpenSim does with a name that leads to nothing.
+        consequence: consequence in OpenSim of a name that leads to nothing.
     """
     return Reference(rule, target, "list", False, legacy, words, consequence, any_case)
 

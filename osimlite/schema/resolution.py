@@ -45,7 +45,7 @@ def is_a(component: Object, target: str) -> bool:
     """Return whether the class of a component is `target` or derives from it.
 
     Args:
-        component: the component.
+        component: object to test.
         target: name of a class.
     """
     return derives_from(type(component), target)
@@ -56,7 +56,7 @@ def derives_from(cls: type[Object], target: str) -> bool:
     """Return whether a class is `target` or derives from it; the module of `target` need not be imported.
 
     Args:
-        cls: the class.
+        cls: class to test.
         target: name of a class.
     """
     return any(base.__name__ == target for base in cls.__mro__)
@@ -190,10 +190,10 @@ def skip_resolution(tree: Tree, text: str, owner: Component, target: str) -> Res
     """Resolve a text that names nothing in the component tree: a file, a column, a position.
 
     Args:
-        tree: the tree of the model.
-        text: the text.
+        tree: tree of the model.
+        text: text of the property.
         owner: component that has the property.
-        target: class of what is named.
+        target: class of the named component; not used.
 
     Returns:
         The owner, so that the text counts as resolved.

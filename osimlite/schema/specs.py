@@ -35,7 +35,7 @@ class FieldSpec(NamedTuple):
         default: default value; None for properties that hold objects.
         factory: function that makes the default object or list.
         declarers: classes that declare the property, the most derived first.
-        names: what its words, objects or columns refer to, if their class does not declare it.
+        names: type of reference of its words, objects or columns, unless their class declares it.
     """
 
     name: str
@@ -151,8 +151,8 @@ class ObjectHolder(NamedTuple):
     """Property that holds objects, with the state of its default until it is first accessed.
 
     Attributes:
-        spec: the property.
-        name: its attribute.
+        spec: declaration of the property.
+        name: name of the Python attribute.
         is_list: whether it is a list, which is empty by default.
         is_plain: whether the default object contains no component and no reference.
     """
@@ -217,7 +217,7 @@ def get_file_specs(cls: type[Object], rule: str) -> tuple[FieldSpec, ...]:
     """Return the properties of a class that name files.
 
     Args:
-        cls: the class.
+        cls: class of an object.
         rule: ``file``, ``output-file`` or ``output-folder``.
 
     Returns:
@@ -257,7 +257,8 @@ def get_name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpe
 
     Args:
         cls: class of the object.
-        names: what the name refers to, if the holding property declares it; otherwise the class does.
+        names: type of the reference if the holding property declares it; by default that of the
+            class.
     """
     reference = names or cls.name_reference
     assert reference is not None

@@ -51,8 +51,8 @@ class Use(NamedTuple):
     Attributes:
         holder: object that has the property.
         owner: component that the holder belongs to.
-        spec: the property.
-        value: text, or component that is given itself.
+        spec: declaration of the property.
+        value: text of the reference, or the component itself.
         position: index of the word in a list, else None.
     """
 
@@ -239,7 +239,7 @@ class Tree:
 
         Args:
             reference: type of the property.
-            text: the text.
+            text: text of the reference.
             owner: component that has the property.
 
         Returns:
@@ -262,10 +262,10 @@ class Tree:
         Args:
             owner: component that has the property.
             name: attribute of the property.
-            value: its value.
+            value: value of the property.
 
         Raises:
-            ModelError: it leads nowhere.
+            ModelError: the value leads to no component.
         """
         spec = get_field_specs(type(owner))[name]
         use = Use(owner, owner, spec, value)
@@ -289,7 +289,7 @@ class Tree:
         Args:
             owner: component that has the property.
             reference: type of the property.
-            component: the component.
+            component: component of the model.
 
         Raises:
             ModelError: the component is not in the model.
