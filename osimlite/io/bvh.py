@@ -178,7 +178,7 @@ def _format_numbers(numbers: Sequence[float] | Array) -> str:
 
 
 class _BvhReader:
-    """Words of a file, with the lines that they are in."""
+    """Words of a file with their line numbers."""
 
     def __init__(self, path: str | Path) -> None:
         self.file = str(path)
@@ -192,7 +192,7 @@ class _BvhReader:
         self.position = 0
 
     def fail(self, message: str) -> DocumentError:
-        """Return an error at the present word."""
+        """Return an error at the line of the current word."""
         index = min(self.position, len(self.words) - 1)
         line = self.words[index][1] if self.words else None
         return DocumentError(message, file=self.file, line=line)
@@ -202,7 +202,7 @@ class _BvhReader:
         return self.words[self.position][0] if self.position < len(self.words) else ""
 
     def take(self, expected: str = "") -> str:
-        """Return the next word; raise an error if another one was expected."""
+        """Return the next word and advance; raise an error if another one was expected."""
         word = self.peek()
         if not word or (expected and word.lower() != expected.lower()):
             expected_text = f"'{expected}'" if expected else "more"
@@ -250,7 +250,7 @@ def read_bvh(path: str | Path) -> BvhMotion:
     """Read a BVH file.
 
     Args:
-        path: the file.
+        path: path of the BVH file.
 
     Raises:
         MissingFileError: the file does not exist or cannot be read.

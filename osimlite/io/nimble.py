@@ -132,7 +132,7 @@ def is_nimble_ellipsoid(joint: EllipsoidJoint, model_name: str) -> bool:
     """Return whether an EllipsoidJoint was probably made for Nimble, and not yet rewritten for OpenSim.
 
     Args:
-        joint: the joint.
+        joint: joint of a model.
         model_name: name of the model.
     """
     # A file that was rewritten must not be rewritten again.

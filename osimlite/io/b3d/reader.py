@@ -30,10 +30,10 @@ LENGTH_BYTES = 8
 
 
 def read_b3d(path: str | Path) -> B3dSubject:
-    """Read the header of a .b3d file; the frames are read when they are asked for.
+    """Read the header of a .b3d file; frames are read at the first access.
 
     Args:
-        path: the file.
+        path: path of the .b3d file.
 
     Raises:
         MissingFileError: the file does not exist or cannot be read.

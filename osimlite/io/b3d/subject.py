@@ -77,7 +77,7 @@ class B3dTrial:
     """Trial of a subject, or a piece of one.
 
     Attributes:
-        subject: the subject.
+        subject: subject to which the trial belongs.
         name: name of the trial.
         frame_count: number of frames.
         time_step: time between two frames, s.
@@ -205,7 +205,7 @@ class B3dTrial:
         """Read all frames of the trial at once.
 
         Args:
-            processing_pass: as of :meth:`read_blocks`.
+            processing_pass: index of the pass; None for the measurements.
 
         Returns:
             Arrays with one row per frame, by field; empty if the trial has no frames.
@@ -230,7 +230,7 @@ class B3dTrial:
         """Return the coordinates of the model (rad, m) over time.
 
         Args:
-            processing_pass: as of :meth:`find_pass`.
+            processing_pass: index or type of the pass, see :meth:`find_pass`.
 
         Raises:
             DocumentError: the model does not have the coordinates of the file, or a frame is
@@ -275,7 +275,7 @@ class B3dTrial:
         the forces, torques and centres of pressure, which are zero in the first and last frame.
 
         Args:
-            processing_pass: as of :meth:`find_pass`.
+            processing_pass: index or type of the pass, see :meth:`find_pass`.
 
         Returns:
             Wrenches (frames, bodies, 6), bodies in the order of `contact_bodies`.
@@ -303,7 +303,7 @@ class B3dTrial:
         centre of pressure on the plate, and the torque is vertical.
 
         Args:
-            processing_pass: as of :meth:`find_pass`.
+            processing_pass: index or type of the pass, see :meth:`find_pass`.
         """
         wrenches = self.read_wrenches(processing_pass)
         columns = []
@@ -370,9 +370,9 @@ class B3dSubject:
     """Subject of a .b3d file.
 
     Attributes:
-        path: the file.
+        path: path of the .b3d file.
         header: values of the header, by the names in :data:`osimlite.io.b3d.messages.HEADER`.
-        trials: the trials.
+        trials: trials of the subject, in the order of the file.
         sensor_frame_size: number of bytes of the measurements of a frame.
         pass_frame_size: number of bytes of a processing pass of a frame.
     """

@@ -39,7 +39,8 @@ class WireField(NamedTuple):
 
     Attributes:
         number: number of the field.
-        wire_type: how the value is encoded.
+        wire_type: type of the encoding in Protocol Buffers (0 varint, 1 eight bytes, 2 with length,
+            5 four bytes).
         value: an integer of a varint, or the bytes of the value.
         offset: offset of the value in the message.
     """

@@ -61,11 +61,11 @@ class FileCache(Generic[T]):
         return entry is not None and entry[0] == get_file_stamp(path)
 
     def keep(self, path: str, result: T) -> None:
-        """Store a result that was computed elsewhere for the present file.
+        """Store the result for the current content of a file that was computed elsewhere.
 
         Args:
-            path: the file.
-            result: the result.
+            path: path of the file.
+            result: result for the file.
         """
         stamp = get_file_stamp(path)
         key = os.path.abspath(path)
@@ -112,8 +112,8 @@ def keep_object(path: str, top: Object, notes: Iterable[Note]) -> None:
 
     Args:
         path: the file, which is well-formed.
-        top: its object, as `read_document` returns it.
-        notes: what the reader noted.
+        top: object of the document, as `read_document` returns it.
+        notes: notes of the reader.
     """
     get_object.keep(path, top)
     _has_known_tags_only.keep(path, not any(note.kind == "unknown-tag" for note in notes))
@@ -123,7 +123,7 @@ def read_copy(path: str | Path, expected_class: type[Top]) -> Top:
     """Return the object of a document as a copy that the caller may change.
 
     Args:
-        path: the file.
+        path: path of the document.
         expected_class: class of the object.
 
     Raises:
@@ -154,7 +154,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
     Unknown elements are ignored as in OpenSim, unless their names are similar to a property.
 
     Args:
-        path: the file.
+        path: path of the document.
         cls: class of the object.
 
     Raises:

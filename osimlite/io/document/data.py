@@ -70,8 +70,8 @@ def write_data(model: Model, path: str | Path) -> None:
     A failure leaves no partial file.
 
     Args:
-        model: the model.
-        path: the file.
+        model: model to write.
+        path: file to write.
 
     Raises:
         ModelError: a reference leads to a component outside the model.
@@ -422,7 +422,7 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
     """Parse a YAML text.
 
     Args:
-        text: the text.
+        text: YAML text.
         file: path of the file, for messages.
         with_lines: return PyYAML's nodes, which know their lines, instead of data.
 

@@ -40,7 +40,7 @@ class UncleanText(Exception):
     """Text that is ambiguous or that OpenSim reads only in part.
 
     Attributes:
-        value: what OpenSim reads; ABSENT if it keeps the default.
+        value: value that OpenSim reads; ABSENT if it keeps the default.
         trouble: kind of the problem.
         word: part of the text with the problem.
     """
@@ -181,12 +181,12 @@ def make_converter(kind: FieldType) -> Callable[[str], Any]:
 
 
 def reads_as(raw: str, kind: FieldType, value: Any) -> bool:
-    """Return whether the text of a property reads as a value without any doubt.
+    """Return whether the text of a property reads as a value without ambiguity.
 
     Args:
-        raw: the text.
+        raw: text of the property.
         kind: type of the property.
-        value: the value.
+        value: expected value.
     """
     try:
         return bool(make_converter(kind)(raw) == value)

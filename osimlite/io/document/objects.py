@@ -34,13 +34,13 @@ DEFAULTS = "defaults"
 
 
 class ReadingStep(NamedTuple):
-    """How to read a child element.
+    """Plan for reading one child element.
 
     Attributes:
         action: `_TEXT`, `_ONE`, `_WRAPPED` or `_LIST`.
         name: attribute of the property.
-        convert: converter of its text.
-        spec: the property.
+        convert: converter from the text of the element.
+        spec: declaration of the property.
     """
 
     action: int
@@ -136,8 +136,8 @@ class ObjectReader:
         """Read the object of a document; only it may have a ``<defaults>`` block.
 
         Args:
-            element: its element.
-            cls: its class.
+            element: XML element of the object.
+            cls: class of the object.
         """
         block = element.find(DEFAULTS)
         result: list[Object] = []
@@ -169,7 +169,7 @@ class ObjectReader:
         """Read one element as an object.
 
         Args:
-            element: the element.
+            element: XML element of the object.
             cls: class of the object.
             name: name that replaces the attribute `name`.
             skip: child element to skip.

@@ -51,7 +51,7 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     """Parse a text to an element tree without namespaces (see :mod:`osimlite.io.document.names`).
 
     Args:
-        source: the text.
+        source: text of the document.
         recover: continue after syntax errors; the tree is then a guess.
 
     Raises:

@@ -386,7 +386,7 @@ class _Declarations:
             owner: name of the class.
             row: declaration of the property.
             kind: type of the property.
-            text: the text.
+            text: text of the default.
         """
         name = row["name"]
         try:
@@ -468,7 +468,7 @@ class _Declarations:
 
         Args:
             entry: declaration of a class.
-            key: the key.
+            key: key of the list.
             words: words of the file that lead to the declaration, for the line of an error.
         """
         result = entry.get(key, entry.get(f"own_{key}", []))
@@ -482,9 +482,9 @@ class _Declarations:
         """Return a value that must be a JSON object with known keys.
 
         Args:
-            value: the value.
+            value: value from the file.
             known_keys: the keys; None for any.
-            description: what it describes, for messages.
+            description: name of the value in messages.
             words: words of the file that lead to it, for the line of an error.
 
         Returns:
@@ -500,11 +500,11 @@ class _Declarations:
         return value
 
     def make_error(self, message: str, *words: str) -> OsimliteError:
-        """Return an error at the last of some words, each searched after the one before.
+        """Return an error at the last of several words, each searched after the one before.
 
         Args:
-            message: the message.
-            words: the words, as strings of JSON.
+            message: message of the error.
+            words: words to search, as strings of JSON.
         """
         # The search starts at the classes: "meta" may contain the same words.
         offset = max(0, self.text.find('"classes"'))

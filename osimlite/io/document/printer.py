@@ -53,7 +53,7 @@ def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> No
 
     Args:
         top: object to write, as for `to_text`.
-        path: the file.
+        path: file to write.
         numbers: format of the numbers, as for `to_text`.
 
     Raises:
@@ -99,8 +99,8 @@ class _Printer:
         """Print one object as an element.
 
         Args:
-            item: the object.
-            name: its attribute `name`.
+            item: object to print.
+            name: value of the attribute `name`; "" for no attribute.
             depth: number of tabs before the element.
         """
         indent = "\t" * depth
@@ -260,7 +260,7 @@ class _Printer:
         """Print comments, one per line.
 
         Args:
-            texts: the comments.
+            texts: comments without ``<!--`` and ``-->``.
             depth: number of tabs before each.
         """
         if self.comments:
@@ -286,8 +286,8 @@ def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
     """Return whether an object or list that was not assigned has content to print.
 
     Args:
-        value: the object or list.
-        spec: its property.
+        value: object or list of objects.
+        spec: property that holds the value; None if it is unknown.
     """
     if isinstance(value, list):
         return bool(value)

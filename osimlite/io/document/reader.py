@@ -80,8 +80,8 @@ class Document:
     """Object at the top of a document, with its text and the notes of the reader.
 
     Attributes:
-        top: the object.
-        source: the text.
+        top: object at the top of the document.
+        source: text of the document.
         version: version of the document.
         notes: notes about content that OpenSim ignores.
         upgraded: result of the upgrade of an old document; None for a current one.
@@ -122,7 +122,7 @@ def read(path: str | Path, *, classes: Paths = ()) -> Model:
     """Read a model file.
 
     Args:
-        path: the file.
+        path: path of the model file.
         classes: files that declare the classes of plug-ins; without them, objects of such classes
             stay text.
 
@@ -137,10 +137,10 @@ def read(path: str | Path, *, classes: Paths = ()) -> Model:
 
 
 def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
-    """Read a document of any kind: a model, the setup of a tool, a set of tasks, of markers, of loads.
+    """Read a document of any kind: a model, a tool setup, or a set of tasks, markers or loads.
 
     Args:
-        path: the file.
+        path: path of the document.
         classes: files that declare the classes of plug-ins.
 
     Raises:
@@ -157,7 +157,7 @@ def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
     """Read a model from the text of a document.
 
     Args:
-        text: the text.
+        text: text of the document; bytes are decoded as a file would be.
         classes: files that declare the classes of plug-ins.
 
     Raises:
@@ -178,7 +178,7 @@ def read_document(
     """Read a document with its text and notes.
 
     Args:
-        source: the text.
+        source: text of the document.
         expected_class: class of the object at the top, or one of its bases.
         to_check: also find text between elements and attributes without meaning, for the linter.
 
@@ -258,7 +258,7 @@ def has_newer_content(root: etree._Element, version: int) -> bool:
 
     Args:
         root: root element.
-        version: the version.
+        version: version that the document states.
     """
     from osimlite.io.document.upgrade.newer import find_newer_content
 
@@ -425,7 +425,7 @@ def _make_include_reader(
     object, or is being read already, leaves the object unchanged.
 
     Args:
-        source: the text.
+        source: text of the document.
         around: paths of the files that are being read.
         read: number of bytes of included files so far; limits files that include each other many times.
     """

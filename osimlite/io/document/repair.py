@@ -59,7 +59,7 @@ class Repair(NamedTuple):
         kind: type of the note about it.
         offset: character offset in the text.
         word: original text.
-        meant: what it was read as.
+        meant: text as which it was read.
     """
 
     kind: NoteKind
@@ -74,7 +74,7 @@ def read_repaired(
     """Parse a text after repairing its syntax errors.
 
     Args:
-        source: the text.
+        source: text of the document.
         fault: error of the parser.
         parse: function that parses the repaired text.
 
@@ -125,7 +125,7 @@ def find_elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
     """Yield the index of the innermost element around each of some characters; 0, the root, outside all.
 
     Args:
-        source: the text.
+        source: text of the document.
         offsets: character offsets in ascending order.
     """
     spans = source.spans

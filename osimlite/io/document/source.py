@@ -31,7 +31,7 @@ class Attribute(NamedTuple):
         before: offset of the blanks before it.
         start: offset of its name.
         end: offset after its value.
-        value: its value as written.
+        value: value of the attribute as written.
     """
 
     before: int
@@ -96,7 +96,7 @@ class Source:
         """Make a source of decoded text; an encoding that the text declares is ignored.
 
         Args:
-            text: the text.
+            text: decoded text of a document.
             file: path of the file, if any.
         """
         source = cls(text.encode("utf-8", "replace"), file)
@@ -171,7 +171,7 @@ class Source:
 
         Args:
             number: index of the element.
-            tag: the tag.
+            tag: tag of the child.
         """
         result = next(
             (child for child in self._iterate_children(number) if self._get_tag(child) == tag), None
@@ -219,7 +219,7 @@ class Source:
         """Return line and column of a character offset.
 
         Args:
-            offset: the offset.
+            offset: character offset in the text.
             length: number of characters that the position covers.
         """
         before = self._line_counts
@@ -235,8 +235,8 @@ class Source:
 
         Args:
             kind: class of the error.
-            message: the message.
-            position: the position.
+            message: message of the error.
+            position: line and column of the error.
         """
         return kind(message, file=self.file, line=position.line, column=position.column)
 
@@ -257,7 +257,7 @@ class Source:
         Args:
             number: index of the element.
             word: the word; the complete text by default.
-            nth: which occurrence of the word, from 0.
+            nth: index of the occurrence of the word, from 0.
         """
         span = self.spans[number]
         inner_text = self.text[span.tag_end : span.inner_end]

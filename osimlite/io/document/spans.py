@@ -15,7 +15,7 @@ class Span(NamedTuple):
     """Character offsets of one element.
 
     Attributes:
-        tag: its tag.
+        tag: tag of the element.
         start: offset of ``<``.
         tag_end: offset after the start tag.
         inner_end: offset of ``</``.
@@ -69,7 +69,7 @@ def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
     """Yield the markup of a text in order; stop at a comment, section or instruction without an end.
 
     Args:
-        text: the text.
+        text: text of a document.
         as_opensim: end instructions at the first ``>`` as OpenSim does, and not at ``?>`` as in XML.
     """
     offset = 0
@@ -103,8 +103,8 @@ def blank_comments(text: str, character: str = " ") -> str:
     linear; a pattern such as ``<!--.*?-->`` would search the rest of the text for each open comment.
 
     Args:
-        text: the text.
-        character: the replacement.
+        text: text of a document.
+        character: character that replaces each of them.
     """
     pieces: list[str] = []
     missing_endings: set[str] = set()

@@ -128,7 +128,7 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
     White space stays unchanged where text and elements mix.
 
     Args:
-        element: the element.
+        element: element to print.
         depth: number of tabs before the element.
         comments: whether to keep comments.
     """

@@ -1,1 +1,1 @@
-"""Surfaces of triangles, and the files that hold them: where they are found, read and written."""
+"""Surfaces of triangles: search, reading and writing of mesh files."""

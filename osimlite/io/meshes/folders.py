@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 
 class OutsideError(OsimliteError):
-    """A model names a file outside the folders that its meshes may come from."""
+    """Error for a mesh file outside of the folders that a model may use."""
 
 
 @dataclass(frozen=True)
 class MeshFolders:
-    """Where the mesh files of a model may be."""
+    """Folders in which the mesh files of a model are searched."""
 
     beside: Path | None = None  # the folder of the model's file; None if it has none
-    # folders that the user names; those in the environment variable follow them
+    # Folders that the user names; those in the environment variable follow them.
     named: Sequence[str | Path] = ()
 
     @property

@@ -1,4 +1,4 @@
-"""Reading Wavefront OBJ files: their points, faces and normals; everything else is passed over."""
+"""Reading of Wavefront OBJ files: points, faces and normals; everything else is ignored."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ from osimlite.io.meshes.surface import Array, Indices, Polygons, Surface, triang
 
 
 def read_obj(content: bytes, name: str) -> Surface:
-    """The surface in an OBJ file, its polygons cut into triangles, with normals if every corner has one.
+    """Return the surface in an OBJ file as triangles, with normals if every corner has one.
 
-    Arguments and errors as those of :func:`read_obj_polygons`.
+    Args:
+        content: content of the file.
+        name: name of the file, for messages.
+
+    Raises:
+        OsimliteError: a point or a face is damaged, or there is no face; with the line.
     """
     polygons, normals, chosen = _parse_lines(content, name)
     if normals is None:
         return Surface(polygons.points, triangulate(*polygons))
-    # A surface has one normal at each point: where faces disagree, the point is there once for each
-    # of its normals.
+    # A surface has one normal at each point, so a point is repeated for each of its normals.
     pairs, corners = np.unique(
         np.column_stack((polygons.corners, chosen)), axis=0, return_inverse=True
     )
@@ -32,11 +36,11 @@ def read_obj(content: bytes, name: str) -> Surface:
 
 
 def read_obj_polygons(content: bytes, name: str) -> Polygons:
-    """The polygons in an OBJ file.
+    """Return the polygons in an OBJ file.
 
     Args:
-        content: of the file.
-        name: of the file, for messages.
+        content: content of the file.
+        name: name of the file, for messages.
 
     Raises:
         OsimliteError: a point or a face is damaged, or there is no face; with the line.
@@ -45,7 +49,7 @@ def read_obj_polygons(content: bytes, name: str) -> Polygons:
 
 
 def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]:
-    """Polygons, normals (m, 3), None unless every corner has one, and which of them each corner has."""
+    """Return polygons, normals (m, 3) or None, and the index of the normal of each corner."""
     points: list[tuple[float, float, float]] = []
     normals: list[list[str]] = []
     corners: list[int] = []
@@ -88,7 +92,7 @@ def _get_index(word: str, count: int) -> int:
     """Return an index from 0; numbers count from 1, negative ones back from the last element.
 
     Raises:
-        ValueError: there is no such place.
+        ValueError: the number is 0, or points before the first element.
     """
     number = int(word)
     index = number - 1 if number > 0 else count + number
@@ -98,7 +102,7 @@ def _get_index(word: str, count: int) -> int:
 
 
 def _make_vectors(rows: list[list[str]]) -> Array | None:
-    """Rows of three finite numbers as an array; None if they are not."""
+    """Return rows of three finite numbers as an array (n, 3); None if they are not."""
     try:
         result = np.array(rows, dtype=np.float64)
     except ValueError:

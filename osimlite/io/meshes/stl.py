@@ -1,4 +1,4 @@
-"""STL files, of which many robot programs read only the binary form: 80 bytes, a count, 50 bytes a triangle."""
+"""Reading of STL files, and their binary form, the only one that many robot programs read."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _CORNER = compile_later(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re
 
 
 def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.0)) -> bytes:
-    """The triangles of a text or binary STL file as a binary one.
+    """Return the triangles of a text or binary STL file as a binary file.
 
     Args:
-        content: of the file.
-        name: of the file, for messages.
-        signs: (3,) of 1 and -1 that multiply the coordinates; the outside remains outside.
+        content: content of the file.
+        name: name of the file, for messages.
+        signs: factors of 1 or -1 (3,) that multiply the coordinates; the outside stays outside.
 
     Raises:
-        OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a
-            place.
+        OsimliteError: it is not an STL file, is cut off, has no triangle, or has a corner without
+            three finite numbers.
     """
     binary = _read_binary(content, name)
     triangles = binary if binary is not None else _from_text(content, name)
@@ -41,7 +41,11 @@ def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 
 
 
 def read_stl_corners(content: bytes, name: str) -> Array:
-    """The corners (t, 3, 3) of the triangles in a text or binary STL file; errors as those of :func:`format_binary_stl`."""
+    """Return the corners (t, 3, 3) of the triangles in a text or binary STL file.
+
+    Raises:
+        OsimliteError: the file is invalid, see :func:`format_binary_stl`.
+    """
     binary = _read_binary(content, name)
     return (
         _read_text_corners(content, name)
@@ -60,7 +64,7 @@ def _get_declared_count(content: bytes) -> int:
 
 
 def _read_binary(content: bytes, name: str) -> _Triangles | None:
-    """The triangles of a binary file; None if it is no such file."""
+    """Return the triangles of a binary file; None for a text file."""
     if not is_binary(content):
         return None
     triangles = np.frombuffer(content, _TRIANGLE, _get_declared_count(content), 84).copy()

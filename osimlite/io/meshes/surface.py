@@ -32,7 +32,7 @@ class Polygons(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A surface of triangles."""
+    """Surface of triangles."""
 
     points: Array  # (n, 3)
     triangles: Indices  # (t, 3) indices of points, counter-clockwise seen from outside

@@ -80,7 +80,7 @@ def _run_reader(path: str | Path, content_type: str) -> dict[str, Array]:
     in a separate process nothing else is lost, and the time is limited.
 
     Args:
-        path: the file.
+        path: path of the .c3d file.
         content_type: ``markers`` or ``forces``.
     """
     size = len(read_file(path))

@@ -93,7 +93,7 @@ class MarkerHeader:
     """First five lines of a marker file.
 
     Attributes:
-        lines: their texts without line ends; fewer if the file has fewer.
+        lines: texts of the lines without line ends; fewer than five if the file has fewer.
         entries: entries of lines two and three, by key.
         labels: labels of the markers.
         label_line: number of the line with the labels.
@@ -231,7 +231,7 @@ def split_header(line: str, number: int, pattern: re.Pattern[str] = _WORD) -> li
     """Return the words of a line of the header.
 
     Args:
-        line: the line.
+        line: text of the line.
         number: number of the line.
         pattern: pattern of one word.
     """

@@ -31,7 +31,7 @@ def format_old_table(
     """Yield the text of a table in parts, as OpenSim's ``Storage`` prints it.
 
     Args:
-        table: the table.
+        table: table to format.
         description: text before the end of the header; a line end is added.
         precision: number of decimals.
     """

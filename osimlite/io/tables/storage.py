@@ -23,7 +23,7 @@ from osimlite.mechanics.multibody.spatial import Array
 
 @dataclass(frozen=True, eq=False)
 class StoTable(Tabular):
-    """A table over time.
+    """Table over time.
 
     Attributes:
         name: first line of the file.
@@ -49,7 +49,7 @@ class StoTable(Tabular):
 
     @property
     def heading(self) -> str:
-        """What the table is, in one line."""
+        """Class, name, times and number of columns, in one line."""
         words = f"{type(self).__name__} '{self.name}': {describe_times(self.times)}"
         return f"{words}, {format_count(len(self.columns), 'column')}"
 
@@ -91,7 +91,7 @@ def format_sto(
     in_degrees: bool = False,
     header: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Write a table as OpenSim 4.6 does, but with all digits of every number, and more in its header."""
+    """Return a table as the text of a storage file, with all digits of every number."""
     lines = list(_format_lines(times, rows, 1))
     first_line, *other_lines = _format_header(name, columns, len(lines), in_degrees, "double")
     return "".join(
@@ -110,30 +110,30 @@ def write_sto(
     kind: str = "double",
     has_missing: bool = False,
 ) -> None:
-    """Write a table to a file, whole or not at all; the rows are taken one by one.
+    """Write a table to a file atomically; the rows are taken one by one.
 
     Args:
-        path: of the file.
+        path: file to write.
         name: first line of the file.
-        times: s.
-        columns: labels; for another kind than ``double`` one for each value.
-        rows: numbers, of one value after the other.
+        times: times of the rows, s.
+        columns: labels of the columns; for a type other than ``double``, one for each cell.
+        rows: rows of numbers, those of one cell after the other.
         in_degrees: whether rotational values are in degrees.
-        kind: of the values: ``Vec3``, ``Quaternion`` and whatever else OpenSim knows.
-        has_missing: whether NaN stands for what was not measured, such as a marker that was not
-            seen.
+        kind: type of a cell (``DataType``): ``double``, ``Vec3``, ``Quaternion`` or another of
+            OpenSim.
+        has_missing: whether numbers may be NaN for missing measurements, such as markers that were
+            not seen. No number is checked then.
 
     Raises:
-        SimulationError: a number is NaN or infinite.
-        OsimliteError: the file cannot be written.
-        UnsupportedError: OpenSim does not know the kind.
+        SimulationError: a number is NaN or infinite, and `has_missing` is false.
+        OsimliteError: the file cannot be written, or a row ends within a cell.
+        UnsupportedError: OpenSim has no such type.
     """
-    # Imported here, since many read tables and write none.
+    # Imported here, since many programs read tables and write none.
     import shutil
     import tempfile
 
-    # The header states the number of rows, so that rows go to a temporary file first.
-    # How many rows there are stands before them.
+    # The header states the number of rows and precedes them, so rows go to a temporary file first.
     with tempfile.TemporaryFile("w+b") as body:
         count = 0
         for line in _format_lines(

@@ -1,4 +1,4 @@
-"""Storage files (.sto, .mot) row by row: the header at once, the rows as they are asked for."""
+"""Reader of storage files (.sto, .mot) row by row."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from osimlite.errors import DocumentError
 from osimlite.io.tables.headers import MAX_HEADER_BYTES, StorageHeader, list_suffixes
 
 _NO_NUMBER = compile_later(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
-"""How programs on Windows wrote what is no number."""
+"""Pattern of NaN and infinity as programs on Windows wrote them."""
 
 
 class TableStream:
@@ -72,7 +72,7 @@ class TableStream:
             yield time, row
 
     def _parse_special_row(self, text: str, number: int) -> list[float]:
-        """A row that has something else than plain numbers."""
+        """Return the numbers of a row that has other words than plain numbers."""
         row = []
         for match in re.finditer(r"\S+", text):
             word = match.group()
@@ -129,7 +129,7 @@ class TableStream:
 
 
 def _make_format_error(beginning: bytes) -> str:
-    """Why a file without a line 'endheader' cannot be taken, by what it begins with."""
+    """Return the message for a file without a line 'endheader', by its beginning."""
     if beginning.startswith(b"PathFileType"):
         return (
             "these are markers over time (.trc), but a storage file is needed here (.sto, .mot); 'osimlite ik' computes "
@@ -143,17 +143,17 @@ def _make_format_error(beginning: bytes) -> str:
 
 
 def find_word_start(text: str, word: int) -> int:
-    """Column (from 1) at which a word (from 0) of a line starts.
+    """Return the column (from 1) at which a word (from 0) of a line starts.
 
     Args:
-        text: the line.
+        text: line of the file.
         word: index of the word.
     """
     return [match.start() for match in re.finditer(r"\S+", text)][word] + 1
 
 
 def stream_table(path: str | Path) -> TableStream:
-    """Open a storage file to read it row by row, however large it is; errors as those of :class:`TableStream`.
+    """Open a storage file to read it row by row; errors are those of :class:`TableStream`.
 
     Example::
 

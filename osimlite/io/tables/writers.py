@@ -25,7 +25,7 @@ def write_trc(
     A position that is NaN is left empty, because the marker was not seen.
 
     Args:
-        path: the file.
+        path: file to write.
         times: n times (s).
         markers: names of the m markers.
         rows: n rows of 3 m numbers, X, Y and Z of each marker.

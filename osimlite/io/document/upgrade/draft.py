@@ -54,7 +54,7 @@ class Refusal(NamedTuple):
         owner: index of the object that OpenSim upgrades then. OpenSim does not fail over objects
             that it never reads.
         number: index of the element in the old document.
-        message: what is wrong, one clause.
+        message: clause that says why OpenSim fails.
     """
 
     owner: int
@@ -236,9 +236,9 @@ class Draft:
         Args:
             parent: element that gets the new child.
             tag: tag of the new element.
-            text: its text; None for no text.
+            text: text of the element; None for no text.
             source: element of the old document that it comes from, for positions in messages.
-            name: its attribute `name`; None for no name.
+            name: value of the attribute `name`; None for no attribute.
         """
         new = etree.SubElement(parent, tag)
         new.text = text
@@ -253,8 +253,8 @@ class Draft:
         """Give an element a new tag.
 
         Args:
-            element: the element.
-            tag: its new tag.
+            element: element of the tree.
+            tag: new tag of the element.
         """
         element.tag = tag
         self._register_tag(tag)
@@ -264,8 +264,8 @@ class Draft:
         """Move an element to the end of `parent`.
 
         Args:
-            element: the element.
-            parent: its new parent.
+            element: element to move.
+            parent: new parent of the element.
         """
         # The text behind an element is layout, and would move with it.
         element.tail = None
@@ -322,7 +322,7 @@ class Draft:
         For an unknown class, the set that contains the element decides.
 
         Args:
-            element: the element.
+            element: element to test.
             family: name of the class.
         """
         if find_families(element.tag):
@@ -337,7 +337,7 @@ class Draft:
         Args:
             owner: object that OpenSim upgrades then.
             element: element over which it fails.
-            message: what is wrong, one clause.
+            message: clause that says why OpenSim fails.
         """
         self.refusals.append(Refusal(self.numbers[owner], self.numbers[element], message))
 
@@ -373,7 +373,7 @@ def find_with_child(owners: Iterable[Element], tag: str) -> Iterator[tuple[Eleme
     """Yield each owner that has a child with a tag, together with the first such child.
 
     Args:
-        owners: the elements.
+        owners: elements to search.
         tag: tag of the child.
     """
     for owner in owners:
@@ -391,7 +391,7 @@ def get_child_text(parent: Element, tag: str) -> str | None:
     """Return the text of the first child with a tag, white space collapsed; None without such a child.
 
     Args:
-        parent: the element.
+        parent: element that has the child.
         tag: tag of the child.
     """
     child = parent.find(tag)

@@ -21,7 +21,7 @@ class NewerContent(NamedTuple):
     """An element that is newer than the version of its document.
 
     Attributes:
-        element: the element.
+        element: element of the document.
         parent: tag of the object that contains it.
         since: version that introduced it.
     """
