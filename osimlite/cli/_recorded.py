@@ -50,6 +50,10 @@ def write_results(
     print_motion_summary(recorded, [folder / name for name in names])
 
 
+LARGEST_USUAL_ANGLE = 10.0
+"""Larger angles of a motion (rad) are usually degrees; OSIM847 has the same limit."""
+
+
 def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> None:
     """Print which coordinates and times of a motion were used, and the files written.
 
@@ -61,6 +65,13 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
         say(f"not in the motion, default value used: {join_words(recorded.missing)}")
     if recorded.ignored:
         say(f"ignored columns, which are not coordinates: {join_words(recorded.ignored)}")
+    turned = [info.motion_type == "rotational" for info in recorded.mechanism.coordinates]
+    largest = abs(recorded.values[:, turned]).max(initial=0.0)
+    if largest > LARGEST_USUAL_ANGLE:
+        say(
+            f"the largest angle is {largest:.4g} rad; if the motion is in degrees, write inDegrees=yes in the header "
+            "of its file"
+        )
     times = recorded.times
     paths = join_words([str(file) for file in files])
     say(f"{len(times)} rows from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

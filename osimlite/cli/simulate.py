@@ -13,6 +13,7 @@ from osimlite.cli._console import FactTable, complain
 from osimlite.cli._progress import motion_bar, progress_bar
 
 if TYPE_CHECKING:
+    from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
 LIVE_STEP_S = 1e-3
@@ -119,7 +120,7 @@ def simulate(
             complain(
                 f"{ending} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
-            _describe_run(trajectory, write_results(trajectory, results)).show()
+            _describe_run(trajectory, write_results(trajectory, results), model).show()
             if is_failure:
                 raise
             # 128 + SIGINT, as shells report an interruption.
@@ -142,7 +143,7 @@ def simulate(
                 )
 
         files = write_results(trajectory, results, plot=plot, film=film if animate else None)
-        _describe_run(trajectory, files).show()
+        _describe_run(trajectory, files, model).show()
         # The window stays open until the user closes it.
         simulation.hold()
 
@@ -247,7 +248,24 @@ def write_results(
     return [folder / path.name for path in paths]
 
 
-def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
+def _find_soft_contacts(model: Model) -> list[str]:
+    """Return the names of the contact forces that act with a stiffness of 0."""
+    from osimlite.schema.contact_forces import ElasticFoundationForce
+    from osimlite.schema.forces import HuntCrossleyForce
+
+    return [
+        f"'{force.name}'"
+        for force in (
+            *model.components(HuntCrossleyForce),
+            *model.components(ElasticFoundationForce),
+        )
+        if force.appliesForce
+        and any(item.stiffness == 0.0 for item in force.contact_parameters.objects)
+    ]
+
+
+def _describe_run(trajectory: Trajectory, files: Sequence[Path], model: Model) -> FactTable:
+    from osimlite.base.text import join_words
     from osimlite.simulation.elements import summarize_skipped
 
     summary = trajectory.summary
@@ -266,6 +284,13 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
         facts.add(
             "warning",
             "muscles start with the model's states, not in equilibrium; add --equilibrate",
+        )
+    # A misspelt <stiffness> leaves the default, 0. OpenSim then computes NaN.
+    if soft := _find_soft_contacts(model):
+        facts.add(
+            "warning",
+            f"contacts with a stiffness of 0 exert no force here, and NaN in OpenSim: {join_words(soft, max_count=3)}; "
+            "'osimlite validate' shows the lines",
         )
     first, last = (summary["energy_J"][moment]["total"] for moment in ("start", "end"))
     facts.add("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")

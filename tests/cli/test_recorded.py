@@ -53,7 +53,7 @@ def test_files_that_are_no_motion_are_named_for_what_they_are(
             "m.trc: these are markers over time (.trc), but a storage file is needed here (.sto, .mot)",
         ),
         ((walker, "m.csv"), "m.csv: this is not a storage file (.sto, .mot)"),
-        ((walker, walker), "this is XML, and no storage file"),
+        ((walker, walker), "this is XML, not a storage file"),
     ):
         for command in ("kinematics", "inverse-dynamics"):
             done = run(command, *words, folder=tmp_path)
@@ -271,3 +271,14 @@ def test_forces_are_shared(fixtures: Path, tmp_path: Path) -> None:
     )
     done = run("static-optimization", walker, "still.mot", folder=tmp_path)
     assert done.code == 1 and "no actuators" in done.err
+
+
+def test_angles_that_look_like_degrees_are_reported(fixtures: Path, tmp_path: Path) -> None:
+    walker = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    header = "m\nversion=1\nnRows=7\nnColumns=2\ninDegrees={}\nendheader\ntime\tRHip_rz\n"
+    rows = "".join(f"{0.1 * k:g}\t{60 + k}\n" for k in range(7))
+    for stated, reported in (("no", True), ("yes", False)):
+        (tmp_path / "m.mot").write_text(header.format(stated) + rows)
+        done = run("inverse-dynamics", walker, "m.mot", "-o", stated, folder=tmp_path)
+        assert done.code == 0, done.err
+        assert ("the largest angle is 66 rad; if the motion is in degrees" in done.out) == reported

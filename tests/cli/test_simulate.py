@@ -172,6 +172,23 @@ def test_failure_on_the_way_keeps_what_was_recorded(walker, tmp_path):
     assert "steps" in out
 
 
+def test_contacts_without_stiffness_are_named(walker, tmp_path):
+    """OpenSim computes NaN with them; here they are left without a force, which nobody may overlook."""
+    text = (
+        Path(walker)
+        .read_text()
+        .replace("stiffness>1000000</stiffness", "stiffnes>1000000</stiffnes", 1)
+    )
+    assert "stiffnes>" in text
+    (tmp_path / "m.osim").write_text(text)
+    done = run("simulate", "m.osim", "--to", "0.1", "-o", "r", folder=tmp_path)
+    assert done.code == 0 and "contacts with a stiffness of 0 exert no force here" in " ".join(
+        done.out.split()
+    )
+    done = run("simulate", walker, "--to", "0.1", "-o", "s", folder=tmp_path)
+    assert done.code == 0 and "stiffness" not in done.out
+
+
 def test_unsupported_force(walker, tmp_path):
     text = Path(walker).read_text()
     station = "<Station><socket_parent_frame>/ground</socket_parent_frame></Station>"
