@@ -57,6 +57,16 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     }
 
 
+def test_a_missing_file_leads_to_one_with_a_similar_name(project):
+    text = (project / "ik.xml").read_text()
+    (project / "ik.xml").write_text(text.replace(">leg.trc<", ">legs.trc<"))
+    (finding,) = validate(project / "ik.xml", select=["OSIM821"]).findings
+    assert "does not exist, but 'leg.trc' does: OpenSim rejects" in finding.message
+    (project / "leg.trc").rename(project / "motion.trc")
+    (finding,) = validate(project / "ik.xml", select=["OSIM821"]).findings
+    assert "does not exist: OpenSim rejects" in finding.message
+
+
 @pytest.mark.parametrize(("folder", "severity"), [("data", "warning"), (" ", "info")])
 def test_the_input_directory_of_old_setups_is_no_misspelling(project, folder, severity):
     """OpenSim 2 wrote this property; OpenSim 4.6 ignores it in files of every version."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from osimlite.base.text import add_article, find_nearest
 from osimlite.lint.project_files import is_table
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.setup import (
@@ -14,7 +15,7 @@ from osimlite.lint.setup import (
     get_content_type,
     is_given,
 )
-from osimlite.lint.words import add_article, describe_object
+from osimlite.lint.words import describe_object
 from osimlite.schema.specs import get_file_specs
 from osimlite.schema.tree import is_a
 
@@ -35,7 +36,8 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
 
     Searches every file that a setup reads where OpenSim does: beside the setup, if OpenSim is
     started there. Files that another setup of the project writes need not exist yet. Reports names
-    in the wrong letter case and names with backslashes, which only Windows accepts.
+    in the wrong letter case and names with backslashes, which only Windows accepts, and suggests a
+    file with a similar name.
 
     OpenSim rejects the setup; where the model is missing, inverse kinematics crashes. A missing
     file of controls is only logged, and the tool runs without controls. A setup that names no file
@@ -59,6 +61,8 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
         is_meant = slashed != naming.name and os.path.isfile(setup.resolve_path(slashed))
         twin = slashed if is_meant else _find_other_case(naming)
         hint = "; backslashes separate folders on Windows only" if "\\" in naming.name else ""
+        if not hint and twin is None and (nearest := _find_nearest_file(naming)):
+            hint = f", but '{nearest}' does"
         goes_on = is_a(naming.item, "ControlSetController")
         consequence = "OpenSim continues without it" if goes_on else "OpenSim rejects the setup"
         report(
@@ -137,6 +141,27 @@ def _find_other_case(naming: FileReference) -> str | None:
     except OSError:
         return None
     return None if twin is None else naming.name[: len(naming.name) - len(last)] + twin
+
+
+def _find_nearest_file(naming: FileReference) -> str | None:
+    """Return the most similar name of a file of the same type in the same folder; None without one."""
+    folder, last = os.path.split(naming.path)
+    suffix = os.path.splitext(last)[1].lower()
+    try:
+        names = [
+            name
+            for name in os.listdir(folder or ".")
+            if name.lower().endswith(suffix) and name != last
+        ]
+    except OSError:
+        return None
+    # Without a suffix, any file would do.
+    nearest = find_nearest(last, sorted(names), cutoff=_MIN_FILE_SIMILARITY) if suffix else None
+    return None if nearest is None else naming.name[: len(naming.name) - len(last)] + nearest
+
+
+_MIN_FILE_SIMILARITY = 75.0
+"""Least similarity (%) of a file that a message names instead of a missing one: one or two letters differ."""
 
 
 @rule("OSIM822", "input-of-another-kind", severity=ERROR, about="document")
