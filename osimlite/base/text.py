@@ -230,7 +230,7 @@ def format_time_span(start: float, end: float) -> str:
     return f"before {end:g} s" if start == float("-inf") else f"between {start:g} and {end:g} s"
 
 
-def with_article(noun: str) -> str:
+def add_article(noun: str) -> str:
     """Return a noun with its indefinite article: ``"a Body"``, ``"an Ellipsoid"``.
 
     Args:

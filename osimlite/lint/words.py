@@ -15,11 +15,6 @@ def describe_object(item: Object) -> str:
     return f"{kind} '{item.name}'" if item.name else kind
 
 
-def add_article(noun: str) -> str:
-    """Return the noun with its article."""
-    return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
-
-
 def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
     """Format a number, or several, with few digits and the unit.
 

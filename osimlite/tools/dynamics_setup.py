@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.progress import watch_items
-from osimlite.base.text import join_words, with_article
+from osimlite.base.text import add_article, join_words
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -49,7 +49,7 @@ def find_analyses(job: Job) -> Analyses:
             class_name = type(analysis).__name__
             if class_name not in ANALYSES:
                 raise job.create_unsupported_error(
-                    f"the analysis '{analysis.name}' is {with_article(class_name)}, which osimlite cannot compute yet; "
+                    f"the analysis '{analysis.name}' is {add_article(class_name)}, which osimlite cannot compute yet; "
                     "switch it off with <on>false</on>"
                 )
             result.append((analysis, import_function(ANALYSES[class_name])))

@@ -10,7 +10,7 @@ from pathlib import Path
 from osimlite.base.files import get_relative_path
 from osimlite.base.progress import report_stage
 from osimlite.base.result_writing import ResultWriter
-from osimlite.base.text import format_count, join_words, with_article
+from osimlite.base.text import add_article, format_count, join_words
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
 from osimlite.io.document.cache import keep_object
 from osimlite.io.document.reader import pause_collector, read_any
@@ -115,12 +115,12 @@ def run(
     class_name = type(setup_object).__name__
     if class_name not in TOOLS:
         raise NotRunnable(
-            f"osimlite cannot run {with_article(class_name)}; it runs {join_words(list_runnable())}",
+            f"osimlite cannot run {add_article(class_name)}; it runs {join_words(list_runnable())}",
             file=str(file),
         )
     # An option without effect would suggest results that it does not give.
     if refine is not None and not class_name.startswith("Moco"):
-        raise SettingError(f"{with_article(class_name)} has no mesh to refine; leave out --refine")
+        raise SettingError(f"{add_article(class_name)} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
     replaced = substitute_inputs(setup_object, file.parent, substitutes or {})
     # Errors are cheaper to find before a tool that may run for hours.

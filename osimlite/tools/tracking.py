@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import join_words, suggest_name, with_article
+from osimlite.base.text import add_article, join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves, derivatives_of_samples
@@ -217,7 +217,7 @@ class TrackingTasks:
         for task in job.read_object(path, CMC_TaskSet).objects:
             # Subclasses would be tracked by other rules.
             if type(task) is not CMC_Joint:
-                message = f"the task '{task.name}' is {with_article(type(task).__name__)}, which osimlite cannot track yet"
+                message = f"the task '{task.name}' is {add_article(type(task).__name__)}, which osimlite cannot track yet"
                 raise NotRunnable(message, file=str(path))
             for property_name in ("active", "weight", "kp", "kv", "ka"):
                 if not getattr(task, property_name):

@@ -12,13 +12,13 @@ from rapidfuzz import fuzz
 
 from osimlite.base.text import (
     MAX_COMPARED_NAMES,
+    add_article,
     escape_control_sequences,
     escape_unprintable,
     find_nearest,
     format_json,
     format_time_span,
     measure_similarity,
-    with_article,
 )
 from osimlite.errors import OsimliteError
 
@@ -137,7 +137,7 @@ def test_the_nearest_name() -> None:
     ],
 )
 def test_articles(noun: str, words: str) -> None:
-    assert with_article(noun) == words
+    assert add_article(noun) == words
 
 
 def test_spans_of_times() -> None:

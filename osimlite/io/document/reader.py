@@ -16,7 +16,7 @@ from lxml import etree
 
 from osimlite.base.files import expect_size
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import find_nearest, with_article
+from osimlite.base.text import add_article, find_nearest
 from osimlite.errors import (
     DocumentError,
     MissingFileError,
@@ -376,12 +376,10 @@ def _read_top(
             description = "no object" if expected_class is Object else f"no <{expected_class.tag}>"
         elif expected_class is Object:
             tag = decode_name(first_element.tag)
-            description = f"{with_article(f'<{tag}>')}, which is not a class of OpenSim 4.6"
+            description = f"{add_article(f'<{tag}>')}, which is not a class of OpenSim 4.6"
         else:
             tag = decode_name(first_element.tag)
-            description = (
-                f"{with_article(f'<{tag}>')}, not {with_article(f'<{expected_class.tag}>')}"
-            )
+            description = f"{add_article(f'<{tag}>')}, not {add_article(f'<{expected_class.tag}>')}"
         position = source.locate_tag(0 if first_element is None else 1)
         suggestion = (
             None

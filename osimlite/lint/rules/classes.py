@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from osimlite.base.text import find_nearest
+from osimlite.base.text import add_article, find_nearest
 from osimlite.io.document.notes import Note
 from osimlite.lint.diagnostic import Consequence
 from osimlite.lint.fixes import rename_tag, replace_text
 from osimlite.lint.old_tags import successor
 from osimlite.lint.registry import ERROR, REFUSES, RUNS, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import add_article, describe_object
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField
 from osimlite.schema.model import Model

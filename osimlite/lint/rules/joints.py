@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from osimlite.base.text import format_count, join_words
+from osimlite.base.text import add_article, format_count, join_words
 from osimlite.lint.axes import list_axis_names, list_coordinates, refuses_axes
 from osimlite.lint.placement import find_rotation_axes
 from osimlite.lint.registry import ERROR, INFO, NAN, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.skeleton import build_skeleton, find_base
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import add_article, describe_object
+from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import dot
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, cast
 
 from osimlite.base.named_tuples import NamedTuple
-from osimlite.base.text import find_nearest, join_words
+from osimlite.base.text import add_article, find_nearest, join_words
 from osimlite.io.document.source import Source
 from osimlite.lint.axes import find_made_up_paths, refuses_axes
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject, cache_per_subject
-from osimlite.lint.words import add_article, describe_object, find_nearest_name, pick_closest
+from osimlite.lint.words import describe_object, find_nearest_name, pick_closest
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.frames import Frame

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.patterns import compile_later
-from osimlite.base.text import find_nearest, format_count, join_words
+from osimlite.base.text import add_article, find_nearest, format_count, join_words
 from osimlite.io.document.lexical import reads_as
 from osimlite.io.document.notes import Note
 from osimlite.io.document.source import Source
@@ -18,7 +18,7 @@ from osimlite.lint.old_tags import Successor, is_comment, reason_unused, success
 from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
 from osimlite.lint.rules.classes import find_part, find_set, find_wrapper
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import add_article, describe_object, format_value
+from osimlite.lint.words import describe_object, format_value
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import add_article
 from osimlite.lint.history import NEWEST, find_new_properties, load_later_changes
 from osimlite.lint.registry import ERROR, INFO, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import add_article, describe_object
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.patterns import compile_later
-from osimlite.base.text import find_nearest, format_count
+from osimlite.base.text import add_article, find_nearest, format_count
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, REFUSES, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import add_article, describe_object
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
