@@ -136,9 +136,7 @@ def _make_format_error(beginning: bytes) -> str:
             "coordinates from markers"
         )
     if beginning.startswith(b"<"):
-        return (
-            "this is XML, and no storage file (.sto, .mot); are the arguments in the right order?"
-        )
+        return "this is XML, not a storage file (.sto, .mot); are the arguments in the right order?"
     return "this is not a storage file (.sto, .mot): it has no line 'endheader'"
 
 
