@@ -28,7 +28,7 @@ def describe_fit(
     """Yield messages about a fitted motion.
 
     Args:
-        motion: the motion.
+        motion: motion that fits measurements.
         advice: limits of the root mean square and of the largest marker error that OpenSim's
             documentation recommends, m.
         marker_note: text that says for which markers the limits hold.
@@ -100,8 +100,9 @@ def describe_unknown(model: Model, consequence: str) -> str:
     """Return a sentence that names the parts of unknown classes, or "" without such parts.
 
     Args:
-        model: the model.
-        consequence: what this means for these parts, for example "Such parts are not scaled".
+        model: model that may have parts of unknown classes.
+        consequence: sentence about these parts without a full stop, for example "Such parts are not
+            scaled".
     """
     unknown_parts = find_unknown(model)
     if not unknown_parts:

@@ -32,7 +32,7 @@ class FittedMotion(Movement):
         unseen: numbers of the frames without any measurement, which have the pose of the frame
             before.
         unsettled: numbers of the frames in which the solver did not converge.
-        model: the model.
+        model: model whose motion it is; None if it is unknown.
         sensors: names of the k fitted sensors.
         turns: rotation vectors of the sensors from their measured orientations (t, k, 3), in
             ground, rad; NaN where one was not measured.

@@ -28,7 +28,7 @@ class FrameSolver:
     """Solver of the pose that fits markers, sensors or both; each frame starts from the one before.
 
     Args:
-        model: the model.
+        model: model that has the markers and sensors.
         markers: names of the markers whose positions :meth:`step` receives, in that order; by
             default all markers, or none if sensors are named.
         weights: weights of markers and sensors by name; the others have weight 1.

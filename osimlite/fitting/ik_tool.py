@@ -52,11 +52,11 @@ def collect_targets(
     are taken as degrees, whatever its header says, and interpolated by splines of degree five.
 
     Args:
-        model: the model.
+        model: model whose markers are fitted.
         mechanism: mechanism of the model.
         tasks: tasks of the setup.
         data: measured markers.
-        coordinates: values of coordinates from a file, or None.
+        coordinates: table with values of coordinates; None without a file.
 
     Raises:
         SettingError: a coordinate does not exist or has no value in the file, or a weight is
@@ -123,13 +123,13 @@ def run_inverse_kinematics(
     """Compute the motion of an InverseKinematicsTool.
 
     Args:
-        tool: the setup.
-        model: the model.
+        tool: setup of the tool.
+        model: model whose markers are fitted.
         data: measured markers.
-        coordinates: values of coordinates from a file, or None.
+        coordinates: table with values of coordinates; None without a file.
 
     Raises:
-        OsimliteError: as for :func:`collect_targets`.
+        OsimliteError: the tasks do not fit the model or the data, see :func:`collect_targets`.
     """
     start, end = expect_time_range(tool.time_range)
     frames = data.select_times(start, end)

@@ -52,15 +52,15 @@ def inverse_kinematics(
         model: model with markers named as the measured ones, and frames named as the sensors.
         markers: a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where a
             marker was not seen.
-        orientations: a .sto file of quaternions, or by name arrays of quaternions (t, 4), scalar
+        orientations: a .sto file of quaternions, or arrays by name: quaternions (t, 4), scalar
             first, or rotation matrices (t, 3, 3) from the axes of a sensor to ground; NaN where one
             was not measured. Without markers, translational coordinates keep their default values,
             as in OpenSim. With markers, both must have the same times.
         times: times of the frames of arrays, s; by default 0, 1, 2 ...
         weights: weights of markers and sensors by name; the others have weight 1, and weight 0
             excludes.
-        coordinates: by name, the weight (1/rad², 1/m²) with which a coordinate keeps its default
-            value, or the weight and the target value (rad or m). A weight of 1 is large compared
+        coordinates: weights (1/rad², 1/m²) with which coordinates keep their default values, or
+            weights and target values (rad or m), by name. A weight of 1 is large compared
             with the mean over the markers.
         constraints: whether the constraints of the model hold.
         start: first time, s.
@@ -150,14 +150,14 @@ def fit_motion(
     """Fit markers, sensors and coordinates of a model.
 
     Args:
-        model: the model.
+        model: model that has the markers.
         mechanism: mechanism of the model.
         data: measured markers.
         weights: weights of the markers to fit, by name.
         goals: k coordinates with target values.
         targets: target values (t, k), rad or m.
         constraints: whether the constraints of the model hold.
-        orientations: measured orientations of sensors, or None.
+        orientations: measured orientations of sensors; None without sensors.
         sensor_weights: weights of the sensors to fit, by name.
 
     Raises:
@@ -176,7 +176,7 @@ def fit_motion(
             "different times; resample one of them"
         )
     if not data.names:
-        # Orientations say nothing about positions.
+        # Orientations determine no positions.
         mechanism = lock_translations(mechanism)
     names = tuple(weights)
     sensors = find_sensor_frames(model, mechanism, sensor_weights) if sensor_weights else {}
@@ -227,8 +227,8 @@ def check_weight(weight: float, owner: str) -> None:
     """Raise an error for an invalid weight.
 
     Args:
-        weight: the weight.
-        owner: what it belongs to, for the message.
+        weight: weight of a marker, a sensor or a task.
+        owner: description of the marker, sensor or task, for the message.
 
     Raises:
         SettingError: the weight is negative, infinite or NaN.
@@ -264,7 +264,7 @@ def find_marker_stations(model: Model, mechanism: Mechanism) -> dict[str, Statio
     """Return body and location of each marker by name; the first of several with one name counts.
 
     Args:
-        model: the model.
+        model: model that has the markers.
         mechanism: mechanism of the model.
 
     Returns:

@@ -169,7 +169,7 @@ def read_c3d(path: str | Path) -> MarkerData:
 
 
 MarkerSource = MarkerData | str | Path | Mapping[str, ArrayLike]
-"""Anything from which markers can be read."""
+"""Sources of markers: data, a file, or arrays by name."""
 
 _READERS = {".trc": read_trc, ENDING: read_c3d, ".sto": read_sto_markers}
 """Readers by suffix of the file; .trc is the default."""

@@ -99,7 +99,7 @@ class Measurements:
         """Return the values (t, k, ...) of k markers or sensors.
 
         Args:
-            names: their names.
+            names: names of k markers or sensors.
 
         Raises:
             SettingError: a name is unknown.
@@ -119,7 +119,7 @@ class Measurements:
 
         Args:
             model: names in the model.
-            selected: if given, only these names count.
+            selected: names to which the result is restricted; None for no restriction.
 
         Raises:
             OsimliteError: the data and the model share no name.

@@ -35,7 +35,7 @@ class ScaleFactorFinder:
     """Finder of scale factors for the bodies of a model.
 
     Args:
-        model: the generic model.
+        model: generic model.
 
     Attributes:
         mechanism: mechanism of the model.
@@ -145,7 +145,7 @@ def create_scale_set(frames: Iterable[str], scale_factors: ScaleFactors) -> Scal
 
     Args:
         frames: names of physical frames, in order.
-        scale_factors: their factors.
+        scale_factors: result that has factors for these frames.
     """
     scales = [
         Scale(scales=tuple(scale_factors.factors[name]), segment=name, apply=True)

@@ -35,8 +35,8 @@ class OrientationData(Measurements):
         """Return orientations from a file, or from arrays by the names of the sensors.
 
         Args:
-            source: a .sto file of quaternions; or by name quaternions (t, 4), scalar first, or
-                rotation matrices (t, 3, 3) from the axes of a sensor to ground; or OrientationData.
+            source: a .sto file of quaternions; OrientationData; or arrays by name: quaternions
+                (t, 4), scalar first, or rotation matrices (t, 3, 3) from a sensor to ground.
             times: times of the frames of arrays, s; by default 0, 1, 2 ...
 
         Raises:
@@ -85,7 +85,7 @@ def to_rotations(values: ArrayLike, owner: str) -> Array:
 
     Args:
         values: quaternions, scalar first, or rotation matrices.
-        owner: what they belong to, for the message.
+        owner: description of the sensor or table, for the message.
 
     Raises:
         SettingError: the array has neither shape.
@@ -106,7 +106,7 @@ def holds_orientations(path: str | Path) -> bool:
     """Return whether a file is a table of quaternions.
 
     Raises:
-        OsimliteError: as for :class:`TableStream`.
+        OsimliteError: the file cannot be read, see :class:`TableStream`.
     """
     if Path(path).suffix.lower() != ".sto":
         return False
@@ -138,4 +138,4 @@ def read_orientations(path: str | Path) -> OrientationData:
 
 
 OrientationSource = OrientationData | str | Path | Mapping[str, ArrayLike]
-"""Anything from which orientations can be read."""
+"""Sources of orientations: data, a file, or arrays by name."""

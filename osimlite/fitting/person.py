@@ -67,7 +67,7 @@ class Person:
     """Model that was fitted to a person.
 
     Attributes:
-        model: the scaled model, with the markers where they are on the person.
+        model: scaled model, with the markers at their positions on the person.
         factors: scale factors of each body along its axes, by name.
         uncertain: standard deviations of the factors, as far as the assumptions about skin hold.
         offsets: offsets of movable markers from the scaled model (3,), m, along the axes of their
@@ -130,10 +130,10 @@ def fit(
     scaled model has it; all others may move.
 
     Args:
-        model: the generic model, with markers named as those of the data; it is not changed.
+        model: generic model with markers named as those of the data; it is not changed.
         trials: movements, as .trc, .c3d or .sto files or arrays by name; the keys of a mapping name
             the trials.
-        static: the standing subject.
+        static: markers of the standing subject, as a file or arrays by name; None without them.
         weights: weights of markers by name; the others have weight 1, and weight 0 excludes.
         held: markers that stay where the model has them; by default those that are `fixed`.
         by_axis: whether the factors of a body may differ between its axes.
@@ -289,7 +289,7 @@ class _PersonFit:
         )
 
     def start_from_model(self, mechanism: Mechanism) -> _Estimate:
-        """Return the estimate of the model as it is."""
+        """Return the estimate for the unscaled model."""
         starts = np.tile(compute_first_pose(mechanism, 0.0, True), (len(self._chosen.times), 1))
         return self._evaluate_estimate(
             np.ones(self._sizes), np.zeros((len(self._chosen.markers), 3)), starts

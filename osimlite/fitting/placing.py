@@ -54,12 +54,12 @@ def place_markers(
     over the frames in which it was seen.
 
     Args:
-        model: the model, which is changed; markers without data are removed.
+        model: model whose markers are moved in place; markers without data are removed.
         data: measured markers of the standing subject.
         tasks: weights and targets of the pose.
         start: start of the range over which markers are averaged, s.
         end: end of the range, s.
-        coordinates: values of coordinates for tasks that read them from a file.
+        coordinates: table with values of coordinates, for tasks that read them from a file.
 
     Raises:
         SettingError: the range has no frames, or a task has an unknown name.
@@ -137,8 +137,8 @@ def format_pose(model: Model, placement: MarkerPlacement) -> str:
     """Return the pose as OpenSim's placer writes it: all states of the model, in radians.
 
     Args:
-        model: the model.
-        placement: its markers and pose.
+        model: model in the pose.
+        placement: placed markers and fitted pose of the model.
     """
     mechanism = placement.pose.mechanism
     motion = placement.pose

@@ -55,7 +55,7 @@ class PoseFit:
     coordinates follow their functions. Coordinates that couplers determine are substituted.
 
     Args:
-        mechanism: the mechanism.
+        mechanism: mechanism whose poses are fitted.
         markers: points with measured positions.
         sensors: frames with measured orientations.
         goals: coordinates with target values.
@@ -148,10 +148,11 @@ class PoseFit:
         """Fit frames, starting from the latest pose.
 
         Args:
-            measured: for each frame (t, ...), positions of the markers, orientations by rows, and
-                target values; NaN where something was not measured.
+            measured: measurements (t, ...) of t frames: positions of the markers in ground, m,
+                rotation matrices of the sensors by rows, and target values of coordinates, rad or
+                m; NaN where something was not measured.
             times: times of the frames for prescribed coordinates, s; zero by default.
-            q: values (n,) of all coordinates to start from.
+            q: values (n,) of all coordinates to start from; by default the latest pose.
 
         Raises:
             SimulationError: no pose satisfies the constraints.
@@ -268,7 +269,7 @@ class SingleFrameFit:
         """Return the values (n,) of all coordinates that fit one frame.
 
         Args:
-            measured: positions of the markers, then orientations of the sensors.
+            measured: positions of the markers, m, then rotation matrices of the sensors by rows.
             time: time, s.
         """
         self._given[:] = measured

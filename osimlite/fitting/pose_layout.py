@@ -52,7 +52,7 @@ def separate_couplers(
     """Separate couplers that determine a coordinate from other constraints.
 
     Args:
-        constraints: all constraints.
+        constraints: constraints of the mechanism.
         fixed: indices of coordinates whose values are known.
 
     Returns:
@@ -272,7 +272,7 @@ def compute_ranges(
     If a clamped coordinate depends on a single other one, that one stays where the range allows it.
 
     Args:
-        mechanism: the mechanism.
+        mechanism: mechanism with the coordinates.
         order: indices of the coordinates to find.
         couplers: couplers that determine a coordinate.
     """

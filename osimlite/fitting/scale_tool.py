@@ -39,7 +39,7 @@ MEASUREMENTS = "measurements"
 MANUAL_SCALE = "manualScale"
 """Word of a `scaling_order` for prescribed factors."""
 MeasurementPairs = Mapping[str, tuple[Sequence[tuple[str, str]], Mapping[str, str]]]
-"""Measurements by name: pairs of markers, and by body the axes that they scale (``"XYZ"``)."""
+"""Pairs of markers and the axes that they scale by body (``"XYZ"``), by name of the measurement."""
 
 
 @dataclass(eq=False)
@@ -47,7 +47,7 @@ class ScaledModel:
     """Scaled model, with its factors and files.
 
     Attributes:
-        model: the model.
+        model: scaled model.
         measured: scale factors of the bodies, and their origin.
         placed: new positions of the markers; None if they were not placed.
         texts: texts of the files that the tool writes, by path from the folder of the setup.
@@ -81,10 +81,10 @@ def scale(
     """Scale a model to a subject, as OpenSim's ScaleTool does.
 
     Args:
-        model: the generic model, with markers named as those of the data; it is not changed.
+        model: generic model with markers named as those of the data; it is not changed.
         static: measured markers of the standing subject: a file, or arrays by name.
-        measurements: by name, pairs of markers, and by body the axes that the mean ratio of their
-            distances scales, as ``{"thigh": ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or
+        measurements: pairs of markers, and the axes by body that the mean ratio of their distances
+            scales, by name of the measurement, as ``{"thigh": ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or
             OpenSim's objects. Later measurements overwrite earlier ones.
         factors: one factor for each body, or one for each axis; they overwrite measurements.
         mass: mass of the subject, kg; if it is not positive, the mass follows from the factors.
@@ -185,7 +185,7 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
     """Compute what a ScaleTool computes from the files of its setup; write nothing.
 
     Args:
-        tool: the setup.
+        tool: setup of the tool.
         folder: folder of the setup, from which its paths start.
 
     Raises:
@@ -265,7 +265,7 @@ def add_markers(model: Model, path: Path) -> None:
     """Add the markers of a file to a model; they replace markers of the same name.
 
     Args:
-        model: the model, which is changed.
+        model: model that gets the markers.
         path: file of a MarkerSet.
 
     Raises:

@@ -55,8 +55,8 @@ def scale_model(
     stiffnesses, ranges of coordinates and contact geometry stay.
 
     Args:
-        model: the model, which is changed.
-        factors: factors of its bodies.
+        model: model to scale; it is changed in place.
+        factors: scale factors of the bodies.
         mass: total mass, kg; if it is not positive, the mass follows from the factors.
         preserve_mass_distribution: whether the bodies keep their shares of the mass; otherwise
             larger bodies are heavier.
@@ -103,8 +103,8 @@ def compute_path_lengths(model: Model, mechanism: Mechanism | None = None) -> di
     """Return the lengths of paths in the default pose, for components that scale with their path.
 
     Args:
-        model: the model.
-        mechanism: its mechanism; built by default.
+        model: model with the paths.
+        mechanism: mechanism of the model; built by default.
 
     Returns:
         Length (m) by path of the component.
@@ -153,8 +153,8 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     moment of inertia.
 
     Args:
-        body: the body, which is changed.
-        factors: factors along its axes (3,).
+        body: body to scale; it is changed in place.
+        factors: scale factors along the axes of the body (3,).
         scales_mass: whether the mass grows with the volume.
     """
     mass = body.mass

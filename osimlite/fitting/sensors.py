@@ -45,7 +45,7 @@ def find_sensor_frames(
     """Return the frames of a model with the names of sensors, in the model's order.
 
     Args:
-        model: the model.
+        model: model with the frames.
         mechanism: mechanism of the model.
         requested: names of the sensors.
 
@@ -85,10 +85,10 @@ def place_sensors(
     rotated.
 
     Args:
-        model: the model, which is changed.
+        model: model to which the sensors are added.
         data: orientations of the sensors in ground; only the first frame counts.
         base: sensor whose axis points where the model faces; without it, the data are not rotated.
-        axis: that axis: x, y or z, with a minus sign if it points backwards.
+        axis: axis of `base`: x, y or z, with a minus sign if it points backwards.
 
     Returns:
         Names of placed and unused sensors, and the heading.

@@ -32,7 +32,7 @@ class ScalableMarkers:
     """Markers of a model whose bodies have scale factors.
 
     Args:
-        model: the model.
+        model: unscaled model, which stays unchanged.
         names: names of the m markers; none is on ground.
         segments: segments with k parameters.
     """

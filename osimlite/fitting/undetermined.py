@@ -39,7 +39,7 @@ def find_undetermined(
     is computed in a few frames by a singular value decomposition.
 
     Args:
-        mechanism: the mechanism.
+        mechanism: mechanism of the model.
         values: values of all coordinates in the fitted poses (t, n).
         visibility: whether each marker was seen in each frame (t, m).
         markers: m markers with their weights.

@@ -42,7 +42,7 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, an AnalyzeTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: AnalyzeTool = job.setup
     analyses = find_analyses(job)
@@ -104,13 +104,14 @@ def equilibrate_rows(
     from it. Here the states of the muscle become NaN.
 
     Args:
-        outcome: collects the messages.
-        simulation: its engine computes the equilibria.
+        outcome: outcome to which messages are added.
+        simulation: simulation of the model, whose engine computes the equilibria.
         times: times (t,), s.
         states: states (t, y), changed in place.
 
     Returns:
-        By path of each muscle without equilibrium at some time: whether it has none (t,).
+        Masks (t,) of the times without equilibrium, by path of the muscle; only muscles that lack one
+        at some time are included.
     """
     engine = simulation.engine
     assert isinstance(engine, System)
@@ -158,10 +159,10 @@ def _read_coordinate_motion(
     """Read the coordinates of a setup, filter them, and satisfy the constraints.
 
     Args:
-        job: the setup.
-        outcome: collects messages.
+        job: setup of the tool, with the paths of its files.
+        outcome: outcome to which messages are added.
         simulation: simulation of the model.
-        model: the model.
+        model: model of the simulation.
 
     Returns:
         Number of the first row; times with states; and a function that returns the times and speeds
@@ -223,7 +224,7 @@ def _read_speeds(
     Speeds without a column have their default values.
 
     Args:
-        job: the setup.
+        job: setup of the tool, with the paths of its files.
         path: file of the speeds.
         recorded: motion of the coordinates.
         simulation: simulation of the model.

@@ -151,7 +151,7 @@ class ActuatorControl:
         Args:
             start: start of the window, s; there the control has its last value.
             end: end of the window, s.
-            value: control at the end.
+            value: control at the end of the window.
         """
         last_value = self.values[-1] if self.values else value
         if self.is_step:
@@ -197,8 +197,8 @@ class ComputedControl:
     """Controls of a model that follows a motion.
 
     Args:
-        job: the setup.
-        simulation: simulation of its model.
+        job: setup of the tool, with the paths of its files.
+        simulation: simulation of the model of the setup.
         desired: motion to follow.
         tasks: weights and gains of the coordinates.
         sharing: distribution of forces over the actuators.
@@ -304,8 +304,8 @@ class ComputedControl:
         Args:
             t: start of the window, s.
             target: end of the window, s.
-            y: state at the start.
-            result: collects errors, and the reason of a failure.
+            y: state (y,) at the start of the window.
+            result: record to which errors and the reason of a failure are added.
 
         Returns:
             Controls (a,) at the end of the window.
@@ -496,8 +496,8 @@ class ComputedControl:
 
         Args:
             start: start of the motion to follow, s.
-            y: initial state.
-            result: collects errors, and the reason of a failure.
+            y: initial state (y,).
+            result: record to which errors and the reason of a failure are added.
 
         Returns:
             Time in s, and state (y,).

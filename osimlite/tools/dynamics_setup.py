@@ -66,9 +66,9 @@ def compute_analyses(
 
     Args:
         job: setup of the tool.
-        outcome: collects the tables.
+        outcome: outcome to which the tables are added.
         analyses: analyses with the functions that compute them.
-        motion: all rows.
+        motion: motion with all rows.
         first_row: number of the first row in the file of the motion.
     """
     # OpenSim counts rows from the start of the file, not of the range that is analysed.
@@ -140,8 +140,8 @@ def _resolve_files(job: Job, setup_object: Object) -> Any:
     The model that the object joins may be in another folder.
 
     Args:
-        job: the setup.
-        setup_object: object of the setup, which is changed.
+        job: setup of the tool, with the paths of its files.
+        setup_object: object of the setup; it is changed in place.
 
     Returns:
         The object.
@@ -160,8 +160,8 @@ def build_simulation(job: Job, model: Model) -> Simulation:
     The results of tools are to have OpenSim's numbers.
 
     Args:
-        job: the setup.
-        model: its model.
+        job: setup of the tool, with the paths of its files.
+        model: model of the setup.
     """
     return Simulation(
         model,
@@ -179,8 +179,8 @@ def build_static_optimization(
     """Return the static optimization of a model under the loads of a setup, as in OpenSim.
 
     Args:
-        job: the setup.
-        model: its model.
+        job: setup of the tool, with the paths of its files.
+        model: model of the setup.
         mechanism: mechanism of the model.
         options: options of :class:`StaticOptimization`.
     """
@@ -202,10 +202,10 @@ def satisfy_constraints(
     Speeds change only in models without constraints in the constraint set, as in OpenSim.
 
     Args:
-        recorded: the motion.
+        recorded: motion whose values are to satisfy the constraints.
         speeds: generalized speeds (t, n).
         simulation: simulation of the model.
-        model: the model.
+        model: model of the simulation.
 
     Returns:
         Values (t, n) and speeds (t, n).
@@ -237,7 +237,7 @@ class StateRows(NamedTuple):
         """Read states of the model of a simulation.
 
         Args:
-            job: the setup.
+            job: setup of the tool, with the paths of its files.
             path: file of the states.
             simulation: simulation of the model.
 
@@ -305,9 +305,9 @@ def report_rows(job: Job, outcome: Outcome, motion: Motion) -> None:
     """Add a message about the number of rows, and the motion for a report.
 
     Args:
-        job: the setup.
-        outcome: collects the message.
-        motion: all rows.
+        job: setup of the tool, with the paths of its files.
+        outcome: outcome to which the message is added.
+        motion: motion with all rows.
     """
     times = motion.times
     outcome.evidence = Evidence.from_values(

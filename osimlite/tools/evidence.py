@@ -60,7 +60,7 @@ class Evidence:
         """Return the evidence of values in the order of a mechanism's coordinates.
 
         Args:
-            model: the model.
+            model: model that moves.
             file: file of the model.
             mechanism: mechanism of the model.
             times: times (t,), s.

@@ -39,7 +39,7 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, an InverseKinematicsTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: InverseKinematicsTool = job.setup
     coordinates = job.find_path("coordinate_file")
@@ -109,7 +109,7 @@ def run_scale_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, a ScaleTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     result = compute_scaled_model(job.setup, job.file.parent)
     for name, text in result.texts.items():
@@ -133,7 +133,7 @@ def run_imu_placer(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, an IMUPlacer.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: IMUPlacer = job.setup
     model = job.read_model()
@@ -169,7 +169,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, an IMUInverseKinematicsTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: IMUInverseKinematicsTool = job.setup
     model = job.read_model()

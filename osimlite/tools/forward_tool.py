@@ -28,7 +28,7 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, a ForwardTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: ForwardTool = job.setup
     analyses = find_analyses(job)
@@ -74,8 +74,8 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
     """Return the initial time and state: the last row of the states file up to the initial time.
 
     Args:
-        job: the setup.
-        outcome: collects messages.
+        job: setup of the tool, with the paths of its files.
+        outcome: outcome to which messages are added.
         simulation: simulation of the model.
 
     Returns:

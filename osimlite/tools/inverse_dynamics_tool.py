@@ -34,7 +34,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, an InverseDynamicsTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: InverseDynamicsTool = job.setup
     model = job.read_model()
@@ -100,7 +100,7 @@ def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -
     of at most 1 % of that force times the height of the mass centre.
 
     Args:
-        outcome: collects the messages.
+        outcome: outcome to which messages are added.
         mechanism: mechanism of the model.
         table: generalized forces.
     """
@@ -160,9 +160,9 @@ def compute_joint_loads(
     counts, and the other does the rest. Each is the shortest vector that does its part.
 
     Args:
-        model: the model.
+        model: model that has the joints.
         joints: requested joints.
-        recorded: the motion.
+        recorded: motion of the model, with t rows.
         forces: generalized forces (t, n) in the order of the mechanism.
 
     Returns:

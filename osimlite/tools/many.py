@@ -53,7 +53,7 @@ class RunRecord:
     status: str  # one of `STATUSES`
     messages: list[tuple[str, str]] = field(
         default_factory=list
-    )  # subjects, and what is said of them
+    )  # subject and text of each message
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the result
     files: list[str] = field(default_factory=list)  # written files
     failure: str = ""  # reason of the failure
@@ -77,7 +77,7 @@ def find_setups(names_or_patterns: Iterable[str | Path]) -> list[Path]:
     returned twice.
 
     Args:
-        names_or_patterns: names and patterns.
+        names_or_patterns: paths of setup files, or patterns of paths.
 
     Raises:
         OsimliteError: a pattern matches nothing, or a word names a folder.
@@ -127,17 +127,18 @@ def run_many(
     The results do not depend on the number of workers.
 
     Args:
-        setups: setup files.
+        setups: paths of setup files.
         output: folder for all results, with a folder in it for each setup; a setup that names a
             result of another one reads it from there.
         workers: number of processes; 1 runs all setups in this process, None starts one for each
             core.
         cluster: address of a Dask scheduler whose workers run the setups; they must see the same
             files.
-        resume: skip setups that an earlier run has finished, if their inputs and results are
-            unchanged.
+        resume: whether to skip setups that an earlier run has finished, if their inputs and results
+            are unchanged.
         progress: function that receives the number of finished setups and of all setups.
-        kept: receives the outcome of each setup; needs one worker in this process.
+        kept: mapping to which the outcome of each setup is added; it needs one worker in this
+            process.
         overwrite: whether to replace any file; by default only results of the same kind are
             replaced.
         write_outside: whether setups may name results outside their project and the current folder.
@@ -188,8 +189,8 @@ def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Pa
     """Assign a folder for its results to each setup.
 
     Args:
-        setups: setup files.
-        output: folder for all results, or None.
+        setups: paths of setup files.
+        output: folder for all results; None for the folders that the setups name.
 
     Returns:
         Folder by setup; None if the setup names the folder itself.
@@ -434,9 +435,9 @@ class _Schedule:
         Setups that were running when a process died are run again, each alone.
 
         Args:
-            do: runs one setup.
+            do: function that runs one setup.
             workers: number of processes; None for one for each core.
-            cluster: address of a Dask scheduler, or None.
+            cluster: address of a Dask scheduler; None for local processes.
         """
         from osimlite.base.pools import WorkerLostError, open_process_pool
 

@@ -27,7 +27,7 @@ def run_moco_study(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, a MocoStudy.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     # This imports CasADi, which is slow.
     from osimlite.optimal.problem import Problem
@@ -57,10 +57,10 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
     """Add the results of a solver to an outcome, with the motion for a report.
 
     Args:
-        job: the setup.
-        problem: the optimal control problem.
-        solution: its solution.
-        outcome: collects the results.
+        job: setup of the tool, with the paths of its files.
+        problem: optimal control problem of the setup.
+        solution: solution of the problem.
+        outcome: outcome to which the results are added.
     """
     outcome.done = solution.success
     outcome.title = job.setup.name
@@ -128,7 +128,7 @@ def run_moco_track(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, a MocoTrack.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     # This imports CasADi, which is slow.
     from osimlite.optimal.program import Program
@@ -154,7 +154,7 @@ def run_moco_inverse(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, a MocoInverse.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     # This imports CasADi, which is slow.
     from osimlite.optimal.inverse import build_inverse_problem, solve_inverse_problem

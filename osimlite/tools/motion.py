@@ -159,7 +159,7 @@ class Motion:
         """Compute rows that depend on the forces of all muscles.
 
         Args:
-            compute: returns the rows of a motion.
+            compute: function that returns the rows of a motion.
 
         Returns:
             Rows (t, ...); NaN at times at which a muscle lacks an equilibrium.
@@ -175,7 +175,8 @@ class Motion:
         """Compute rows that do not depend on the forces of muscles without equilibrium.
 
         Args:
-            compute: returns the rows of a motion, whose `left_out` names the muscles that are off.
+            compute: function that returns the rows of a motion, whose `left_out` names the muscles
+                that are off.
 
         Returns:
             Rows (t, ...).
@@ -346,8 +347,8 @@ class Motion:
 
         Args:
             requested: requested names.
-            names: all names.
-            what: description of the names for the message.
+            names: names from which the analysis requests some.
+            what: description of the names, for the message.
 
         Raises:
             SettingError: a requested name is unknown.
@@ -425,7 +426,7 @@ class AnalysisTables:
 
         Args:
             suffix: end of the file's name.
-            content: the text.
+            content: content of the file.
         """
         self.outcome.add_text(self._create_path(f"_{suffix}"), content)
 

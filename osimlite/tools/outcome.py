@@ -43,7 +43,7 @@ class Outcome:
 
     tables: dict[str, StoTable] = field(default_factory=dict)  # tables by the names of their files
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the results
-    # Messages about the results: the subject, and what is said of it.
+    # Messages about the results: subject and text of each.
     messages: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)  # written files
     # Findings about the setup, and files that it names, that are not errors; those with a
@@ -132,8 +132,8 @@ class Outcome:
         """Add a message about the results.
 
         Args:
-            name: what the message is about, one to three words.
-            message: the message.
+            name: subject of the message, in one to three words.
+            message: sentence for the user.
         """
         self.messages.append((name, message))
 
@@ -141,8 +141,8 @@ class Outcome:
         """Add a message that makes the results doubtful, and print it on standard error.
 
         Args:
-            name: what the message is about, one to three words.
-            message: the message.
+            name: subject of the message, in one to three words.
+            message: sentence for the user.
         """
         self.add_message(name, message)
         warn_caller(message)
@@ -201,7 +201,7 @@ class Outcome:
 
         Args:
             setup: path of the setup.
-            writer: decides which files may be written.
+            writer: writer of files, which refuses those that may not be written.
 
         Raises:
             OsimliteError: a file cannot be written or is an input of the setup, or results are not

@@ -37,8 +37,8 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
     """Return the function that computes an output; None if osimlite does not support the output.
 
     Args:
-        motion: the motion.
-        component: component of its model.
+        motion: motion along which the output is computed.
+        component: component of the motion's model.
         name: name of the output.
     """
     for cls in type(component).__mro__:
@@ -284,10 +284,10 @@ def _read_muscle_output(
     """Return an output of a muscle from the quantities of MuscleAnalysis and of its law.
 
     Args:
-        motion: the motion.
-        muscle: the muscle.
+        motion: motion along which the output is computed.
+        muscle: muscle of the motion's model.
         path: path of the muscle.
-        compute_output: computes the output (t, 1) from these quantities.
+        compute_output: function that computes the output (t, 1) from these quantities.
     """
     extra = [
         name

@@ -76,7 +76,7 @@ class ConstraintForces:
 
         Args:
             constraint: constraint between bodies.
-            multipliers: its multipliers (m,).
+            multipliers: Lagrange multipliers of the constraint (m,).
 
         Returns:
             Moment (N m) and force (N) on each body (k, 6), about the body's origin, in ground.
@@ -134,7 +134,7 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
     The sign is that of Simbody's multipliers, opposite to the forces that act.
 
     Args:
-        motion: the motion.
+        motion: motion along which the forces are computed.
 
     Returns:
         Labels of m columns, and rows (t, m).
@@ -212,7 +212,7 @@ class JointWrenches:
         """Return the wrenches of a motion; cached unless other controls drive the actuators.
 
         Args:
-            motion: the motion.
+            motion: motion along which the forces are computed.
             controls: controls that replace those of the simulation; None keeps them.
         """
         if controls is not None:
@@ -276,7 +276,7 @@ class JointWrenches:
         """Return the reaction of a joint on one of its bodies.
 
         Args:
-            joint: the joint.
+            joint: joint of the model.
             side: ``"child"`` or ``"parent"``.
 
         Returns:

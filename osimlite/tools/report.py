@@ -186,7 +186,7 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
     """Return the HTML of a viewer with the motion.
 
     Args:
-        evidence: the motion.
+        evidence: motion of a run, with measured data.
         states: activations that a tool has computed, which color the muscles.
     """
     mechanism = build_mechanism(evidence.model)
@@ -345,7 +345,7 @@ def _draw_errors(
         times: times (t,), s.
         names: names of m markers or sensors.
         errors: errors (t, m); NaN where one was not measured.
-        noun: what the names are.
+        noun: noun for the names in the singular, for example "marker".
         unit: unit of the errors.
         limits: limits of the root mean square and of the largest error.
 

@@ -23,7 +23,7 @@ def find_roots(
     """Return roots (n,) of n functions, each of its own argument.
 
     Args:
-        function: n values of n arguments.
+        function: function that returns n values (n,) for n arguments (n,).
         lower: lower bounds of the arguments (n,).
         upper: upper bounds of the arguments (n,).
         tolerance: tolerance of the arguments.

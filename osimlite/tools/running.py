@@ -47,7 +47,7 @@ class FaultySetup(DocumentError):
     """Error for a setup, or a file that it names, with findings of severity error.
 
     Attributes:
-        report: all findings.
+        report: findings of the check, of any severity.
     """
 
     def __init__(self, report: Report) -> None:
@@ -89,16 +89,16 @@ def run(
             about a marker that the tool ignores because of its spelling, or about the units of a
             table.
         progress: function that receives lines about the progress of a long search.
-        refine: for optimal control, split mesh intervals until no error is above this value; see
-            :func:`osimlite.moco.solve`.
-        simulates: for optimal control, whether to simulate the model with the controls of the
-            solution, and report how far the simulation is from the solution.
+        refine: largest error of a solution of optimal control, above which mesh intervals are
+            split; see :func:`osimlite.moco.solve`. None: no refinement.
+        simulates: whether to simulate the model with the controls of a solution of optimal control,
+            and report how far the simulation is from the solution.
         overwrite: whether to replace any file; by default only results of the same kind are
             replaced.
         write_outside: whether the setup may name results outside its project and the current
             folder.
-        substitutes: by absolute path of an input of the setup, the path of the file to read
-            instead.
+        substitutes: paths of files to read instead of inputs of the setup, by absolute path of the
+            input.
 
     Returns:
         The written tables, before rounding to the digits of the files, and a summary.
@@ -177,9 +177,9 @@ def substitute_inputs(
     """Replace the names of some input files in a document.
 
     Args:
-        setup_object: object of the document, which is changed.
+        setup_object: object of the document; it is changed in place.
         folder: folder from which the paths in the document start.
-        substitutes: by absolute path of an input, the path of its replacement.
+        substitutes: paths of the replacements, by absolute path of the input.
 
     Returns:
         The replaced names, as they stood in the document.
@@ -231,8 +231,8 @@ def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[R
 
     Args:
         setup: path of the document.
-        files_elsewhere: receives the files that are in the current folder, but not in the folder of the
-            document that names them.
+        files_elsewhere: mapping to which files are added that are in the current folder, but not in
+            the folder of the document that names them.
     """
     waiting = deque([setup])
     visited = {os.path.realpath(setup)}

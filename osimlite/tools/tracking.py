@@ -70,10 +70,10 @@ class DesiredMotion:
         """Read, pad and filter the motion that a setup names.
 
         Args:
-            job: the setup.
-            outcome: collects messages.
+            job: setup of the tool, with the paths of its files.
+            outcome: outcome to which messages are added.
             simulation: simulation of the model.
-            model: the model.
+            model: model of the simulation.
 
         Raises:
             OsimliteError: osimlite cannot read or follow the motion.
@@ -149,7 +149,7 @@ def _apply_locks(
     """Replace the desired motion of locked coordinates, as in OpenSim, and report differences.
 
     Args:
-        outcome: collects the messages.
+        outcome: outcome to which messages are added.
         mechanism: mechanism of the model.
         recorded: motion of the file.
         values: values of the padded rows (t, n), changed in place.
@@ -204,7 +204,7 @@ class TrackingTasks:
         """Read the tasks of a setup.
 
         Args:
-            job: the setup.
+            job: setup of the tool, with the paths of its files.
             mechanism: mechanism of the model.
 
         Raises:
@@ -302,8 +302,8 @@ class ForceDistribution:
     """Distribution of the tasks' accelerations over the forces of actuators.
 
     Args:
-        job: the setup.
-        model: its model.
+        job: setup of the tool, with the paths of its files.
+        model: model of the setup.
         mechanism: mechanism of the model.
         tasks: tasks to fulfil.
         exact: whether the accelerations are constraints and the squared forces the objective;

@@ -53,7 +53,7 @@ def run_rra_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, an RRATool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: RRATool = job.setup
     model = build_model(job)
@@ -92,8 +92,8 @@ def _move_mass_center(
     As in OpenSim, the masses that would remove the vertical residual are reported, but not changed.
 
     Args:
-        job: the setup.
-        outcome: collects messages.
+        job: setup of the tool, with the paths of its files.
+        outcome: outcome to which messages are added.
         model: model with the forces of the setup, which is changed.
         file_model: model as in its file, which is changed.
         desired: motion to follow.
@@ -177,7 +177,7 @@ def run_cmc_tool(job: Job, outcome: Outcome) -> None:
 
     Args:
         job: setup, a CMCTool.
-        outcome: collects the results.
+        outcome: outcome to which the results are added.
     """
     setup: CMCTool = job.setup
     if setup.actuators_to_exclude:
@@ -207,8 +207,8 @@ def _track_motion(
     """Let a model follow a motion, and add the files that OpenSim writes.
 
     Args:
-        job: the setup.
-        outcome: collects the results.
+        job: setup of the tool, with the paths of its files.
+        outcome: outcome to which the results are added.
         model: model with the forces of the setup.
         desired: motion to follow.
         window: length of the windows in which controls are computed, s.

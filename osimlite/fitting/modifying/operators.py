@@ -312,7 +312,7 @@ def replace_paths(model: Model, paths: Any) -> None:
     """Replace the paths of forces.
 
     Args:
-        model: the model, which is changed.
+        model: model to change in place.
         paths: new paths, each named by the path of its force.
 
     Raises:
@@ -372,12 +372,12 @@ def apply_operators(
     """Change a model by operators, in their order.
 
     Args:
-        model: the model, which is changed.
-        operators: the operators.
+        model: model to change in place.
+        operators: operators to apply.
         folder: folder from which paths start.
 
     Raises:
-        OsimliteError: as for :func:`process_model`.
+        OsimliteError: an operator cannot be applied, see :func:`process_model`.
     """
     for operator in operators:
         operation = OPERATIONS.get(type(operator))

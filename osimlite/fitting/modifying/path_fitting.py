@@ -38,7 +38,7 @@ class PathFit(NamedTuple):
     """Path as a polynomial.
 
     Attributes:
-        path: the path, named by the path of its force.
+        path: fitted path, named by the path of its force.
         order: order of the polynomial.
         length: root mean square error of the length, m.
         arm: root mean square error of the moment arms, m.
@@ -60,7 +60,7 @@ def fit_paths(
     """Fit polynomials to all paths of forces of a model.
 
     Args:
-        model: the model; function-based paths are skipped.
+        model: model with the paths; function-based paths are skipped.
         tolerance: root mean square error at which the order stops rising, m.
         poses: number of poses, spread over the ranges of the coordinates.
     """

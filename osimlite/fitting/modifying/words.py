@@ -134,7 +134,7 @@ def modify(
     """Return a copy of a model with other parts, as OpenSim's ModelProcessor makes it.
 
     Args:
-        model: the model, which is not changed.
+        model: model to copy; it is not changed.
         operators: OpenSim's operators, such as ``osimlite.ModOpAddReserves(optimal_force=100.0)``,
             applied first.
         folder: folder from which paths start.
@@ -142,7 +142,7 @@ def modify(
             ``("tendon", "rigid")``, ``("paths", "polynomial")``, ``("contact", "smooth")``,
             ``("joints", "weld:mtp_r,mtp_l")``, ``("reserves", "100:1")`` (optimal force, bound),
             ``("muscles", "none")``.
-        words: the same by keyword.
+        words: further replacements as keywords, such as ``muscles="degroote"``, applied last.
 
     Raises:
         SettingError: there is no such replacement.

@@ -40,7 +40,7 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the table.
     """
     mechanism, model = motion.mechanism, motion.model
@@ -83,7 +83,7 @@ def _find_joints(analysis: JointReaction, model: Model, tables: AnalysisTables) 
     """Return the joints that an analysis names, in the order of its names; all if the first word is ALL.
 
     Args:
-        analysis: the analysis.
+        analysis: settings of the analysis.
         model: model with the joints.
         tables: writer of the tables, for errors.
 
@@ -131,7 +131,7 @@ def _find_frame_path(
     """Return the path of a frame that a setup names, by a word or as OpenSim searches for it.
 
     Args:
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         requested: ``"child"``, ``"parent"``, or name of a frame.
         bases: paths of the joint's bodies by these words.
         tables: writer of the tables.
@@ -162,7 +162,7 @@ def _override_forces(
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
 
     Returns:
@@ -229,7 +229,7 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     actuators = [

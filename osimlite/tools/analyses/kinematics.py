@@ -17,7 +17,7 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: AnalysisTable
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     infos = motion.mechanism.coordinates
@@ -54,7 +54,7 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     bodies = motion.model.body_set.objects
@@ -133,7 +133,7 @@ def write_point_kinematics(
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     mechanism = motion.mechanism

@@ -34,7 +34,7 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     all_muscles = list(motion.model.components(Muscle))
@@ -128,7 +128,7 @@ def write_static_optimization(
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     job = tables.job

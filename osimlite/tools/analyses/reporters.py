@@ -37,7 +37,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     tree = motion.model.tree()
@@ -102,7 +102,7 @@ def write_forces(analysis: ForceReporter, motion: Motion, tables: AnalysisTables
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the tables.
     """
     rows = motion.compute_by_parts(
@@ -143,7 +143,7 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the table.
     """
     engine = motion.simulation.engine
@@ -188,7 +188,7 @@ def write_states(analysis: StatesReporter, motion: Motion, tables: AnalysisTable
 
     Args:
         analysis: settings of the analysis.
-        motion: the motion.
+        motion: motion along which the analysis is computed.
         tables: writer of the table.
     """
     states = motion.histories

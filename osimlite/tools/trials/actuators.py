@@ -98,7 +98,7 @@ def measure_residuals(
     """Yield peaks and root mean squares of residual columns.
 
     Args:
-        folder: the trial.
+        folder: files of the trial.
         file: table with the residuals.
         units: unit of each residual column.
         scale: force and moment with which residuals are compared.
@@ -320,7 +320,7 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
     """Yield the share of the time in which each muscle is fully active.
 
     Args:
-        folder: the trial.
+        folder: files of the trial.
         file: table of activations.
         muscles: names of the muscles.
     """

@@ -49,7 +49,7 @@ class TrialReport(Report):
 
     Attributes:
         verdicts: measured numbers with their limits.
-        unchecked: what could not be checked, with the reasons.
+        unchecked: sentences about parts that could not be checked, with the reasons.
     """
 
     verdicts: list[TrialVerdict] = field(default_factory=list)
@@ -272,9 +272,9 @@ def _plan_tracking(
     """Yield the measurements of results of RRA and CMC.
 
     Args:
-        tool: the tool.
+        tool: setup whose results are measured.
         tools: all tools of the trial.
-        claimed: receives the files that are measured.
+        claimed: set to which the measured files are added.
     """
     folder = tool.folder
     force = _find_result(tool, "_Actuation_force.sto")
@@ -327,9 +327,9 @@ def _plan_static_optimization(
     """Yield the measurements of results of StaticOptimization.
 
     Args:
-        tool: the tool.
+        tool: setup whose results are measured.
         tools: all tools of the trial.
-        claimed: receives the files that are measured.
+        claimed: set to which the measured files are added.
     """
     for analysis in tool.setup.analysis_set.objects:
         if type(analysis).__name__ != "StaticOptimization" or not analysis.on:

@@ -155,7 +155,7 @@ def measure_written_errors(folder: TrialFolder, file: Path) -> Numbers:
     """Yield marker errors from a file that the tool wrote.
 
     Args:
-        folder: the trial.
+        folder: files of the trial.
         file: table of marker errors.
     """
     table = folder.read_table(file)
@@ -188,7 +188,7 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
     """Return the motion in a file with the measured markers, at the times of both.
 
     Args:
-        tool: an InverseKinematicsTool.
+        tool: setup of the class InverseKinematicsTool.
         file: table of its motion.
     """
     model, mechanism = tool.model, tool.mechanism
@@ -247,8 +247,8 @@ def _find_swapped_markers(
     The pose of the frame with the largest error is fitted again for every pair.
 
     Args:
-        tool: an InverseKinematicsTool.
-        motion: its motion.
+        tool: setup of the class InverseKinematicsTool.
+        motion: motion that the tool has fitted.
 
     Yields:
         Names of both markers, and the numbers of the frames in which the exchange fits better.
@@ -353,9 +353,9 @@ def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | N
     """Yield the tracking errors of RRA or CMC.
 
     Args:
-        folder: the trial.
+        folder: files of the trial.
         file: table of the errors.
-        tool: the tool; None if its setup is missing.
+        tool: setup of the tool; None if it is missing.
     """
     table = folder.read_table(file)
     infos = {} if tool is None else {info.name: info for info in tool.mechanism.coordinates}
@@ -446,7 +446,7 @@ def _measure_noise(motion: RecordedMotion, start: float, end: float) -> float | 
     """Return the median share of the accelerations' power above 15 Hz; None if it is unknown.
 
     Args:
-        motion: the motion.
+        motion: motion of the trial.
         start: first time, s.
         end: last time, s.
     """

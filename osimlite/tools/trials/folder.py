@@ -204,8 +204,8 @@ class TrialTool:
     """Setup of a trial, with its inputs and results.
 
     Args:
-        folder: the trial.
-        job: the setup.
+        folder: files of the trial.
+        job: setup of the tool, with the paths of its files.
     """
 
     def __init__(self, folder: TrialFolder, job: Job) -> None:

@@ -187,9 +187,9 @@ def _measure_distances(
     """Return the distances of a load from the mass centres of bodies at times at which it is large.
 
     Args:
-        motion: the motion.
+        motion: motion of the trial.
         table: data of the loads.
-        load: the load.
+        load: load of the trial, with its forces and points.
         bodies: names of b bodies.
 
     Returns:
@@ -266,7 +266,7 @@ def _compute_rising_speed(motion: RecordedMotion, time: float, up: Array) -> flo
     """Return the upward speed of the mass centre at a time, m/s.
 
     Args:
-        motion: the motion.
+        motion: motion of the trial.
         time: time, s.
         up: unit vector upwards.
     """
