@@ -1,4 +1,4 @@
-"""Errors a user can cause. Each is one plain sentence that names the thing and the next step."""
+"""Errors that users can cause. Each message is a sentence with the cause and the next step."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from osimlite.base.text import escape_unprintable, shorten_message
 
 
 class OsimliteError(Exception):
-    """Base of every error osimlite raises on purpose.
+    """Base class of all errors that osimlite raises on purpose.
 
     Args:
-        message: one plain sentence that says what is wrong and what to do.
-        file: the file concerned, if any.
-        line: 1-based line in that file.
-        column: 1-based column, counted in characters.
+        message: sentence that says what is wrong and what to do.
+        file: file with the error, if any.
+        line: line in this file, from 1.
+        column: column in this line in characters, from 1.
     """
 
     exit_code: ClassVar[int] = 2
@@ -44,41 +44,44 @@ class OsimliteError(Exception):
 
 
 class DoubtfulWarning(UserWarning):
-    """Something can be done as it is asked for, but was hardly meant so."""
+    """Warning about an input that is valid, but probably a mistake."""
 
 
 class UnitWarning(DoubtfulWarning):
-    """A number without a unit was hardly meant in rad."""
+    """Warning about a number without a unit that is probably not in rad."""
 
 
 class DeprecatedWarning(DoubtfulWarning, DeprecationWarning):
-    """A name or an option still works, and will be removed; commands print it as a line on standard error."""
+    """Warning that a name or an option will be removed; commands print it on standard error."""
 
 
 class DocumentError(OsimliteError):
-    """A file cannot be read as what it should be. `meant` is the tag that would be right there, if that is known."""
+    """Error of a file whose content is not what it should be.
+
+    The attribute `meant` is the tag that the author probably meant, if known.
+    """
 
     meant: str | None = None
 
 
 class MissingFileError(DocumentError):
-    """A file is not there or may not be read."""
+    """Error of a file that does not exist or may not be read."""
 
 
 class MissingFolderError(MissingFileError):
-    """A folder is not there."""
+    """Error of a folder that does not exist."""
 
 
 class SpecialFileError(MissingFileError):
-    """There is something, but no file that is read: a pipe, a device, or more than the settings allow."""
+    """Error of a path that is no regular file (a pipe, a device), or of a file that is too large."""
 
 
 class NotWellFormedError(DocumentError):
-    """The text is not XML, or declares entities."""
+    """Error of a text that is not well-formed XML, or declares entities."""
 
 
 class VersionError(DocumentError):
-    """The version of the document is missing, not a number, or not supported.
+    """Error of a document whose version is missing, not a number, or not supported.
 
     In the first two cases the attribute `version` has no value.
     """
@@ -87,18 +90,18 @@ class VersionError(DocumentError):
 
 
 class ModelError(OsimliteError):
-    """The model says something that cannot be, or names something that is not there."""
+    """Error of a model that contradicts itself, or names something that does not exist."""
 
     exit_code = 1
 
 
 class MissingNameError(ModelError, AttributeError):
-    """A component has no property or member of that name.
+    """Error of a component that lacks the requested property or member.
 
     Args:
-        describe: returns the message. It is called when the message is read: finding the
-            nearest name takes milliseconds, and `hasattr` and `getattr` with a default drop the
-            error unread.
+        describe: function that returns the message. It is called when the message is read: finding
+            the nearest name takes milliseconds, and `hasattr` and `getattr` with a default discard
+            the error unread.
     """
 
     def __init__(self, describe: Callable[[], str]) -> None:
@@ -109,7 +112,7 @@ class MissingNameError(ModelError, AttributeError):
 
     @cached_property
     def message(self) -> str:  # type: ignore[override]
-        """The sentence that says which name is missing."""
+        """Sentence that says which name is missing."""
         return shorten_message(self._describe())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -124,23 +127,23 @@ def _restore_missing_name(cls: type[MissingNameError], message: str) -> MissingN
 
 
 class SimulationError(OsimliteError):
-    """The motion cannot be computed any further."""
+    """Error of a motion that cannot be computed any further."""
 
     exit_code = 1
     trajectory: Any = None  # what was recorded up to there, an `Trajectory`; None before any step
 
 
 class SettingError(SimulationError):
-    """A simulation is asked for in a way that means nothing: a negative time, a coordinate that is not there."""
+    """Error of a setting without meaning: a negative time, a coordinate that does not exist."""
 
     exit_code = 2
 
 
 class UnsupportedError(OsimliteError):
-    """The model uses something this version cannot do; the message names it."""
+    """Error of a model that contains something which osimlite does not support."""
 
     exit_code = 1
 
 
 class MissingDependency(OsimliteError):
-    """An optional package is not installed; the message says which extra brings it."""
+    """Error of a missing optional package; the message names the extra that installs it."""

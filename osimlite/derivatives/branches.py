@@ -37,8 +37,8 @@ class _EvaluationState:
     """State of the evaluation of a system.
 
     Attributes:
-        widened: parts of the code whose branches belong to their caller, as a merged value of them
-            was unmergeable.
+        widened: parts of the code whose branches their caller decides, because a value that they
+            merge cannot be merged.
         frame: function that is run for all combinations of its branches.
         failures: conditions under which a law has no solution, or a matrix no inverse.
     """
@@ -77,7 +77,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
         function: function without arguments.
 
     Returns:
-        Its result.
+        Result of the function.
 
     Raises:
         NoFormula: a part depends on the state in a way that has no formula.

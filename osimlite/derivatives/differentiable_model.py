@@ -27,7 +27,7 @@ class DifferentiableModel:
     """Model with named states, controls and parameters, whatever the method of differentiation.
 
     Args:
-        model: model.
+        model: model to differentiate.
         parameters: paths of numbers that the rates are functions of.
         folder: folder of the model's file.
         apart: whether bodies that never move relative to one another remain separate links.
@@ -122,7 +122,7 @@ class DifferentiableModel:
         """Return the forces and probes of a model.
 
         Args:
-            model: the model.
+            model: model with the forces.
             mechanism: mechanism of the model.
 
         Returns:

@@ -29,7 +29,7 @@ def casadi(
     """Return a model as CasADi functions, made of the same laws that simulate it.
 
     Args:
-        model: model.
+        model: model to differentiate.
         parameters: paths of numbers of the model that stay symbols: ``/bodyset/torso/mass``,
             ``/forceset/soleus_r/max_isometric_force``, ``/bodyset/torso/mass_center/1``. A path may
             stand for several numbers that are equal.

@@ -96,8 +96,7 @@ def linearize(
     Raises:
         SettingError: a state, control or output does not exist.
         SimulationError: a coordinate moves no mass, or a derivative is not finite.
-
-    Other errors are those of :func:`osimlite.tangents`.
+        OsimliteError: see :func:`osimlite.tangents`.
     """
     if isinstance(model, CasadiModel):
         model = model.in_tangents

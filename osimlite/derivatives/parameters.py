@@ -148,7 +148,7 @@ def read_parameter(model: Model, name: str) -> float:
     """Return the value of a parameter in a model.
 
     Args:
-        model: model.
+        model: model with the parameter.
         name: path of the parameter.
 
     Returns:

@@ -125,7 +125,7 @@ def sensitivity(
     require.
 
     Args:
-        model: model.
+        model: model to simulate and differentiate.
         parameters: paths of numbers of the model, as for :func:`osimlite.tangents`; or its
             tangents, made once for many motions; or its functions (:func:`osimlite.casadi`), for
             their parameters. The values are those in the model now.
@@ -145,8 +145,7 @@ def sensitivity(
             tangents are those of another model.
         UnsupportedError: a force is computed in Python.
         SimulationError: the motion ended early, or a derivative is not finite.
-
-    Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
+        OsimliteError: see :func:`osimlite.tangents` and :func:`osimlite.simulate`.
     """
     check_is_model(model)
     for name in options:
@@ -439,7 +438,7 @@ def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> 
     """Check that a parameter is not an initial value of a state.
 
     Args:
-        model: the model.
+        model: model with the parameter.
         tangent_model: tangents of this model.
         name: path of the parameter.
 

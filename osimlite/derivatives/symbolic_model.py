@@ -84,7 +84,7 @@ class SymbolicModel(DifferentiableModel):
         """Return the forces of a model, with symbols for paths around surfaces.
 
         Args:
-            model: the model.
+            model: model with the forces.
             mechanism: mechanism of the model.
         """
         from osimlite.derivatives.wrapped_paths import WrappedPaths

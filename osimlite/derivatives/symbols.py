@@ -99,7 +99,7 @@ class BranchWideningSignal(Exception):
     A wider part of the code must then be run for both sides.
 
     Attributes:
-        code_part: part of the code that merged the value.
+        part: part of the code that merged the value.
     """
 
     def __init__(self, code_part: Any) -> None:

@@ -45,7 +45,7 @@ def tangents(
     """Return the rates of a model with exact derivatives, by the machine code that simulates it.
 
     Args:
-        model: model.
+        model: model to differentiate.
         parameters: paths of numbers of the model that the rates are functions of, as for
             :func:`osimlite.casadi`.
         folder: folder of the model's file, for the files that it names; the current folder if None.

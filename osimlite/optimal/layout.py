@@ -240,7 +240,7 @@ def number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
     """Number the equations of a model's constraints.
 
     Args:
-        model: model.
+        model: model with the constraints.
         count: number of equations.
 
     Returns:

@@ -51,7 +51,7 @@ def read_position_motion(position_motion: PositionMotion, model: Model) -> Motio
 
     Args:
         position_motion: PositionMotion of the model.
-        model: model.
+        model: model whose coordinates the motion prescribes.
 
     Returns:
         The motion; instead the path of the first coordinate without a function if one has none.
@@ -76,14 +76,14 @@ class PrescribedMotion:
 
     Args:
         model: model without the PositionMotion.
-        motion: motion of all its coordinates.
+        motion: motion of all coordinates of the model.
         folder: folder of the model's file.
 
     Attributes:
         mechanism: mechanism of the model.
         coordinates: empty, as no coordinate varies.
         states: paths of the auxiliary states, the only ones that vary.
-        system_states: the same, as OpenSim orders them.
+        system_states: paths of the auxiliary states in OpenSim's order.
         controls: paths of the controls of the actuators.
         bench: CasADi functions of the test bench.
         carriages: index of each actuator's carriage among the coordinates of the bench.
@@ -91,7 +91,7 @@ class PrescribedMotion:
         is_muscle: whether each actuator is a muscle.
         moving: names of the coordinates that can move.
         constraint_count: number of equations of the model's constraints.
-        numbers: cached `_tabulate_numbers`.
+        numbers: function `_tabulate_numbers`, which caches the result for the last times.
     """
 
     coordinates: tuple[str, ...] = ()

@@ -56,11 +56,10 @@ class Refinement:
 
     @classmethod
     def parse(cls, value: float | str | Refinement) -> Refinement:
-        """Return the settings that a user gives.
+        """Return the settings of refinement for a tolerance or a text.
 
         Args:
-            value: tolerance, or a text such as ``1e-3`` or ``1e-3:limited-memory``, or the
-                settings.
+            value: tolerance, text such as ``1e-3`` or ``1e-3:limited-memory``, or settings.
 
         Raises:
             SettingError: the text is invalid.

@@ -1,7 +1,7 @@
 """Constant sparse matrices that are multiplied by vectors.
 
-It holds the few operations that a nonlinear program needs, by NumPy alone: to import `scipy.sparse`
-takes a fifth of the process that solves a small study.
+The module has the few operations that a nonlinear program needs, with NumPy alone: importing
+`scipy.sparse` takes a fifth of the time in which a small study is solved.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.spatial import Array
 
 @dataclass(frozen=True, eq=False)
 class SparseMatrix:
-    """Sparse matrix as a list of its entries: each place once, row by row and column by column.
+    """Sparse matrix as a list of its entries, each once, row by row and column by column.
 
     Attributes:
         rows: row of each entry (k,).
@@ -33,7 +33,7 @@ class SparseMatrix:
     def from_entries(
         cls, rows: ArrayLike, columns: ArrayLike, values: ArrayLike, shape: tuple[int, int]
     ) -> SparseMatrix:
-        """Return the matrix of some entries; those at one place are added.
+        """Return the matrix of some entries; entries with the same row and column are added.
 
         Args:
             rows: row of each entry (k,).
@@ -63,7 +63,7 @@ class SparseMatrix:
         """Return the matrix of some columns, in their order.
 
         Args:
-            indices: indices of the columns (c,); one may stand there several times.
+            indices: indices of the columns (c,); an index may occur several times.
         """
         order = np.argsort(self.columns, kind="stable")
         starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))

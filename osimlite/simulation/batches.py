@@ -260,9 +260,11 @@ class Runs:
         endings: reason why each run ended (W,), one of `ENDINGS`.
         counts: accepted steps, attempted steps, evaluations (W, 3).
         reports: states at the report times (W, r, y); NaN after the end of a run.
-        events: events of each run in order of time: time (s), name, whether it begins or rises.
+        events: events of each run in order of time: time (s), name, and whether a contact begins or
+            a level is passed upwards.
         peaks: largest force (N) of each contact at the end of a step, and its time (s) (W, P, 2).
-        event_states: states at the events of each run (as many as events, y), if recorded.
+        event_states: states at the events of each run, one row for each event (e, y); empty unless
+            they are recorded.
     """
 
     times: Floats

@@ -37,8 +37,12 @@ def simulate(
     violates them, it is moved to the nearest state that fulfils them; values in `initial` and
     `initial_speeds` stay.
 
+    What depends on the model alone is computed once and cached until the model changes, so that
+    calls in a loop cost one run each. Files that the model names are read again for every call.
+    Several threads may simulate the same model.
+
     Args:
-        model: the model.
+        model: model to simulate.
         to: end of the motion, s.
         engine: engine that computes the accelerations: "compiled" (the default) or "bullet". A
             window (`show`) needs "bullet", which is the default there.
@@ -58,10 +62,6 @@ def simulate(
             set is locked or prescribed.
         SettingError: there is no such option, or a value has no meaning.
         MissingDependency: a package that the engine needs is not installed.
-
-    What depends on the model alone is computed once and cached until the model changes, so that
-    calls in a loop cost one run each. Files that the model names are read again for every call.
-    Several threads may simulate the same model.
     """
     with _borrow_simulation(model, engine, choices) as simulation:
         trajectory = simulation.run(
@@ -81,7 +81,7 @@ def _borrow_simulation(
     closed, not cached.
 
     Args:
-        model: the model.
+        model: model to simulate.
         engine: name of the engine; None for the default one.
         choices: options of the simulation and of its runs by name.
 

@@ -51,7 +51,7 @@ class Gain(NamedTuple):
 
     @property
     def path(self) -> str:
-        """The name again, because a gain is not part of a model."""
+        """Name of the gain, because a gain is not part of a model and has no path."""
         return self.name
 
 
@@ -79,7 +79,7 @@ class Controller(Protocol):
         """Return the controller in the form of the kernels.
 
         Args:
-            model: the model.
+            model: model that the controller drives.
             engine: compiled engine of the model.
         """
 

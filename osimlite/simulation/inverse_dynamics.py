@@ -64,7 +64,7 @@ def kinematics(
     """Read a motion of a model; its ``bodies()`` and ``markers()`` are tables of positions.
 
     Args:
-        model: the model.
+        model: model whose coordinates the motion has.
         motion: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,)
             in rad and m by the names or paths of coordinates.
         times: times of arrays (t,), s.
@@ -106,7 +106,7 @@ def inverse_dynamics(
     forces f, the result is M udot + c - g - f (Featherstone 2008, ch. 5).
 
     Args:
-        model: the model.
+        model: model on which the forces act.
         motion: the motion, see :func:`kinematics`.
         external_loads: measured loads or their file; with `applied_to` a table (.mot, .sto, .c3d)
             in the axes of ground.
@@ -226,7 +226,8 @@ def prepare_motion(
         end: last time, s.
 
     Returns:
-        The part of the motion, which remembers the rest for its derivatives.
+        The part of the motion, which keeps the other rows so that derivatives at its ends are those
+        of the complete motion.
 
     Raises:
         SettingError: no time lies between the first and the last.

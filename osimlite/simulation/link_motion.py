@@ -182,7 +182,7 @@ class LinkMotion:
         )
 
     def _get_link(self, body: int) -> tuple[Floats | None, Floats]:
-        """Return the link of a body and the body's place in it.
+        """Return the records of a body's link, and the frame of the body in this link.
 
         Args:
             body: index of the body, -1 for ground.

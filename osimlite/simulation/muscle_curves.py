@@ -65,7 +65,7 @@ class MuscleCurves(Tabular):
 
     @property
     def heading(self) -> str:
-        """What the curves are, in one line."""
+        """One-line description of the curves."""
         swept_coordinates = f" over {join_words(self.coordinates)}" if self.values else ""
         count = int(np.prod([len(values) for values in self.values.values()], dtype=int))
         muscles = format_count(len(self.muscles), "muscle")
@@ -169,7 +169,7 @@ def muscle_curves(
     is at rest, and fibers are in equilibrium with their tendons at the given activation.
 
     Args:
-        model: the model.
+        model: model with the muscles.
         values: values of coordinates by name or path, rad or m. Several coordinates are combined;
             the last varies fastest.
         muscles: names or paths; all if empty.

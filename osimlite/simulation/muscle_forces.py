@@ -44,8 +44,9 @@ class MuscleForces(StoTable):
     Attributes:
         forces: forces of the model and of the loads (N, N m), labelled as by OpenSim's
             ForceReporter.
-        shared: times that have a solution, and what is missing at the others.
-        motion: the motion.
+        shared: distribution of the generalized forces over the actuators, with the times without a
+            solution.
+        motion: motion that requires the forces.
     """
 
     forces: StoTable | None = field(default=None, repr=False)
@@ -131,13 +132,13 @@ def static_optimization(
     through the speeds.
 
     Args:
-        model: the model; its actuators act within their min_control and max_control.
+        model: model, whose actuators act within their min_control and max_control.
         motion: the motion, see :func:`kinematics`.
         external_loads: measured loads, see :func:`inverse_dynamics`.
         times: times of arrays (t,), s.
         applied_to: assignment of the columns of loads, see :func:`inverse_dynamics`.
-        forces: further forces such as reserve actuators: files of ForceSets, or forces.
-        replace_forces: whether these replace the model's own forces.
+        forces: additional forces such as reserve actuators: files of ForceSets, or forces.
+        replace_forces: whether `forces` replace the forces of the model.
         exponent: p, greater than 1.
         muscles: "active", as in OpenSim: force of the fibers along a rigid tendon, without passive
             force; "isometric": max_isometric_force.
@@ -193,7 +194,7 @@ def _compute_states(
     """Compute the states of a motion that fulfil the constraints.
 
     Args:
-        model: the model.
+        model: model whose actuators cause the motion.
         mechanism: mechanism of the model.
         recorded: motion of the mechanism.
 

@@ -112,7 +112,9 @@ class IntegrationOptions:
         return {name: getattr(self, name) for name in INTEGRATION_OPTIONS}
 
     def summarize_choices(self) -> dict[str, Any]:
-        """Return what a summary says of the integration: accuracy, integrator, and all that is not default.
+        """Return the entries of a summary about the integration.
+
+        They are accuracy, integrator, and all options that differ from their defaults.
 
         Returns:
             Values by name of the option.

@@ -32,8 +32,8 @@ class MeasuredPath(Silent):
 
     Attributes:
         path: component path of the owner.
-        along: the path itself.
-        states: no states.
+        along: path in terms of the mechanism.
+        states: auxiliary states: none.
     """
 
     path: str  # path of the owner
@@ -63,7 +63,7 @@ class MeasuredPath(Silent):
 
 
 class _OnSurface(NamedTuple):
-    """Offsets in the work vector that tell the length of a path on one of its surfaces."""
+    """Offsets in the work vector from which the length of a path on one of its surfaces follows."""
 
     path: str  # path of the owner
     surface: str  # name of the surface

@@ -40,7 +40,7 @@ def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = N
     Paths of forces that are switched off are included.
 
     Args:
-        model: the model.
+        model: model with the paths.
         wrapping: "opensim" or "geodesic", see :class:`osimlite.simulation.Options`.
         mechanism: mechanism of the model; built if None.
 
@@ -67,7 +67,7 @@ class Paths:
     by name or path; missing ones have their defaults.
 
     Args:
-        model: the model.
+        model: model with the paths.
         wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         code: backend that runs the kernels; None for the fastest that is installed.
         left_out: paths of owners that are ignored.

@@ -70,7 +70,7 @@ class Polylines:
 
     Args:
         mechanism: mechanism on which the paths depend.
-        routes: the paths.
+        routes: paths to trace.
 
     Attributes:
         program: the packed mechanism.
@@ -79,7 +79,7 @@ class Polylines:
         laws: names of the laws by index; index 0 is no law.
         numbers: numbers of the mechanism and of the paths.
         items: offsets of the paths in the structure.
-        traces: indices of the laws that trace them.
+        traces: index of the law that traces each path.
         most_corners: largest number of corners of a path.
         work: length of the work vector.
     """

@@ -94,10 +94,10 @@ class PropertySetter:
         """Set the number to a value times `factor`.
 
         Args:
-            value: the value.
+            value: number to set, which is multiplied by `factor` first.
 
         Raises:
-            ModelError: the property does not accept it.
+            ModelError: the property does not accept the number.
         """
         value *= self.factor
         if self.entry is None:
@@ -149,7 +149,7 @@ def expand_braces(name: str, model: Model) -> list[str]:
 
     Args:
         name: a name, path or pattern, with at most one pair of braces.
-        model: the model.
+        model: model with the components.
 
     Returns:
         Names in the order of the model; the name itself without braces.
@@ -194,7 +194,7 @@ def find_properties(model: Model, path: str) -> tuple[PropertyPath, ...]:
     (``/bodyset/Pelvis/mass_center/1``); the only entry of a list needs no index.
 
     Args:
-        model: the model.
+        model: model with the components.
         path: the path.
 
     Returns:

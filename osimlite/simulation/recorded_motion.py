@@ -64,7 +64,7 @@ def find_excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
     """Return the forces that OpenSim's tools switch off for `forces_to_exclude`.
 
     Args:
-        model: the model.
+        model: model with the forces.
         names: names of forces or of groups, or "All", "Actuators" or "Muscles".
 
     Returns:
@@ -328,7 +328,8 @@ class RecordedMotion(Movement):
                 all.
 
         Returns:
-            The part, which remembers the rest for its derivatives.
+            The part, which keeps the other rows so that derivatives at its ends are those of the
+            complete motion.
 
         Raises:
             SettingError: `last` is before `first`.

@@ -85,7 +85,7 @@ class Simulation:
     :func:`osimlite.simulate`.
 
     Args:
-        model: the model.
+        model: model to simulate; later changes of it have no effect.
         engine: engine that computes the accelerations: "compiled" (the default) or "bullet". A
             window (`show`) needs "bullet", which is the default there.
         choices: attributes of :class:`osimlite.simulation.Options`. Those in `RUN_OPTIONS` are

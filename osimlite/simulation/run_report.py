@@ -224,7 +224,7 @@ class Extreme:
 
         Args:
             t: time, s.
-            value: present value.
+            value: value at this time.
         """
         return value if self._is_new(value, self._extreme) else self._extreme
 
@@ -233,7 +233,7 @@ class Extreme:
 
         Args:
             t: time, s.
-            value: value there.
+            value: value at this time.
         """
         self._extreme = self.evaluate(t, value)
 
@@ -247,9 +247,9 @@ class Rate:
 
     Attributes:
         time: time of the last accepted value, s; minus infinity before the first.
-        value: the value there.
-        rate: the rate there.
-        is_good: whether `rate` is one of a step.
+        value: value at this time.
+        rate: rate at this time.
+        is_good: whether `rate` is the result of a step.
     """
 
     time: float = -inf
@@ -262,7 +262,7 @@ class Rate:
 
         Args:
             t: time, s.
-            value: value there.
+            value: value at this time.
         """
         # At the first time there is no earlier value.
         if t == self.time or self.time == -inf:
@@ -276,7 +276,7 @@ class Rate:
 
         Args:
             t: time, s.
-            value: value there.
+            value: value at this time.
         """
         rate = self.evaluate(t, value)
         self.is_good = self.time != -inf

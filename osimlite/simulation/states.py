@@ -41,7 +41,7 @@ def sort_by_component(model: Model, paths: Sequence[str]) -> list[str]:
     States of one component keep their order, and so do the coordinates of one joint.
 
     Args:
-        model: the model.
+        model: model with the states.
         paths: paths of states, such as ``/jointset/knee/flexion/value``.
 
     Returns:

@@ -51,7 +51,7 @@ class StaticOptimization:
     """Solver that distributes the generalized forces of motions over the actuators of a model.
 
     Args:
-        model: the model.
+        model: model with the actuators.
         mechanism: mechanism of the model.
         exponent: p, greater than 1.
         muscles: force of a muscle at an activation of 1, one of `MUSCLES`.

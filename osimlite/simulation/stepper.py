@@ -53,10 +53,10 @@ class Stepper(ABC):
 
     Attributes:
         time: present time, s.
-        state: y at that time; every step makes a new list.
-        derivative: f(time, state).
-        evaluations: calls of f so far.
-        taken: accepted steps so far.
+        state: state y at this time; every step makes a new list.
+        derivative: function f(time, state) that returns the derivative of the state.
+        evaluations: number of calls of f so far.
+        taken: number of accepted steps so far.
         ended: exception that ended a table before its last time: Ctrl-C, or an error of the motion.
     """
 

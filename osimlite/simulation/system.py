@@ -155,8 +155,8 @@ class System(StateEvaluator):
         """Divide `columns` into copies of numbers in the work vector and columns that elements compute.
 
         Returns:
-            Copied columns, their places in the work vector, and numbers and columns of the elements
-            that compute theirs.
+            Copied columns, their offsets in the work vector, and index and columns of each element
+            that computes its columns.
         """
         copied = list[int]()
         sources = list[int]()

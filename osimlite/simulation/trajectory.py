@@ -85,7 +85,7 @@ class Trajectory(Tabular):
 
     @property
     def heading(self) -> str:
-        """What the trajectory is, in one line."""
+        """One-line description of the trajectory."""
         return (
             f"Trajectory of '{self.mechanism.name}': {describe_times(self.times)}, "
             f"{format_count(len(self.coordinates), 'coordinate')}"
@@ -354,11 +354,11 @@ class TrajectoryReports(NamedTuple):
     """Functions with which a trajectory computes its reports when they are first read.
 
     Attributes:
-        forces: returns labels, and one row of numbers for each moment.
-        energies: returns kinetic energy, potential energy of gravity and stored energy at each
-            moment, J.
-        probes: returns labels, and one row of numbers for each moment.
-        summary: returns the content of summary.json.
+        forces: function that returns labels, and one row of numbers for each moment.
+        energies: function that returns kinetic energy, potential energy of gravity and stored
+            energy at each moment, J.
+        probes: function that returns labels, and one row of numbers for each moment.
+        summary: function that returns the content of summary.json.
     """
 
     forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
@@ -402,7 +402,7 @@ class Movement(Tabular):
 
     @property
     def heading(self) -> str:
-        """What the motion is, in one line."""
+        """One-line description of the motion."""
         return (
             f"{type(self).__name__} of '{self.mechanism.name}': {describe_times(self.times)}, "
             f"{format_count(len(self.coordinates), 'coordinate')}"

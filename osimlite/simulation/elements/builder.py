@@ -33,19 +33,19 @@ WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
 
 
 class ElementBuilder:
-    """Maker of the elements of one model.
+    """Builder of the force elements of one model.
 
     Args:
-        model: the model.
+        model: model whose elements are built.
         mechanism: mechanism of the model.
         folder: folder of the model's file.
-        early_return: see below.
-        own_times: see below.
+        early_return: whether to reproduce Simbody's defect in contact of several surfaces.
+        own_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
         wrapping: "opensim" or "geodesic".
-        rigid_tendons: see below.
+        rigid_tendons: whether muscles are computed with rigid tendons and without states.
 
     Attributes:
-        model: the model.
+        model: model whose elements are built.
         tree: component tree of the model.
         mechanism: mechanism of the model.
         reads_files: whether an element has used a file.
@@ -138,7 +138,7 @@ class ElementBuilder:
         """Return the element of a force.
 
         Args:
-            force: the component.
+            force: force component of the model.
 
         Raises:
             UnsupportedError: osimlite cannot compute it; the message is its path and class.
@@ -160,7 +160,7 @@ class ElementBuilder:
         """Return the index in the mechanism of the coordinate that a force names.
 
         Args:
-            force: the component.
+            force: force component of the model.
             field: property that names the coordinate.
         """
         named = getattr(force, field)
@@ -199,8 +199,8 @@ class ElementBuilder:
         """Return a function of one argument that belongs to a force.
 
         Args:
-            force: the component.
-            function: the function of the schema.
+            force: force component of the model.
+            function: function object of the schema.
             what: name of the property, for messages.
 
         Raises:
@@ -233,7 +233,7 @@ class ElementBuilder:
         """Return the error that names a force that cannot be computed.
 
         Args:
-            force: the component.
+            force: force component of the model.
             why: continuation of the message after the class.
         """
         return UnsupportedError(f"'{self.path(force)}' ({get_class_name(force)}{why})")

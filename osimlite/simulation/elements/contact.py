@@ -384,7 +384,7 @@ def read_geometries(
 
     Args:
         builder: builder of the model's elements.
-        force: the component.
+        force: force component of the model.
 
     Yields:
         A geometry, and the material that the force gives it.

@@ -146,7 +146,7 @@ def read_load_of_model(builder: ElementBuilder, force: ExternalForce) -> Load:
 
     Args:
         builder: builder of the model's elements.
-        force: the component.
+        force: force component of the model.
 
     Raises:
         UnsupportedError: the force is not in such a set. OpenSim finds no data for it either.
@@ -238,7 +238,7 @@ def _list_identifiers(force: ExternalForce) -> dict[str, str]:
     """Return the starts of the labels of a force's columns.
 
     Args:
-        force: the component.
+        force: force component of the model.
 
     Returns:
         Identifiers by part ("force", "point", "torque"), for the parts that the force has.

@@ -68,7 +68,7 @@ class ForceRecord:
 
 
 class ForceElement(Protocol):
-    """Anything that applies forces to bodies or coordinates."""
+    """Element of a model with states and records of the kernels: a force or a probe."""
 
     @property
     def path(self) -> str:
@@ -80,10 +80,10 @@ class ForceElement(Protocol):
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Auxiliary states, in the order of its offsets.
+        """Auxiliary states of the element, in the order of their offsets.
 
         Returns:
-            One state for each offset.
+            One entry for each state.
         """
 
     def make_records(self, places: Places) -> list[ForceRecord]:
@@ -115,10 +115,12 @@ class ForceElement(Protocol):
         """
 
     def find_copied_places(self) -> Sequence[int] | None:
-        """Return the places in its last record that :meth:`report` copies, so that tables copy whole columns.
+        """Return the offsets in the last record that :meth:`report` copies.
+
+        With them, tables copy complete columns.
 
         Returns:
-            One place for each of `columns`; None if `report` computes numbers.
+            One offset for each of `columns`; None if `report` computes numbers.
         """
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
@@ -144,7 +146,7 @@ class Silent:
         return []
 
     def find_copied_places(self) -> Sequence[int] | None:
-        """Return no places, since there are no columns."""
+        """Return no offsets, since there are no columns."""
         return ()
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:

@@ -107,13 +107,13 @@ class ForceType:
         contact_response: name of the kernel with the derivatives of a contact force along its
             normal and across it.
         batched: the law in stages, for several forces together.
-        describe_failure: returns words about a force whose law or equilibrium has no solution, from
-            its `list_named_values`.
+        describe_failure: function that describes a force whose law or equilibrium has no solution,
+            from the values of `list_named_values`.
         labels: labels of the report with their outputs, where {name} is the name of the force; the
             labels of the geometry if None.
-        compute_energy: returns the energy (J) of a force from its record, if it is not an output of
-            the law.
-        check: raises a ModelError if the parameters have no meaning together.
+        compute_energy: function that returns the energy (J) of a force from its record, if the
+            energy is not an output of the law.
+        check: function that raises a ModelError if the parameters contradict each other.
         shares_numbers: whether a force may depend on properties of others of its class.
         states_change_when_off: whether the states change even if `appliesForce` is false; otherwise
             they are constant.
@@ -184,7 +184,7 @@ class ForceType:
 
         Args:
             builder: builder of the model's elements.
-            force: the component.
+            force: force component of the model.
 
         Raises:
             UnsupportedError: osimlite cannot compute a part of it.
@@ -383,7 +383,7 @@ class DeclaredForce:
         ]
 
     def find_copied_places(self) -> Sequence[int] | None:
-        """Return the places in its last record that are columns; None if its geometry computes them."""
+        """Return the offset of each column in the last record; None if the geometry computes them."""
         force_type = self.force_type
         if force_type.labels is None:
             return None

@@ -155,8 +155,8 @@ class Springs:
     """Springs of two meshes that touch, each with half the area of its triangle.
 
     Args:
-        one: surface 1.
-        two: surface 2.
+        one: mesh that is surface 1.
+        two: mesh that is surface 2.
         vt: transition velocity, m/s.
     """
 
@@ -263,10 +263,10 @@ def _find_springs_inside(
 
     Args:
         stiffness: stiffness of each spring (t,).
-        mesh: the mesh of the springs.
-        pose: pose of its body.
-        other: the other mesh.
-        theirs: pose of the other body.
+        mesh: mesh with the springs.
+        pose: pose in ground of the body of `mesh`.
+        other: mesh that the springs may be inside.
+        theirs: pose in ground of the body of `other`.
 
     Returns:
         Stiffness, middle (m) and end (m, the nearest point of the other mesh) of each spring, in

@@ -59,16 +59,16 @@ def force_elements(
     Args:
         model: the model.
         mechanism: mechanism of the same model.
-        skip_unsupported: leave out forces that cannot be computed instead of raising.
-        simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
-        own_activation_times: do not reproduce OpenSim's defect in the activation of several
-            DeGrooteFregly2016Muscles.
+        skip_unsupported: whether forces that cannot be computed are left out; otherwise they raise.
+        simbody_early_return: whether Simbody's defect in contact of several surfaces is reproduced.
+        own_activation_times: whether each DeGrooteFregly2016Muscle uses its own activation times;
+            OpenSim's defect shares those of one muscle.
         wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         external_loads: measured loads or their file; their elements follow the forces of the model.
         folder: folder of the model's file and of the files that it names; the working directory if
             None.
-        rigid_tendons: compute each muscle's tension as its control times the force of fully active
-            fibers along a rigid tendon.
+        rigid_tendons: whether the tension of each muscle is its control times the force of fully
+            active fibers along a rigid tendon.
 
     Raises:
         UnsupportedError: some forces cannot be computed; the message names them.

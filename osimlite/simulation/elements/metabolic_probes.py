@@ -40,7 +40,7 @@ def read_metabolic_probe(
 
     Args:
         builder: builder of the elements.
-        probe: the probe.
+        probe: probe component of the model.
         numbers: function that returns the numbers of the law from the parameters of a muscle, the
             muscle, and its mass (kg).
         curve: curve that the law takes.
@@ -168,7 +168,7 @@ def define_bhargava(probe: Any, item: Any, muscle: Any, mass: float) -> Bhargava
     Switches that the probe does not have, as in the smooth form, are on.
 
     Args:
-        probe: the probe.
+        probe: probe component of the model.
         item: the probe's parameters of the muscle.
         muscle: the muscle.
         mass: mass of the muscle, kg.
@@ -248,7 +248,7 @@ def _measure_smoothed(
     """Return the metabolic rates of all muscles.
 
     Args:
-        probe: the probe.
+        probe: probe component of the model.
         system: the system after an evaluation of its forces.
         t: time, s.
         y: state (y,).

@@ -64,7 +64,7 @@ class Parameter(ABC):
 
         Args:
             builder: builder of the model's elements.
-            force: the component.
+            force: force component of the model.
         """
 
     @abstractmethod
@@ -174,7 +174,7 @@ class Numbers(NumbersParameter):
 
         Args:
             builder: builder of the model's elements.
-            force: the component.
+            force: force component of the model.
 
         Returns:
             `count` values.
@@ -245,7 +245,7 @@ class Vector(Numbers):
 
         Args:
             builder: builder of the model's elements.
-            force: the component.
+            force: force component of the model.
 
         Returns:
             The numbers of the function.
@@ -384,7 +384,7 @@ class Expressions(Parameter):
 
         Args:
             builder: builder of the model's elements.
-            force: the component.
+            force: force component of the model.
 
         Returns:
             One formula for each name.

@@ -285,7 +285,7 @@ def _locate_inputs(
     Args:
         probe_type: declaration of the probe's class.
         builder: builder of the elements.
-        probe: the probe.
+        probe: probe component of the model.
         subject: one of its actuators.
         elements: forces of the model by path.
 
@@ -324,7 +324,7 @@ def find_members(
 
     Args:
         builder: builder of the elements.
-        probe: the probe.
+        probe: probe component of the model.
         words: names, or components.
         path: path of the set.
         probe_type: class name of the components in the set.

@@ -18,11 +18,11 @@ CACHE_VARIABLE = "NUMBA_CACHE_DIR"
 
 
 class KeptResults:
-    """Results by name, with a key that names everything on which they depend.
+    """Cache of results by name, with a key that describes everything on which they depend.
 
     Args:
         owner: text that distinguishes the file from those of other installations.
-        key: description of what the results depend on; results with another key are forgotten.
+        key: description of what the results depend on; results with another key are discarded.
     """
 
     def __init__(self, owner: str, key: str) -> None:
@@ -37,7 +37,7 @@ class KeptResults:
         return self._results.get(name)
 
     def keep(self, name: str, result: Any) -> None:
-        """Keep a result, which must be fit for JSON, until this process ends and in later ones."""
+        """Store a result, which must be JSON data, for this process and later ones."""
         if not self._has_changed:
             # One process computes many results, and writes them together.
             atexit.register(self.save)
@@ -45,7 +45,7 @@ class KeptResults:
         self._results[name] = result
 
     def save(self) -> None:
-        """Write the results into the first folder that allows it; without one they are computed again."""
+        """Write the results into the first folder that allows it; do nothing without one."""
         content = json.dumps({"key": self._key, "results": self._results}).encode()
         for folder in self._folders:
             try:

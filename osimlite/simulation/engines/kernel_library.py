@@ -98,7 +98,7 @@ class KernelLibrary:
 
     @cached_property
     def kept(self) -> KeptResults:
-        """Results on the present state of the sources.
+        """Cached results about the sources in their present state.
 
         Without them, every process after an edit, or after `git pull`, computes the digests of the
         laws of its model, which takes up to a quarter of a second.

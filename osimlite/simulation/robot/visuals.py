@@ -75,10 +75,11 @@ def collect_visuals(
     """Collect the shapes of a model, each placed in the frame of the body that carries it.
 
     Args:
-        model: the model.
+        model: model with the shapes.
         mechanism: mechanism of the same model.
-        note: called for what cannot be drawn.
-        mesh_files: converts the mesh files and knows the folders; without it none are found.
+        note: function that is called for each shape that cannot be drawn.
+        mesh_files: converter of mesh files, with the folders to search; if None, no mesh file is
+            found.
 
     Returns:
         Shapes and mesh files.
@@ -263,8 +264,8 @@ def mesh_shape(
     Args:
         name: name of the file in the model.
         path: absolute path of the component that names it.
-        mesh_files: finds and converts the file.
-        note: called for what was changed.
+        mesh_files: converter of mesh files, with the folders to search.
+        note: function that is called for each change and for a file that cannot be used.
         scale: factors along the axes; negative ones mirror the surface.
 
     Returns:

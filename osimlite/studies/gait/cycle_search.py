@@ -112,7 +112,7 @@ class Candidate:
     """Walker whose two steps end in similar states.
 
     Attributes:
-        fractions: numbers of its model, as parts of their ranges (k,).
+        fractions: numbers of the walker's model, as fractions of their ranges (k,).
         state: state at the end of the first step, exchanged to the first foot (y,).
         miss: distance between the states at the ends of the two steps.
     """
@@ -127,7 +127,7 @@ class ModelCycle:
     """Numbers of a model with a gait cycle of the model.
 
     Attributes:
-        fractions: numbers as parts of their ranges (k,).
+        fractions: numbers as fractions of their ranges (k,).
         numbers: numbers by the names of the variables.
         cycle: gait cycle of the model with these numbers.
         walking: part of the walkers started near the cycle that walk; 0 if it was not measured.
@@ -513,7 +513,7 @@ class _ClosingProblem:
         )
 
     def _get_step_map(self, fractions: Floats, state: Floats) -> StepMap:
-        """Return the step map of the model at some fractions; the latest ones are kept."""
+        """Return the step map of the model at some fractions; the latest ones are cached."""
         key = fractions.tobytes()
         if key not in self._maps:
             # The solver evaluates residual and Jacobian of the latest models only.

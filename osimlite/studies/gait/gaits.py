@@ -54,12 +54,13 @@ class Gait:
     """Walker with a stable gait.
 
     Attributes:
-        found: numbers of the model with the cycle.
-        start: initial value and speed by the names of coordinates.
+        found: numbers of the model with the gait cycle.
+        start: initial value and speed of each coordinate, by name.
         walk: walk from this initial state.
         candidates: number of random walkers that made two steps.
-        cycles: number of cycles that were found among them and during the optimization.
-        files: files that were written.
+        cycles: number of cycles that the search found from these walkers and during the
+            optimization.
+        files: files that the search wrote.
     """
 
     found: ModelCycle
@@ -248,7 +249,7 @@ def round_cycle(search: CycleSearch, found: ModelCycle, digits: int) -> ModelCyc
 
     Args:
         search: search with the plan.
-        found: numbers with their cycle.
+        found: numbers of the model with their gait cycle.
         digits: number of significant digits.
 
     Raises:
@@ -274,11 +275,11 @@ def choose_start(
 
     Args:
         search: search with the plan.
-        found: numbers with their cycle.
+        found: numbers of the model with their gait cycle.
         digits: significant digits of values and speeds; None for no rounding.
 
     Returns:
-        Value (rad or m) and speed by the names of coordinates, and the walk.
+        Value (rad or m) and speed of each coordinate, by name, and the walk.
     """
     step_map = search.make_step_map(found.fractions, found.cycle.state, TIGHT_ACCURACY)
     engine = step_map.engine

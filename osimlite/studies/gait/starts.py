@@ -23,7 +23,8 @@ class Carriers:
     Attributes:
         offsets: offsets in the state of the coordinates that move all contacts by the same vector
             (m,).
-        lift_offset: offset of the one among them that lifts the walker off the ground, or None.
+        lift_offset: offset of the coordinate that lifts the walker off the ground, which is one of
+            `offsets`; None if there is none.
     """
 
     offsets: tuple[int, ...]

@@ -87,9 +87,9 @@ class StepMap:
     Attributes:
         start: state at the first touch-down after `near`, exchanged to the first foot (y,).
         exchange: permutation of the state that exchanges the legs, see `find_leg_exchange`; None if
-            they differ.
+            the legs differ.
         neutral: orthonormal directions that do not change the motion (y, m).
-        basis: orthonormal directions of all others (y, y - m).
+        basis: orthonormal basis (y, y - m) of the complement of `neutral`.
 
     Raises:
         OsimliteError: there are not two feet, or the walker makes no step from there.

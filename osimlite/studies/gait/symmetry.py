@@ -36,7 +36,8 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
         states: states at which the derivatives are compared (k, y).
 
     Returns:
-        Index of the entry that takes each place (y,), or None if the legs are not alike.
+        Index of the entry that replaces each entry of the state (y,), or None if the legs are not
+        alike.
     """
     mechanism = engine.mechanism
     body_of = {

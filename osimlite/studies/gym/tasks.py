@@ -39,7 +39,9 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Task(IntegrationOptions):
-    """Task of a learner.
+    """Task for reinforcement learning.
+
+    Options of the integration, such as `accuracy` and `integrator`, are attributes too.
 
     Attributes:
         model: function that returns the model.
@@ -50,8 +52,6 @@ class Task(IntegrationOptions):
             states and a random generator; None for the default state.
         seconds: duration of an episode (s).
         step: duration of a control step (s).
-
-    Options of the integration, such as `accuracy` and `integrator`, are attributes too.
     """
 
     model: Callable[[], Model]

@@ -70,7 +70,7 @@ def search_parameters(
         report: called with the state after each generation.
 
     Returns:
-        Per name of a parameter its best value.
+        Best value of each parameter, by name.
 
     Raises:
         MissingDependency: cma is not installed.

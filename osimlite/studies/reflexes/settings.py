@@ -55,7 +55,7 @@ class SettingNode:
     """Value with its parts, and its position in a file.
 
     Attributes:
-        value: text as it is written; "" for none.
+        value: text of the value as it is written; "" for none.
         parts: keys and nodes below this one, in the order of the file.
         file: path of the file, or "" for Python data.
         line: line in the file, from 1; 0 for Python data.

@@ -68,8 +68,8 @@ class ReflexType(NamedTuple):
             indices.
         channels: channels whose terms are added.
         corrects: True for gain * (offset - sensor), False for gain * (sensor - offset).
-        is_own: whether the target is the source of a reflex without one.
-        settings: keys that its sensors read.
+        is_own: whether the target is the source of a reflex that names no source.
+        settings: keys that the sensors of the reflex read.
         refused: keys of SCONE that are not supported.
     """
 

@@ -373,8 +373,8 @@ class Walkers(SensedModel):
             indices: indices of the walkers; all by default.
 
         Returns:
-            Per control step of the first walker its state at the start, excitations and leg loads,
-            one row each.
+            State at the start, excitations and leg loads of the first walker, one row for each
+            control step.
 
         Raises:
             SimulationError: forces cannot be computed in a state from which a walker starts.

@@ -82,12 +82,12 @@ class RunMeasure:
     """Measure: one number for each run.
 
     Attributes:
-        name: name of its column.
+        name: name of the column in the table of results.
         compute: function that computes the numbers (W,) of a batch; NaN for runs without one.
-        watches: events that must be watched.
+        watches: events that the runs must record.
         event_count: function that returns the number of events to record in a run of a duration
             (s).
-        event_states: whether it needs the states at events.
+        event_states: whether `compute` needs the states at events.
     """
 
     name: str
@@ -228,7 +228,7 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
     Args:
         engine: engine of the model.
-        feet: contacts of each foot, which every maker of a measure is given; not used here.
+        feet: contacts of each foot, an argument of all functions that make measures; not used here.
 
     Raises:
         SettingError: the model has no such coordinate.
@@ -258,7 +258,7 @@ def largest_force(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
     Args:
         engine: engine of the model.
-        feet: contacts of each foot, which every maker of a measure is given; not used here.
+        feet: contacts of each foot, an argument of all functions that make measures; not used here.
     """
     return RunMeasure(
         "largest_force",
@@ -273,7 +273,7 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
     Args:
         engine: engine of the model.
-        feet: contacts of each foot, which every maker of a measure is given; not used here.
+        feet: contacts of each foot, an argument of all functions that make measures; not used here.
     """
 
     def compute_change(batch: Batch) -> Floats:

@@ -314,7 +314,7 @@ class _Evaluations:
     Args:
         plan: plan with the objective as its first measure.
         free_indices: indices of the variables that vary.
-        sign: factor that makes a cost of the objective.
+        sign: factor that makes a cost of the objective: -1 to maximize, 1 to minimize.
         is_bounded: whether points are clipped to the ranges.
         budget: number of evaluations that are allowed.
         workforce: pool of workers.
@@ -322,9 +322,10 @@ class _Evaluations:
 
     Attributes:
         count: number of evaluations that the method has requested.
-        batches: number of requests.
+        batches: number of batches of evaluations that the method has requested.
         worst: largest cost so far.
-        best: smallest cost, its number and the values of the variables; None before any success.
+        best: smallest cost, number of this evaluation and values of the variables; None before any
+            success.
         reason: first reason of a failure.
     """
 

@@ -77,6 +77,8 @@ class Stop:
 class Plan(IntegrationOptions):
     """Runs of one model, each with its own values of the variables.
 
+    Options of the integration, such as `accuracy` and `integrator`, are attributes too.
+
     Attributes:
         text: model as XML text (.osim).
         variables: variables that differ between runs.
@@ -96,8 +98,6 @@ class Plan(IntegrationOptions):
         make: function that makes the model, if its parameters vary.
         folder: folder of the model file, to which its files are relative.
         controller: feedback controller of all runs.
-
-    Options of the integration, such as `accuracy` and `integrator`, are attributes too.
     """
 
     text: str
@@ -182,7 +182,7 @@ class Plan(IntegrationOptions):
         """Return all settings on which the results depend, as data for JSON.
 
         Returns:
-            Value per setting; the model is represented by its digest.
+            Value of each setting, by name; the model is represented by its digest.
         """
         import hashlib
 

@@ -69,7 +69,7 @@ def settings_of(path: str | Path) -> dict[str, Any]:
         path: Parquet file.
 
     Returns:
-        Value per setting.
+        Value of each setting, by name.
 
     Raises:
         MissingFileError: there is no such file.
@@ -92,7 +92,7 @@ def _parse_settings(table: Any) -> dict[str, Any]:
     """Return the settings in a schema.
 
     Returns:
-        Value per setting.
+        Value of each setting, by name.
 
     Raises:
         ValueError: the schema has no settings; errors of Arrow for other files are of this class,
@@ -184,7 +184,7 @@ class PartialTable:
     """Table to which rows are added; call `close` after use.
 
     Args:
-        path: Parquet file that it will become.
+        path: Parquet file into which `finish` converts the table.
         table: schema of the table.
         resume: whether to continue an existing partial file.
 

@@ -58,7 +58,7 @@ killed.
 
 
 class SweepInterruption(OsimliteError):
-    """A sweep or a search was interrupted; what was done is saved."""
+    """Error of an interrupted sweep or search, whose results so far are saved."""
 
     exit_code = 130
 

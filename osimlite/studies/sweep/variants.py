@@ -55,13 +55,13 @@ class Variant:
     """Model of a sample, ready for simulation.
 
     Attributes:
-        state: layout of its state.
+        state: layout of the state of the model.
         structure: bytes that are equal for variants which differ in numbers only.
-        numbers: all numbers of a compiled engine; empty for other engines.
-        maker: function that makes its engine.
+        numbers: numbers of the model for the compiled engine; empty for other engines.
+        maker: function that makes the engine of the model.
         simulation: simulation of the engine; None if only numbers were updated.
         controller: feedback controller of the sample.
-        held: the same, compiled.
+        held: controller of the sample in the form of the kernels.
     """
 
     state: StateLayout
@@ -86,7 +86,7 @@ class Variants:
 
     Attributes:
         model: model with the numbers of the latest variant.
-        given: variant of the model as it is, without any variable set.
+        given: variant of the model with none of the variables set.
 
     Raises:
         OsimliteError: the model cannot be simulated.

@@ -41,7 +41,7 @@ def turn_bodies(model: Ints, data: Floats, g: Ints, gp: Floats, torque: float) -
         model: integers of the model.
         data: work vector.
         g: links of both bodies, and of the axis.
-        gp: the axis in its link (3,), and as given (3,).
+        gp: axis in the link of its frame (3,), then axis with the components in the file (3,).
         torque: torque, N.m.
     """
     axis = direction(model, data, g[2], vector(gp, 0))
@@ -58,7 +58,7 @@ def compute_turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> flo
         model: integers of the model.
         data: work vector.
         g: links of both bodies, and of the axis.
-        gp: the axis in its link (3,), and as given (3,).
+        gp: axis in the link of its frame (3,), then axis with the components in the file (3,).
 
     Returns:
         Angular velocity, rad/s.
@@ -224,7 +224,7 @@ class OnBodies(ForceGeometry):
             places: placement of the bodies in the links of the tree.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         links = [places.placement(body).link for body in location.bodies]
         numbers: list[float] = []
@@ -363,7 +363,7 @@ class AtStation(ForceGeometry):
         """Return the link of the station and the position in it.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         link, point = places.station(location.body, location.point)
         return (link,), point
@@ -376,7 +376,7 @@ class AtStation(ForceGeometry):
         """Return the labels of the force on the station, in ground.
 
         Returns:
-            Labels.
+            Labels of the columns.
         """
         return tuple(f"{force.name}.{force.location.name}.force.{axis}" for axis in "XYZ")
 

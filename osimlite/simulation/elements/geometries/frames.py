@@ -176,7 +176,7 @@ class BetweenFrames(ForceGeometry):
         """Return the links of the frames, and axes and origin of each frame in its link.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         (one, first), (two, second) = (places.frame(frame.body, frame.placed) for frame in location)
         return (one, two), (*first, *second)
@@ -189,7 +189,7 @@ class BetweenFrames(ForceGeometry):
         """Return the labels of force and torque on each of the frames.
 
         Returns:
-            Labels.
+            Labels of the columns.
         """
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
         return tuple(

@@ -11,7 +11,7 @@ from osimlite.simulation.elements.force_records import ForceRecord
 
 
 class ForceGeometry:
-    """Base class of the places where forces act: it computes inputs of the law, and applies its outputs.
+    """Base class of geometries, which compute inputs of a law and apply its outputs.
 
     In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `work` its part
     of the record; `model`, `reals`, `data`, `y`, `f` are the vectors that every kernel has.
@@ -37,7 +37,7 @@ class ForceGeometry:
     called_functions: ClassVar[tuple[Callable[..., Any], ...]] = ()
 
     def list_functions(self) -> dict[str, Callable[..., Any]]:
-        """Return the functions that its code calls.
+        """Return the functions that the code of the geometry calls.
 
         Returns:
             The functions by name.
@@ -45,19 +45,21 @@ class ForceGeometry:
         return {function.__name__: function for function in self.called_functions}
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Return where a component acts, in terms of the mechanism.
+        """Return the location at which a component acts, in terms of the mechanism.
 
         Args:
             builder: builder of the elements.
-            force: the component.
+            force: force component of the model.
 
         Raises:
-            ModelError: it names something that does not exist.
+            ModelError: the component names something that does not exist.
             UnsupportedError: osimlite cannot compute a force there.
         """
 
     def make_parts(self, location: Any, places: Places) -> list[ForceRecord]:
-        """Return records that the code calls; `item - g[0]` is the offset of the last of them.
+        """Return records that the code of the geometry calls.
+
+        `item - g[0]` is the offset of the last of them.
 
         Args:
             location: result of `read`.
@@ -73,12 +75,12 @@ class ForceGeometry:
             places: placement of the bodies in the links of the tree.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         return (), ()
 
     def record_size(self, location: Any) -> int:
-        """Return the size of its part of the record.
+        """Return the size of the part of the output record that the geometry fills.
 
         Args:
             location: result of `read`.
@@ -86,10 +88,10 @@ class ForceGeometry:
         return 0
 
     def list_columns(self, force: Any) -> tuple[str, ...]:
-        """Return the labels of its part of the record, for force types without labels.
+        """Return the labels of this part of the record, for force types without labels.
 
         Args:
-            force: the element.
+            force: force element.
 
         Returns:
             Labels in the order of `report`; none by default.
@@ -102,7 +104,7 @@ class ForceGeometry:
         """Return one row of these columns, from its part of the record.
 
         Args:
-            force: the element.
+            force: force element.
             record: part of the output record that the geometry fills.
             origins: origin of each body in ground, m; the last one is that of ground.
         """

@@ -129,7 +129,7 @@ class BetweenPoints(ForceGeometry):
         """Return the links of the ends, and points and reported points in them.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         stations = [
             places.station(body, point)
@@ -146,7 +146,7 @@ class BetweenPoints(ForceGeometry):
         """Return the labels of force and point in ground, for each of the frames.
 
         Returns:
-            Labels.
+            Labels of the columns.
         """
         labels = [f"{what}.{axis}" for what in ("force", "point") for axis in "XYZ"]
         return tuple(

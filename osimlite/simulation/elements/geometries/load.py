@@ -116,7 +116,7 @@ class Load(NamedTuple):
 
 
 class GivenLoad(ForceGeometry):
-    """Place of a prescribed load, which has functions of time in place of a law."""
+    """Geometry of a prescribed load, in which functions of time take the place of a law."""
 
     apply_code = ("apply_load(model, data, g, gp, work, data[WORK.TIME])",)
     called_functions = (apply_load,)
@@ -125,7 +125,7 @@ class GivenLoad(ForceGeometry):
         """Return links and placements of the frames, and the tables of the functions.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         links: list[int] = []
         numbers: list[float] = []
@@ -150,7 +150,7 @@ class GivenLoad(ForceGeometry):
         """Return the labels of the groups that exist: force and torque in ground, the point in its frame.
 
         Returns:
-            Labels.
+            Labels of the columns.
         """
         load: Load = force.location
         groups = zip(load.labels, load.groups, strict=True)

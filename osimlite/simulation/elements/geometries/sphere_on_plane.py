@@ -130,7 +130,7 @@ class SphereOnPlane(ForceGeometry):
         """Return the links, a point of the plane and its normal, and centre and radius of the sphere.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         one, two = location
         first, on_plane = places.station(one.body, one.center)
@@ -150,7 +150,7 @@ class SphereOnPlane(ForceGeometry):
         """Return the labels of force and torque on the body of the sphere, then on that of the half space.
 
         Returns:
-            Labels.
+            Labels of the columns.
         """
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
         return tuple(

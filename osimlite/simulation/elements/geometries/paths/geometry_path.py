@@ -81,7 +81,7 @@ class Node:
             piece: piece of the node.
 
         Returns:
-            Integers and numbers.
+            Integers and numbers of the geometry.
         """
         # The frame of the point in its link.
         link, frame = places.placement(self.body)
