@@ -26,8 +26,8 @@ def compute_or_load(
     Args:
         question: name of the result.
         file: path of the file.
-        data: its content.
-        compute: computes the result, and returns it with whether it depends on the content alone.
+        data: content of the file.
+        compute: function that returns the result, and whether it depends on the content alone.
             Only such results are cached.
     """
     key = [question, make_key(file, Config()), blake2b(data).hexdigest()]

@@ -114,7 +114,7 @@ class _BoundParameter(NamedTuple):
 
         Args:
             value_type: type of the value.
-            word: the word of the command line.
+            word: word of the command line.
         """
         if value_type is str or value_type is Path:
             return value_type(word)
@@ -130,8 +130,10 @@ class Command:
     """Function that is a command.
 
     Args:
-        function: the function; each parameter is annotated with a :class:`ParameterSpec`.
-        more: returns further options, which the function takes as keyword arguments.
+        function: function of the command, whose parameters are annotated with
+            :class:`ParameterSpec`.
+        list_further_options: function that returns further options, which the function takes as
+            keyword arguments.
         groups: names of parameters by the heading under which the help lists them.
     """
 
@@ -323,7 +325,8 @@ def command_with(
     """Decorate a function as a command with further options.
 
     Args:
-        list_further_options: returns the options, which the function takes as keyword arguments.
+        list_further_options: function that returns further options, which the function takes as
+            keyword arguments.
         groups: names of parameters by the heading under which the help lists them.
     """
     return lambda function: Command(function, list_further_options, groups)

@@ -90,13 +90,13 @@ def _break_line(line: str) -> str:
 
 
 MIN_TEXT_WIDTH = 30
-"""Letters of the narrowest column of text beside others."""
+"""Smallest width of a column of text beside others, in letters."""
 
 TEXT_INDENT = 4
-"""Letters by which text is indented below its row, where it does not fit beside."""
+"""Indentation of text that does not fit beside its row and stands below it, in letters."""
 
 MIN_WRAP_WIDTH = 10
-"""Letters of the narrowest text in a terminal that is too narrow for any."""
+"""Smallest width of text, in letters, however narrow the terminal is."""
 
 
 def show_rows(
@@ -143,8 +143,8 @@ def complain(text: object, advice: str = "") -> None:
     """Print one sentence to standard error, after the name of the program.
 
     Args:
-        text: the message; for an exception, the page of the manual is added.
-        advice: what the user can do.
+        text: message; for an exception, the page of the manual is added.
+        advice: text after the message that says what the user can do.
     """
     from osimlite.cli._manual import find_page
 
@@ -157,7 +157,7 @@ def show(lines: str, *, err: bool = False) -> None:
 
     Args:
         lines: text with line ends.
-        err: print to standard error.
+        err: whether to print to standard error.
     """
     (sys.stderr if err else sys.stdout).write(lines)
 
@@ -261,7 +261,7 @@ def add_row(table: Table, *cells: str) -> None:
     """Add a row whose cells are escaped.
 
     Args:
-        table: the table.
+        table: table to which the row is added.
         cells: texts of the row.
     """
     table.add_row(*map(escape_unprintable, cells))
@@ -283,7 +283,7 @@ def print_table(table: Table) -> None:
     row becomes a block: its first cell, and below it the others with their headings.
 
     Args:
-        table: the table.
+        table: table to print.
     """
     columns = table.columns
     heads = [str(column.header) for column in columns]
@@ -346,7 +346,7 @@ def _list_row_lines(
     """Return the lines of a row whose cells are wrapped between words.
 
     Args:
-        row: its cells.
+        row: texts of the cells.
         widths: widths of the columns.
         is_right: whether each column is aligned to the right.
         bold: whether the row is bold where output is coloured.

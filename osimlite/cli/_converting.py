@@ -1,4 +1,4 @@
-"""Work of ``osimlite convert``: which formats are meant, the conversion, and the report on it."""
+"""Work of ``osimlite convert``: choice of formats, conversion, and report on it."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class Request:
     """Conversion that the user asks for.
 
     Attributes:
-        file: the file to convert.
-        source: name of its format.
+        file: file to convert.
+        source: name of the format of the file.
         target: name of the format to write.
         folder: folder to write into.
         name: name of the main file without suffix.
@@ -71,7 +71,7 @@ class Request:
         """Determine the formats and the output folder of a conversion.
 
         Args:
-            file: the file to convert.
+            file: file to convert.
             output: file or folder to write; None for a folder named after the file.
             source: name of the format of the file; None to find it.
             target: name of the format to write; None to find it.
@@ -365,7 +365,7 @@ class OutputGuard:
     files are replaced only on request. One folder has the record of one conversion.
 
     Args:
-        folder: the output folder.
+        folder: output folder of the conversion.
         main: name of the main file; "" if the conversion writes a folder.
         source: name of the converted file.
         overwrite: whether to replace any file.
@@ -463,7 +463,7 @@ def _get_relative(path: Path, folder: Path) -> str:
 
 
 def report(request: Request, result: Conversion) -> None:
-    """Print what was lost, and which files were written."""
+    """Print the losses of a conversion and the written files."""
     if len(result.fidelity):
         print_table(tabulate(result.fidelity, request.target))
     exact_count, changed_count, dropped_count = result.fidelity.counts()

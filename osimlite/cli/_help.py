@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from osimlite.cli._command import Command
 
 NAME_WIDTH = 22
-"""Width of the column of options; a longer option stands in a line of its own."""
+"""Width of the column of options, in letters; a longer option has its own line."""
 MAX_WIDTH = 120
-"""Longer lines are hard to read."""
+"""Largest width of a line, in letters; longer lines are hard to read."""
 DESCRIPTION = "Build, check, translate and simulate OpenSim models (.osim) without OpenSim."
-"""What the program does, in one sentence."""
+"""Description of the program in one sentence."""
 PROGRAM_OPTIONS = {
     "--version": "Print the version and stop.",
     "-v, --verbose": "With --version: also show how the numerical code (the kernels) is compiled.",
@@ -34,8 +34,8 @@ def format_overview(commands: Mapping[str, Command], width: int, *, bold: bool =
     """Return the help of the program.
 
     Args:
-        commands: the commands by name, in the order of the help.
-        width: letters of a line.
+        commands: commands by name, in the order of the help.
+        width: width of a line, in letters.
         bold: whether headings and names are bold.
     """
     width = min(width, MAX_WIDTH)
@@ -57,8 +57,8 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
 
     Args:
         name: name of the command.
-        command: the command.
-        width: letters of a line.
+        command: command to describe.
+        width: width of a line, in letters.
         bold: whether headings and names of options are bold.
     """
     width = min(width, MAX_WIDTH)
@@ -133,10 +133,10 @@ def _format_entry(name_text: str, text: str, width: int, start: str, end: str) -
 
     Args:
         name_text: option with its metavariable.
-        text: its help.
+        text: help text of the option.
         width: width of the terminal.
         start: escape sequence before the name, to colour it.
-        end: escape sequence after it.
+        end: escape sequence after the name.
     """
     beginning = f"  {start}{name_text}{end}"
     indent = NAME_WIDTH + 4

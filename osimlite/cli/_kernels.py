@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def explain_kernels() -> list[str]:
-    """Return sentences on what runs the kernels and why: a compiled library, a compiler, numba or Python."""
+    """Return sentences about what runs the kernels: a library, a compiler, numba or Python."""
     from osimlite.errors import MissingDependency
 
     try:

@@ -270,8 +270,8 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
     """Return the requested folder, by default one in the current folder, named after the model's file.
 
     Args:
-        file: the model.
-        output: the requested folder.
+        file: path of the model file.
+        output: requested folder; None for the default.
 
     Raises:
         OsimliteError: the default folder is a link that leads elsewhere.
@@ -291,7 +291,7 @@ def check_mass(mass: float) -> None:
     """Check the mass of a subject in kg; -1, the default, keeps the mass of the model.
 
     Args:
-        mass: the mass, kg.
+        mass: mass of the subject, kg.
 
     Raises:
         SettingError: the mass is not positive.
@@ -474,8 +474,8 @@ def list_mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]
     """Return the folders searched for meshes after the model's own: those of ``--geometry``, then of the settings.
 
     Args:
-        file: the model.
-        geometry: folders of ``--geometry``.
+        file: path of the model file.
+        geometry: folders of ``--geometry``; None without that option.
 
     Raises:
         MissingFolderError: a folder of the command line does not exist.

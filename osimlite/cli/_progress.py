@@ -1,4 +1,4 @@
-"""The line that tells people at a terminal what long work does, how far it is, and how long it takes."""
+"""Progress line at the terminal: current work, finished amount, and time left."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from osimlite.cli._console import complain, count_columns, get_raw_stream, set_o
 SILENT_S = 0.5
 """Time without any output after which the line appears, s."""
 FIRST_SILENT_S = 0.15
-"""The same for the first line of a command, s: starting Python and its packages took the rest."""
+"""Time without output before the first line of a command, s: starting Python took the rest."""
 REDRAW_S = 0.1
 """Time between two states of the line, s."""
 ESTIMATE_S = 1.0
-"""Work that took less than this says nothing about the time left, s."""
+"""Duration of work from which on the time left is estimated, s."""
 LONG_S = 10.0
-"""Work of this duration says in logs and pipes, once, how far it is, and when it ends, s."""
+"""Duration of work from which on logs and pipes show its progress once, and its end, s."""
 
 INTERACTIVE = ("lsp",)
 """Commands that only wait for editors."""
@@ -57,20 +57,20 @@ ACTIVITIES = {
     "validate": "checking",
     "view": "preparing the picture",
 }
-"""What commands do until they say more, in words."""
+"""Descriptions of the work of commands until they report more."""
 
 
 class _Task:
     """Work of known or unknown length.
 
     Attributes:
-        title: what is done.
-        total: how much there is to do; None if that is unknown.
+        title: name of the work.
+        total: total amount, in `unit`; None if it is unknown.
         unit: unit of the amounts, with a blank before it.
-        done: how much is done.
-        details: more about the state, in words.
-        part: the piece of work that the library reports on now; None without.
-        stage: the last piece of work of unknown length that the library has named; None without.
+        done: finished amount, in `unit`.
+        details: further words about the state of the work.
+        part: part of the work on which the library reports now; None without any.
+        stage: latest part of unknown length that the library has reported; None without any.
     """
 
     def __init__(self, title: str, total: float | None, unit: str = "") -> None:
@@ -83,18 +83,18 @@ class _Task:
         self.stage: _Task | None = None
 
     def receive(self, title: str, done: float, total: float, unit: str) -> None:
-        """Take over what the library reports about a part of the task."""
+        """Record the progress of a part of the task that the library reports."""
         if self.part is None or title != self.part.title or done < self.part.done:
             self.part = _Task(title, total, unit)
         self.part.done, self.part.total, self.part.unit = float(done), total, unit
         if total == 0.0:
             self.stage = self.part
-        # Finished parts say nothing about what follows: the stage that they belong to continues.
+        # After a finished part, the stage that it belongs to continues.
         if 0.0 < total <= done:
             self.part = self.stage
 
     def describe(self, now: float) -> str:
-        """Return the task, how far it is, and the time left."""
+        """Return the name of the task, its progress, and the time left."""
         if self.part is not None:
             description = self.part.describe(now)
             is_one_of_many = self.total is not None and self.total > 1.0
@@ -154,7 +154,7 @@ class _Line:
         self._thread: threading.Thread | None = None
 
     def receive(self, title: str, done: float, total: float, unit: str) -> None:
-        """Take over what the library reports about the current task."""
+        """Record the progress of the current task that the library reports."""
         if self.tasks:
             self.tasks[-1].receive(title, done, total, unit)
             self.update(self.tasks[-1])
@@ -246,11 +246,11 @@ _line = _Line()
 _stack = ExitStack()
 """Listeners of the command."""
 _is_listening = False
-"""Whether what the library reports is passed on."""
+"""Whether reports of the library are passed on."""
 
 
 def watch_command(name: str) -> None:
-    """Show what a command does while it prints nothing, at a terminal only."""
+    """Show the progress of a command while it prints nothing, at a terminal only."""
     if name not in INTERACTIVE:
         _line.tasks.append(_Task(ACTIVITIES.get(name, "working"), None))
         _line.hasten()
@@ -260,7 +260,7 @@ def watch_command(name: str) -> None:
 
 @contextmanager
 def _listen() -> Iterator[None]:
-    """Pass what the library reports to the current task, once even if contexts are nested."""
+    """Pass reports of the library to the current task, once even if contexts are nested."""
     global _is_listening
     if _is_listening:
         yield
@@ -284,19 +284,19 @@ def finish_command() -> None:
 
 @contextmanager
 def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Callable[..., None]]:
-    """Show what is done, how far it is and the time left in a line on standard error.
+    """Show current work, progress and the time left in a line on standard error.
 
-    At a terminal the line appears after half a second. In a log or a pipe, work that takes long
-    prints how far it is once, and when it is finished.
+    At a terminal the line appears after half a second. In a log or a pipe, long work prints its
+    progress once, and a line when it is finished.
 
     Args:
-        title: what is done.
-        total: how much there is to do; None if that is unknown.
+        title: name of the work.
+        total: total amount, in `unit`; None if it is unknown.
         unit: unit of the amounts, with a blank before it.
 
     Yields:
-        A function that takes how much is done, of how much if that has become known, and details in
-        words, or a function that returns them for an amount done in a second.
+        Function of the finished amount, the total amount (if it has become known), and details: a
+        text, or a function that returns it for the amount finished per second.
     """
     task = _Task(title, total, unit)
     _line.tasks.append(task)
@@ -310,7 +310,7 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
             elapsed = max(now - task.started, 1e-9)
             # A function of the rate is called here, where the rate is known.
             task.details = more(task.done / elapsed) if callable(more) else str(more)
-        # What the library reported about the item that is done says nothing about the next.
+        # Reports of the library on the finished item do not belong to the next one.
         task.part = task.stage = None
         _line.update(task)
 
@@ -331,7 +331,7 @@ def motion_bar(title: str, end_time: float) -> Iterator[Callable[[float, float],
     """Show the progress of a motion up to a time (s).
 
     Yields:
-        A function that takes the time reached and the length of the steps, s.
+        Function of the time reached and the length of the steps, s.
     """
     with progress_bar(title, end_time, " s") as advance:
         yield lambda t, step: advance(t, None, f"steps of {step:.2g} s")
@@ -342,7 +342,7 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
     """Show the progress of work in stages, one after the other.
 
     Yields:
-        A function that takes what is being done, how much of it is done, and of how much.
+        Function of the name of the work, the finished amount and the total amount.
     """
     current: str | None = None
     advance: Callable[..., None] = _ignore_progress
@@ -360,7 +360,7 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
 
 
 def show_engine_warnings() -> None:
-    """Show people what the engine warns of, and that it compiles."""
+    """Show warnings of the engine, and a message while it compiles."""
     import logging
 
     class ProgressHandler(logging.Handler):

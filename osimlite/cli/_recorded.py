@@ -26,7 +26,7 @@ def write_results(
         recorded: motion from which the tables were computed.
         tables: tables by file name.
         folder: output folder.
-        trc: also write the table of markers as markers.trc.
+        trc: whether to write the table of markers as markers.trc, too.
     """
     make_folder(folder)
     for name, table in tables.items():
@@ -55,11 +55,11 @@ LARGEST_USUAL_ANGLE = 10.0
 
 
 def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> None:
-    """Print which coordinates and times of a motion were used, and the files written.
+    """Print the coordinates and times of a motion that were used, and the written files.
 
     Args:
-        recorded: the motion.
-        files: paths of the files.
+        recorded: motion that was read.
+        files: paths of the written files.
     """
     if recorded.missing:
         say(f"not in the motion, default value used: {join_words(recorded.missing)}")
@@ -141,7 +141,7 @@ def draw_tables(
 
 
 def describe_pictures(files: list[Path]) -> str:
-    """Return what was drawn, in a sentence."""
+    """Return a sentence about the pictures that were drawn."""
     if not files:
         return "no picture: nothing changes over time"
     if len(files) == 1:

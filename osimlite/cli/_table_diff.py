@@ -25,7 +25,7 @@ def describe_table_differences(old_file: Path, new_file: Path) -> list[str]:
 
     Raises:
         DocumentError: a table cannot be read; with line and column.
-        MissingDependencyError: numpy is not installed.
+        MissingDependency: numpy is not installed.
     """
     require("numpy", extra="sim", purpose="comparing tables")
     import numpy as np

@@ -54,19 +54,19 @@ def validate_paths(
         select: rules to run.
         ignore: rules to skip.
         fail_on: lowest severity for which the exit code is 1.
-        fix: apply safe fixes.
-        unsafe_fixes: apply all fixes.
-        diff: print the changes of the fixes instead of writing them.
+        fix: whether to apply safe fixes.
+        unsafe_fixes: whether to apply all fixes.
+        diff: whether to print the changes of the fixes instead of writing them.
         baseline: file with findings to leave out.
         write_baseline: file to write the present findings to.
         geometry: further folders with meshes.
         classes: files with classes of plug-ins.
-        target_version: version of OpenSim that shall read the files.
-        statistics: print counts by rule instead of findings.
-        no_cache: check files again although the cache has their findings.
-        everything: print every finding instead of folding similar ones.
+        target_version: version of OpenSim that will read the files.
+        statistics: whether to print counts by rule instead of findings.
+        no_cache: whether to check files again although the cache has their findings.
+        everything: whether to print every finding instead of folding similar ones.
         stdin_filename: path of the file whose content standard input provides.
-        only_ours: skip XML files that are not OpenSim's.
+        only_ours: whether to skip XML files that are not OpenSim's.
 
     Returns:
         0 without findings of `fail_on` or worse, 1 with some, 2 if a file could not be processed.
@@ -177,10 +177,11 @@ def _apply_fixes(
     """Apply fixes until none is left.
 
     Args:
-        source: the file.
+        source: text of the file.
         config: settings of the command line.
-        unsafe: apply fixes that may change the meaning, too.
-        make_source: makes the source of the next round from the pieces of the fixed text.
+        unsafe: whether to apply fixes that may change the meaning, too.
+        make_source: function that makes the source of the next round from the pieces of the fixed
+            text.
 
     Returns:
         The fixed file, the number of fixes, and the number of remaining unsafe fixes.

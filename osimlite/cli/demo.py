@@ -40,9 +40,9 @@ class TourMotion(NamedTuple):
         model: built-in model that moves.
         to: duration, s.
         title: heading of its step and page.
-        describe: returns sentences on the result.
-        seen: what else its page shows.
-        command: what to try next; {} is the folder of the tour.
+        describe: function that returns sentences about the result.
+        seen: description of what the page shows besides the motion.
+        command: command to try next; {} is the folder of the tour.
     """
 
     model: str

@@ -258,9 +258,9 @@ def _describe_simulation(model: Model, folder: Path, text: str) -> tuple[str, bo
     """Describe which parts of a model cannot be simulated.
 
     Args:
-        model: the model.
-        folder: folder of its file.
-        text: content of its file.
+        model: model to describe.
+        folder: folder of the model file.
+        text: content of the model file.
 
     Returns:
         The description, and whether it depends on the model file alone and may be cached.

@@ -266,8 +266,8 @@ def _draw_outcome(
     """Draw the tables of a setup into a folder that is named after it.
 
     Args:
-        setup: the setup.
-        outcome: its results.
+        setup: path of the setup.
+        outcome: results of the setup.
         output: folder of all results; None if the setups name theirs.
         parent: folder in which the folder of the pictures is made.
         err: whether to report on standard error.

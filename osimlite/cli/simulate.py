@@ -200,10 +200,11 @@ def write_results(
     They are written into a temporary folder first, so that a failure leaves no partial results.
 
     Args:
-        trajectory: the motion.
+        trajectory: simulated motion.
         folder: output folder.
-        plot: draw plots.
-        film: draws an animation into a file.
+        plot: whether to draw plots.
+        film: function that draws an animation into a file, and returns its path; None for no
+            animation.
 
     Returns:
         Paths of the files in `folder`.

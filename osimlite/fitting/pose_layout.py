@@ -95,11 +95,11 @@ class FitLayout:
 
     Args:
         system: engine of the mechanism.
-        places: links and degrees of freedom by bodies and coordinates.
+        placements: links and degrees of freedom by bodies and coordinates.
         markers: points with measured positions.
         sensors: frames with measured orientations.
         goals: coordinates with target values.
-        held: indices of locked and prescribed coordinates.
+        held_coordinates: indices of locked and prescribed coordinates.
         couplers: couplers that determine a coordinate.
     """
 

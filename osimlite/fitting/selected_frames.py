@@ -29,7 +29,7 @@ class SelectedFrames:
 
     Args:
         trials: measured markers by the name of the trial.
-        known: names of the markers of the model.
+        known_names: names of the markers of the model.
         count: number of frames.
         weights: weights of markers by name; the others have weight 1.
 

@@ -87,10 +87,10 @@ def to_biomod(
     """Translate a model for biorbd.
 
     Args:
-        model: the model.
+        model: model to translate.
         name: name of the files without suffix; that of the model by default.
-        folder: not used; exporters have it in common.
-        geometry: not used; exporters have it in common.
+        folder: folder of the model file, as for other exporters; not used here.
+        geometry: folders with mesh files, as for other exporters; not used here.
 
     Raises:
         ModelError: the model is not a mechanism.
@@ -184,7 +184,7 @@ def _format_segment(
         origin: frame of the segment in that of the parent (4, 4), before the motion.
         joint: the joint that moves it; None if it does not move.
         axis_letter: axis of the motion.
-        robot: the robot.
+        robot: robot form of the model.
     """
     yield f"segment {name}"
     yield f"\tparent {parent}"
@@ -251,7 +251,7 @@ def _measure_path_errors(model: Model, placements: Placements) -> dict[str, dict
     """Measure how far straight lines through the fixed points are from the paths of muscles.
 
     Args:
-        model: the model.
+        model: model to translate.
         placements: frames of the model.
 
     Returns:

@@ -59,12 +59,12 @@ def to_bvh(
     """Return a model and its motion as BVH.
 
     Args:
-        model: the model.
+        model: model to translate.
         motion: file of the coordinates over time (.sto, .mot); None for one frame, the default pose.
         scale: numbers of the file per metre.
         name: name of the file without suffix; that of the model by default.
-        folder: not used; exporters have it in common.
-        geometry: not used; exporters have it in common.
+        folder: folder of the model file, as for other exporters; not used here.
+        geometry: folders with mesh files, as for other exporters; not used here.
 
     Raises:
         SettingError: the scale is not positive.
@@ -113,7 +113,7 @@ class BvhMarkers:
     """Joint centres of a BVH file as markers, for `ik` and `fit`.
 
     Args:
-        path: the file.
+        path: path of the BVH file.
         name: name of the written file without suffix; that of the file by default.
         scale: numbers of the file per metre.
 

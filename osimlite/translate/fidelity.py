@@ -35,7 +35,7 @@ class Error(NamedTuple):
 
         Args:
             differences: differences between target and model (k,).
-            unit: their unit.
+            unit: unit of the differences.
         """
         magnitudes = np.abs(differences)
         return cls(float(magnitudes.max()), float(np.sqrt(np.mean(magnitudes**2))), unit)
@@ -46,10 +46,11 @@ class Record:
     """Loss or approximation of one component.
 
     Attributes:
-        kind: what it concerns: force, contact-geometry, coordinate-range, gravity ...
+        kind: subject of the record in one word: force, contact-geometry, coordinate-range, gravity
+            ...
         component: absolute path in the model.
-        cannot_say: what the target cannot express.
-        done: what was written instead.
+        cannot_say: property that the target cannot express, as a phrase.
+        done: replacement in the target, as a phrase.
         detail: numbers and names of this case, or "".
         errors: errors of an approximation by quantity: length, value, force ...
     """
@@ -72,9 +73,9 @@ class RecordGroup:
     """Records of one kind that say the same about several components.
 
     Attributes:
-        kind: what they concern.
-        cannot_say: what the target cannot express.
-        done: what was written instead.
+        kind: subject of the records in one word.
+        cannot_say: property that the target cannot express, as a phrase.
+        done: replacement in the target, as a phrase.
         records: records, in the order of the model.
     """
 
@@ -114,7 +115,8 @@ class Fidelity:
     Attributes:
         model: name of the model.
         target: target format, for example "urdf".
-        translated: what a component became, by absolute path: "link Pelvis", "joint RHip_rz".
+        translated: element of the target for each component, by absolute path: "link Pelvis",
+            "joint RHip_rz".
         records: losses and approximations.
         renamed: new names by path and kind of element, where they differ from those of the
             components.
@@ -144,10 +146,10 @@ class Fidelity:
         """Add a record of a loss or an approximation.
 
         Args:
-            kind: what it concerns, one word.
+            kind: subject of the record in one word.
             component: absolute path in the model.
-            cannot_say: what the target cannot express.
-            done: what was written instead.
+            cannot_say: property that the target cannot express, as a phrase.
+            done: replacement in the target, as a phrase.
             detail: numbers and names of this case.
             errors: errors of the approximation by quantity.
         """

@@ -68,8 +68,8 @@ class NimbleChange:
 
     Attributes:
         component: path of the component.
-        difference: what Nimble does otherwise than OpenSim.
-        done: what was changed in the model; "" if nothing can be changed.
+        difference: sentence about what Nimble does otherwise than OpenSim.
+        done: change of the model as a sentence; "" if nothing can be changed.
     """
 
     component: str

@@ -40,11 +40,11 @@ _LOST_TYPES: tuple[tuple[type[Component], str, str], ...] = (
 
 
 def record_losses(model: Model, robot: Robot, fidelity: Fidelity) -> None:
-    """Record what became of every component of a model in a robot.
+    """Record the translation or the loss of every component of a model in a robot.
 
     Args:
         model: model that was translated.
-        robot: its robot, with final names and limits.
+        robot: robot form of the model, with final names and limits.
         fidelity: account, which already has the records of the geometry.
     """
     _Survey(model, robot, fidelity).run()

@@ -154,12 +154,12 @@ def _make_element(
 def _identify_element(
     enclosing: Element | None, tag: str, name: str
 ) -> tuple[type[Object] | None, FieldSpec | None]:
-    """Identify what an element stands for.
+    """Identify the class and the property of an element.
 
     Args:
         enclosing: enclosing element; None at the top.
-        tag: its tag.
-        name: its attribute `name`.
+        tag: tag of the element.
+        name: value of the attribute `name`; "" without it.
 
     Returns:
         Class of the object, and the property that it is or that holds it; None where unknown.

@@ -54,7 +54,7 @@ def list_code_actions(
     """Return the actions for the findings in a range: fix them, ignore them, or fix everything in the file.
 
     Args:
-        analysis: the file.
+        analysis: analysis of the open file.
         uri: URI of the file.
         requested_range: range that the editor asks about; all of its lines count.
     """

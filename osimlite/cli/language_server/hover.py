@@ -23,8 +23,8 @@ def describe_cursor(analysis: DocumentAnalysis, offset: int) -> types.Hover | No
     """Describe the class, the property, or the target of the reference at an offset.
 
     Args:
-        analysis: the file.
-        offset: character offset in its text.
+        analysis: analysis of the open file.
+        offset: character offset in the text of the file.
     """
     cursor = analysis.cursor(offset)
     element = cursor.subject

@@ -47,8 +47,8 @@ class Name(NamedTuple):
     """Candidate text for a reference.
 
     Attributes:
-        text: the text.
-        detail: what it refers to, for display.
+        text: text to insert.
+        detail: description of the target, for display.
         likely: whether it is listed before candidates that are possible but unlikely.
     """
 
@@ -80,7 +80,7 @@ def list_names(
     Args:
         analysis: last version of the document that could be read.
         cursor: position of the reference.
-        reference: what is named.
+        reference: type of the reference.
         owner: element that has the reference.
     """
     setup = analysis.document if isinstance(analysis.document, Setup) else None
@@ -188,7 +188,7 @@ def _suggest_files(folder: str, content: str) -> Iterator[Name]:
 
     Args:
         folder: folder to search.
-        content: what the file holds: a key of `_SUFFIXES`, or the class of the objects in it.
+        content: content of the files: a key of `_SUFFIXES`, or the class of the objects in them.
 
     Yields:
         Paths relative to the folder. Files without the class in their first bytes are unlikely.

@@ -153,8 +153,8 @@ class Project:
         """Compute the edits that rename a component and update all references to it.
 
         Args:
-            target: the component.
-            name: its new name.
+            target: component to rename.
+            name: new name of the component.
 
         Returns:
             The edits of each document, by URI.
@@ -207,9 +207,9 @@ def _compute_model_edits(
     """Compute the edits of the references in the model that contains a component.
 
     Args:
-        analysis: the document.
-        component: the component.
-        name: its new name.
+        analysis: analysis of the document.
+        component: component to rename.
+        name: new name of the component.
 
     Returns:
         The new path of the component, and the edits.
@@ -239,9 +239,9 @@ def _compute_setup_edits(
     """Compute the edits of the names in a setup that refer to a component or pass through it.
 
     Args:
-        analysis: the setup.
-        target: the component.
-        path: its new path.
+        analysis: analysis of the setup.
+        target: component to rename.
+        path: new path of the component.
     """
     edits = []
     for use, start, end in analysis.uses:

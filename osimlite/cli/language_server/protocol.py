@@ -51,7 +51,7 @@ class Protocol(LanguageServerProtocol):
         """Send an error as the answer to a request.
 
         Args:
-            error: the error.
+            error: error to send.
             number: `id` of the request; null is sent if it is unknown or not an id.
         """
         # Without a number the type of pygls leaves out the `id`, which has to be there and null.

@@ -72,7 +72,7 @@ class Server(LanguageServer):
         """Send an error to the editor, as an answer if it may belong to a request.
 
         Args:
-            error: the exception.
+            error: exception that was raised.
             source: class of errors that pygls assigns it to.
         """
         # pygls only logs malformed JSON, but an editor may be waiting for an answer.
@@ -86,8 +86,8 @@ class Server(LanguageServer):
         """Replace the analysis of an open file by one of a new text, and return it.
 
         Args:
-            uri: the file.
-            text: its present text.
+            uri: URI of the open file.
+            text: present text of the file.
         """
         result = self.project.open[uri] = DocumentAnalysis(
             text, to_fs_path(uri) or uri, use_cached_measures=True
@@ -98,7 +98,7 @@ class Server(LanguageServer):
         """Schedule a check of a file; a new call replaces one that has not started.
 
         Args:
-            uri: the file.
+            uri: URI of the open file.
             pause: time without typing before the check starts, s.
         """
         self.cancel_check(uri)
@@ -108,7 +108,7 @@ class Server(LanguageServer):
         """Schedule checks of files whose dependencies have changed, but not their text.
 
         Args:
-            uris: the files.
+            uris: URIs of the open files.
             pause: time without typing before the checks start, s.
         """
         for uri in uris:

@@ -19,7 +19,7 @@ class Text:
     (UTF-16). Offsets count characters of Python.
 
     Args:
-        content: the characters.
+        content: characters of the text.
         unit: encoding in which the editor counts characters.
     """
 

@@ -170,8 +170,8 @@ class MjcfDraft:
         root: element `<mujoco>`.
         bodies: element of each body by its index in the mechanism, -1 for ground; its frame is the
             body's.
-        frames: per name of a link of the robot that is fixed in an element, the element and the
-            frame (4, 4) in it.
+        frames: element in which a link of the robot is fixed, and the frame (4, 4) of the link in
+            it, by name of the link.
         leads: joint of a coordinate by the index of the coordinate; a locked coordinate has none.
         followers: dependence of joints that equalities move, by name.
         helpers: those of them that move nothing, but which others follow.
@@ -348,7 +348,7 @@ class MjcfDraft:
 
         Args:
             joint: name of the joint.
-            follower: its dependence.
+            follower: dependence of the joint on its leader.
         """
         self.followers[joint] = follower
         # MuJoCo's equality has a quartic with five coefficients.

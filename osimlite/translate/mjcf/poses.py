@@ -95,8 +95,8 @@ class PathSamples:
     Attributes:
         lengths: lengths (P,) (m).
         arms: moment arms about the free coordinates (P, m) (m for rotations, 1 for translations).
-        nodes: per pose the numbers of the nodes of the path and their positions in ground (3,), see
-            `Paths.points`.
+        nodes: numbers of the nodes of the path and their positions in ground (3,), m, for each
+            pose; see `Paths.points`.
     """
 
     lengths: Array

@@ -136,7 +136,7 @@ def _read_linear_law(
     Args:
         draft: draft of the model.
         actuator: index of the actuator.
-        gear: its gear; one of 0 makes an actuator without a force.
+        gear: gear of the actuator; with 0 it has no force, and is left out.
     """
     gain_and_bias, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     if gain_and_bias is None or delay is None or not gear:

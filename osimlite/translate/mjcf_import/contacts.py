@@ -181,7 +181,7 @@ def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry
     """Add a force between each plane and each round geom that can touch it; record other pairs.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         surfaces: contact surfaces of each geom, by its index.
     """
     model = draft.mj

@@ -45,8 +45,9 @@ class Osim:
 
     Attributes:
         name: name of the files.
-        model: the model.
-        fidelity: what became of every object of MuJoCo, and what OpenSim does not have.
+        model: converted model.
+        fidelity: account of the objects of MuJoCo that were converted, and of those that OpenSim
+            lacks.
         coordinates: map from MuJoCo's positions to values of coordinates.
         files: meshes and the table of keyframes, by name relative to the model.
     """

@@ -55,7 +55,7 @@ class ConversionDraft:
     """State of a conversion.
 
     Attributes:
-        source: the compiled file.
+        source: compiled MJCF file.
         options: options of the user.
         model: the OpenSim model.
         fidelity: account of the conversion.
@@ -148,8 +148,8 @@ class ConversionDraft:
         Args:
             body: index of the body.
             name: name of the new frame.
-            position: of the frame in the body (3,), m.
-            rotation: of the frame in the body (3, 3).
+            position: position of the frame in the body (3,), m.
+            rotation: rotation matrix from the frame to the body (3, 3).
 
         Returns:
             The frame, and whether it is new. A new frame is in the model's component set.

@@ -51,7 +51,7 @@ class Obstacles:
     """Contact surfaces of a model over which paths run, each made when it is first used.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         frames: frames that own the surfaces, by body.
         model: model that gets the surfaces.
     """
@@ -101,7 +101,7 @@ def find_hint(
     the surface.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         segment: the segment, with a geom.
         pose: the default pose.
         version: version of MuJoCo whose rules hold.
@@ -163,7 +163,7 @@ def make_geodesic_path(
     """Make a path through the sites of a tendon and over its geoms.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         frames: frames of the bodies.
         obstacles: surfaces that paths run over.
         segments: the segments of a tendon with one branch.
@@ -245,7 +245,7 @@ def select_geodesics(
     A path that fails in one pose can be off by metres, so that many poses are needed.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         tendons: spatial tendons that wrap objects do not follow closely.
         trials: sets of poses; each is tried with the tendons that are left.
         version: version of MuJoCo whose rules hold.

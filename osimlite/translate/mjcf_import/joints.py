@@ -98,7 +98,7 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
     """Connect a body to its parent.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         body: index of the body.
         frame: the OpenSim body, already in the model.
         parent: the frame of the parent body.

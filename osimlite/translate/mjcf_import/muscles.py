@@ -70,7 +70,7 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     """Return the numbers of a muscle, with lengths of the path.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         actuator: index of the actuator.
         gear: factor from the length of the path to MuJoCo's actuator length; positive.
         shift: number that was added to the path, m.
@@ -113,12 +113,12 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
 def make_muscle(
     draft: ConversionDraft, actuator: int, path: TendonPath, gear: float, lengths: Array
 ) -> Muscle | None:
-    """Make a muscle, and record how near it is.
+    """Make a muscle, and record the errors of its curves.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         actuator: index of the actuator.
-        path: its path.
+        path: path of the muscle.
         gear: factor from the length of the path to MuJoCo's actuator length.
         lengths: lengths of the path that occur (P,), m.
 

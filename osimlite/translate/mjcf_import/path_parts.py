@@ -44,9 +44,10 @@ class Surfaces:
     """Wrap surfaces of a model, each made when it is first used.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         frames: frames that own the surfaces, by body.
-        reach: largest distance (m) along the axis of each cylinder at which a tendon ends.
+        max_heights: largest distance (m) along the axis of a cylinder at which a tendon ends, by
+            index of the geom.
     """
 
     def __init__(
@@ -130,12 +131,12 @@ def make_geometry_path(
     """Make a path through the sites of a tendon.
 
     Args:
-        draft: the conversion.
+        draft: OpenSim model under construction.
         frames: frames of the bodies.
         surfaces: surfaces that paths wrap around.
         segments: the segments of a tendon with one branch.
-        quadrants: how each segment wraps: ``"all"`` on either side, ``"+x"`` on that of the side
-            site, None not at all.
+        quadrants: part of its surface around which each segment wraps: ``"all"`` for either side,
+            ``"+x"`` for the side of the side site, None for no wrapping.
     """
     model = draft.mj
     sites = [segments[0].first, *(segment.second for segment in segments)]

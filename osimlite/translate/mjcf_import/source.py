@@ -39,11 +39,11 @@ class MjcfSource:
     """A compiled MJCF file.
 
     Attributes:
-        path: the file.
+        path: path of the MJCF file.
         mujoco: MuJoCo's module.
-        model: the compiled model (``MjModel``).
+        model: compiled model (``MjModel``).
         major: first number of the version of MuJoCo that compiled it.
-        warnings: what MuJoCo warned of while it compiled the file.
+        warnings: warnings of MuJoCo's compiler about the file.
     """
 
     path: Path

@@ -90,9 +90,9 @@ def segment_lengths(
     A segment that goes through the inside of a surface and touches it has NaN there.
 
     Args:
-        source: the compiled file.
-        segments: the segments.
-        poses: the poses.
+        source: compiled MJCF file.
+        segments: segments of tendons (S).
+        poses: poses of MuJoCo's model (P).
         version: version of MuJoCo whose rules hold, 3 or 4.
 
     Returns:
@@ -157,9 +157,9 @@ def tendon_lengths(
     """Return the lengths (T, P) of spatial and fixed tendons, m or rad.
 
     Args:
-        source: the compiled file.
-        tendons: the tendons.
-        poses: the poses.
+        source: compiled MJCF file.
+        tendons: tendons to measure (T).
+        poses: poses of MuJoCo's model (P).
         version: version of MuJoCo whose rules hold, 3 or 4.
     """
     model = source.model
