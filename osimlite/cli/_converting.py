@@ -317,10 +317,10 @@ class Request:
         from osimlite.schema.frames import Body
         from osimlite.translate.fidelity import LEFT_OUT, Fidelity
         from osimlite.view.incomplete import build_showable
-        from osimlite.view.shown import Shown
+        from osimlite.view.model_view import ModelView
 
         model, mechanism, left_out = build_showable(model)
-        viewed = Shown.of(
+        model_view = ModelView.from_model(
             model, mechanism, mesh_folders, file=self.file, motion=motion, left_out=left_out
         )
         fidelity = Fidelity(mechanism.name, exporter.name)
@@ -334,11 +334,11 @@ class Request:
                 "what a force does",
                 f"{LEFT_OUT}; its path is drawn if it has one",
             )
-        for remark in viewed.remarks:
+        for remark in model_view.remarks:
             fidelity.add("view", "/", remark, LEFT_OUT)
         path = make_folder(self.folder) / f"{self.name}{exporter.suffix}"
         defaults = {option.name: option.default for option in exporter.choices}
-        exporter.write(viewed, path, **{**defaults, **option_values})
+        exporter.write(model_view, path, **{**defaults, **option_values})
         return Conversion([path], fidelity)
 
 

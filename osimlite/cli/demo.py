@@ -202,7 +202,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
         return []
     # Drawing imports large packages, which a tour without pictures does not need.
     from osimlite.mechanics.multibody import build_mechanism
-    from osimlite.view import Shown, Story, plot_simulation
+    from osimlite.view import ModelView, Story, plot_simulation
 
     human_title, human_page = "It walks by reflexes", "human-walks.html"
     human_command = (
@@ -221,15 +221,17 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
         # `Simulation` keeps the model of its trajectories.
         for motion, trajectory, sentence in zip(MOTIONS, result, sentences, strict=True):
             assert trajectory.model is not None
-            viewed = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
+            model_view = ModelView.from_model(
+                trajectory.model, trajectory.mechanism, motion=trajectory
+            )
             caption = f"{sentence} {motion.seen}"
             story = Story(
                 caption, motion.command.format(tour.folder), f"{motion.model}.html", titles
             )
-            pages.append(viewed.write_page(tour.folder / story.page, story))
-        viewed = Shown.of(human.model, build_mechanism(human.model), motion=states)
+            pages.append(model_view.write_page(tour.folder / story.page, story))
+        model_view = ModelView.from_model(human.model, build_mechanism(human.model), motion=states)
         pages.append(
-            viewed.write_page(
+            model_view.write_page(
                 tour.folder / human_page, Story(walking_text, human_command, human_page, titles)
             )
         )

@@ -12,7 +12,7 @@ from osimlite.cli._command import Argument, Option, command_with
 from osimlite.translate.exporters import list_exporters
 
 if TYPE_CHECKING:
-    from osimlite.view.shown import Shown
+    from osimlite.view.model_view import ModelView
 
 
 def _choices() -> Iterator[OptionSpec]:
@@ -61,12 +61,12 @@ def view(
     from osimlite.cli._console import say
     from osimlite.io.document.reader import read
     from osimlite.view.incomplete import build_showable, describe_errors
-    from osimlite.view.shown import Shown
+    from osimlite.view.model_view import ModelView
 
     model, mechanism, left_out = build_showable(read(file))
     coordinate_values: Mapping[str, float] = options.parse_quantities(values, mechanism, "--set")
     folders = options.list_mesh_folders(file, geometry)
-    viewed = Shown.of(
+    model_view = ModelView.from_model(
         model,
         mechanism,
         folders,
@@ -77,7 +77,10 @@ def view(
         wrapping=wrapping,
         left_out=left_out,
     )
-    for remark in (*viewed.remarks, *describe_errors(viewed.findings, viewed.scene.remarks)):
+    for remark in (
+        *model_view.remarks,
+        *describe_errors(model_view.findings, model_view.scene.remarks),
+    ):
         say(remark)
     requested_exporters = {
         name: exporter
@@ -86,18 +89,18 @@ def view(
     }
     for name, exporter in requested_exporters.items():
         format_options = {option.name: option_values[option.name] for option in exporter.choices}
-        say(f"wrote {exporter.write(viewed, option_values[name], **format_options)}")
+        say(f"wrote {exporter.write(model_view, option_values[name], **format_options)}")
     if not requested_exporters:
-        _serve(viewed, port, browser=browser)
+        _serve(model_view, port, browser=browser)
 
 
-def _serve(viewed: Shown, port: int, *, browser: bool) -> None:
+def _serve(model_view: ModelView, port: int, *, browser: bool) -> None:
     import webbrowser
 
     from osimlite.cli._console import say
     from osimlite.cli._progress import finish_command
 
-    with viewed.server(port) as server:
+    with model_view.create_server(port) as server:
         finish_command()
         say(f"serving {server.url} until you press Ctrl-C")
         if browser:

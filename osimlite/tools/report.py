@@ -38,11 +38,11 @@ from osimlite.tools.trial_curves import (
 from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
+from osimlite.view.model_view import ModelView
 from osimlite.view.page import page_data, page_text
 from osimlite.view.panel_groups import Panel
 from osimlite.view.panels import COLORS, draw_pages, has_cycles, make_figure
 from osimlite.view.recording import MeasuredMarkers
-from osimlite.view.shown import Shown
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
 """Color and name of the curves of each side."""
@@ -207,7 +207,7 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
     motion = create_recording(
         replace(evidence, states={**evidence.states, **states}), mechanism, measured
     )
-    viewer = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
+    viewer = ModelView.from_model(evidence.model, mechanism, file=evidence.file, motion=motion)
     # A report shows no findings about the model.
     data = page_data(viewer.model, viewer.scene, viewer.motion, (), viewer.q)
     page = page_text(data).replace("</style>", f"{NO_SIDEBAR_STYLE}</style>", 1)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from osimlite.translate.bvh import Bvh
     from osimlite.translate.export import Urdf
     from osimlite.translate.mjcf.export import Mjcf
-    from osimlite.view.shown import Shown
+    from osimlite.view.model_view import ModelView
 
 SCREENSHOT_SIZE = (1200, 900)
 """Width and height of a screenshot, pixels."""
@@ -32,7 +32,7 @@ class Exporter:
     The function of an exporter of ``osimlite translate`` takes a model and its options, as
     :func:`osimlite.to_urdf` does, and returns an object with `write`, `fidelity` and `robot`, as
     :class:`osimlite.translate.export.Urdf` has them. That of ``osimlite view`` takes a
-    :class:`osimlite.view.shown.Shown`, a path and its options, writes the file, and returns a
+    :class:`osimlite.view.model_view.ModelView`, a path and its options, writes the file, and returns a
     sentence about it.
     """
 
@@ -79,24 +79,24 @@ def write_biomod(*model: Any, **options: Any) -> BioMod:
     return to_biomod(*model, **options)
 
 
-def write_page(viewed: Shown, path: Path) -> str:
+def write_page(model_view: ModelView, path: Path) -> str:
     """Write a page for browsers, and return its name and size."""
-    return f"{viewed.write_page(path)} ({_megabytes(path)})"
+    return f"{model_view.write_page(path)} ({_megabytes(path)})"
 
 
-def write_glb(viewed: Shown, path: Path) -> str:
+def write_glb(model_view: ModelView, path: Path) -> str:
     """Write a file of glTF, and return its name and size."""
-    return f"{viewed.write_glb(path)} ({_megabytes(path)})"
+    return f"{model_view.write_glb(path)} ({_megabytes(path)})"
 
 
-def write_rerun(viewed: Shown, path: Path) -> str:
+def write_rerun(model_view: ModelView, path: Path) -> str:
     """Write a recording for the viewer of Rerun, and return its name, its size and how to open it."""
-    return f"{viewed.write_rrd(path)} ({_megabytes(path)}); open it with: rerun {path}"
+    return f"{model_view.write_rrd(path)} ({_megabytes(path)}); open it with: rerun {path}"
 
 
-def write_screenshot(viewed: Shown, path: Path, *, at: float | None) -> str:
+def write_screenshot(model_view: ModelView, path: Path, *, at: float | None) -> str:
     """Write a picture of a moment (s), and return its name."""
-    return str(viewed.write_picture(path, SCREENSHOT_SIZE, at))
+    return str(model_view.write_picture(path, SCREENSHOT_SIZE, at))
 
 
 def _megabytes(path: Path) -> str:

@@ -19,7 +19,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.motion import (
-    ShownMotion,
+    DrawableMotion,
     activity_color,
     find_moving_bodies,
     get_values,
@@ -52,7 +52,7 @@ Progress = Callable[[int, int], None]
 
 def animate(
     model: Model,
-    trajectory: ShownMotion,
+    trajectory: DrawableMotion,
     path: str | Path,
     *,
     fps: int = 25,
@@ -146,7 +146,7 @@ class Film:
     """Motion at the times of the frames, with the region of space that it covers."""
 
     def __init__(
-        self, scene: Scene, motion: ShownMotion, fps: int, speed: float, plane: Plane
+        self, scene: Scene, motion: DrawableMotion, fps: int, speed: float, plane: Plane
     ) -> None:
         if plane not in _AXES:
             raise OsimliteError(f"a picture shows the plane 'xy', 'yz' or 'xz', not '{plane}'")

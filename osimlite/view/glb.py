@@ -20,7 +20,7 @@ from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.progress import watch_items
 from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
-from osimlite.view.motion import ShownMotion, get_values, interpolate_columns
+from osimlite.view.motion import DrawableMotion, get_values, interpolate_columns
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Bodies, Color, Scene
@@ -34,7 +34,7 @@ _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 _ROUND = make_cylinder(8)
 
 
-def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Path) -> Path:
+def write_glb(scene: Scene, q: Array, motion: DrawableMotion | None, path: str | Path) -> Path:
     """Write the visible parts of a model, and their motion, as a .glb file.
 
     Args:
@@ -96,7 +96,7 @@ class _Track(NamedTuple):
 
 
 def _list_segments(
-    scene: Scene, motion: ShownMotion | None, times: Array, rows: Array, poses: Sequence[Bodies]
+    scene: Scene, motion: DrawableMotion | None, times: Array, rows: Array, poses: Sequence[Bodies]
 ) -> Iterator[tuple[str, Color, float, Array]]:
     """Yield component path, colour, radius and ends (n, 2, 3) in ground of segments and forces.
 

@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.scene import Bodies, Color, Scene
 
 
-class ShownMotion(Protocol):
+class DrawableMotion(Protocol):
     """Recorded motion at n times, for example a Trajectory."""
 
     @property
@@ -54,7 +54,7 @@ class ContactForce(NamedTuple):
     torques: Array | None = None
 
 
-def contact_forces(motion: ShownMotion) -> list[ContactForce]:
+def contact_forces(motion: DrawableMotion) -> list[ContactForce]:
     """Return the force vectors among the columns of `motion.forces`, in their order."""
     result = []
     for label in motion.forces:
@@ -72,13 +72,13 @@ def contact_forces(motion: ShownMotion) -> list[ContactForce]:
     return result
 
 
-def _find_columns(motion: ShownMotion, label: str) -> Array:
+def _find_columns(motion: DrawableMotion, label: str) -> Array:
     return np.column_stack(
         [np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"]
     )
 
 
-def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
+def read_activations(scene: Scene, motion: DrawableMotion) -> dict[str, Array]:
     """Read the recorded activations of muscles from the columns of a motion.
 
     Files of OpenSim 3 have them as ``soleus_r.activation``.
@@ -118,19 +118,19 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
     return result
 
 
-def interpolate_columns(motion: ShownMotion, columns: Array, times: Array) -> Array:
+def interpolate_columns(motion: DrawableMotion, columns: Array, times: Array) -> Array:
     """Interpolate columns (n, k) of the motion linearly at other times (m,)."""
     recorded = np.asarray(motion.times, dtype=float)
     rows = [np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])]
     return np.array(rows).reshape(len(rows), len(times)).T
 
 
-def get_values(motion: ShownMotion, mechanism: Mechanism) -> Array:
+def get_values(motion: DrawableMotion, mechanism: Mechanism) -> Array:
     """Return the coordinate values (n, c) of the motion in the order of the mechanism's coordinates."""
     return order_columns(motion, mechanism, np.asarray(motion.values, dtype=float))
 
 
-def order_columns(motion: ShownMotion, mechanism: Mechanism, columns: Array) -> Array:
+def order_columns(motion: DrawableMotion, mechanism: Mechanism, columns: Array) -> Array:
     """Return columns (n, k) of the motion in the order of the mechanism's coordinates (n, c), defaults elsewhere."""
     result = np.tile(mechanism.default_state()[0], (len(columns), 1))
     for k, name in enumerate(motion.coordinates):

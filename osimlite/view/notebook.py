@@ -179,22 +179,24 @@ def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
     try:
         require("numpy", extra="view", purpose="the picture")
-        from osimlite.view.shown import Shown
+        from osimlite.view.model_view import ModelView
 
-        viewed = Shown.of(
+        model_view = ModelView.from_model(
             shown_model, None if motion is None else motion.mechanism, folders, motion=motion
         )
         # mtime=0: equal pages give equal notebooks.
-        encoded = base64.b64encode(gzip.compress(viewed.page_text().encode(), 6, mtime=0)).decode()
+        encoded = base64.b64encode(
+            gzip.compress(model_view.page_text().encode(), 6, mtime=0)
+        ).decode()
     except OsimliteError as error:
         return f"<div>no picture: {escape(error.message)}</div>"
     # Notebooks with larger outputs become slow to open.
     if len(encoded) > MOST_BYTES:
         return (
             f"<div>a page of {len(encoded) / 1e6:.0f} MB is too large for a notebook; write it to a file: "
-            "<code>osimlite.view.Shown.of(model, motion=trajectory).write_page('page.html')</code></div>"
+            "<code>osimlite.view.ModelView.from_model(model, motion=trajectory).write_page('page.html')</code></div>"
         )
-    remarks = "".join(f"<div>{escape(remark)}</div>" for remark in viewed.remarks)
+    remarks = "".join(f"<div>{escape(remark)}</div>" for remark in model_view.remarks)
     return (
         # sandbox: the page may run its scripts only.
         f"<iframe srcdoc='{escape(_UNPACK.replace('@PAGE@', encoded))}' sandbox='allow-scripts' loading='lazy' "

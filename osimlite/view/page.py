@@ -27,7 +27,7 @@ from osimlite.translate.sidecar import replace_non_finite
 from osimlite.view.incomplete import describe_left_out
 from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
-from osimlite.view.motion import ShownMotion, find_moving_bodies, get_values, read_activations
+from osimlite.view.motion import DrawableMotion, find_moving_bodies, get_values, read_activations
 from osimlite.view.pushes import DrawnForces
 from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
@@ -78,7 +78,7 @@ def page_text(data: Mapping[str, Any]) -> str:
 def page_data(
     model: Model,
     scene: Scene,
-    motion: ShownMotion | None,
+    motion: DrawableMotion | None,
     findings: Sequence[Finding],
     q: Array,
     *,
@@ -240,7 +240,7 @@ def _describe_coordinates(
     return rows
 
 
-def _describe_motion(scene: Scene, motion: ShownMotion) -> dict[str, Any]:
+def _describe_motion(scene: Scene, motion: DrawableMotion) -> dict[str, Any]:
     mechanism = scene.mechanism
     times = np.asarray(motion.times, dtype=float)
     values = get_values(motion, mechanism)

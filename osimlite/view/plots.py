@@ -18,7 +18,7 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.motion import ContactForce, ShownMotion, contact_forces, order_columns
+from osimlite.view.motion import ContactForce, DrawableMotion, contact_forces, order_columns
 from osimlite.view.panel_groups import group_columns
 from osimlite.view.panels import COLORS, STYLES, draw_pages, make_figure, name_pages, render_png
 from osimlite.view.table_plots import ColumnNames, describe_columns
@@ -39,7 +39,7 @@ _NEVER_MIND = 1e-9
 
 
 def plot_simulation(
-    trajectory: ShownMotion, folder: str | Path, *, mechanism: Mechanism | None = None
+    trajectory: DrawableMotion, folder: str | Path, *, mechanism: Mechanism | None = None
 ) -> list[Path]:
     """Draw the coordinates, states of muscles, forces, probes and energy of a motion over time.
 
@@ -72,7 +72,9 @@ def plot_simulation(
         ]
 
 
-def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
+def compute_energies(
+    motion: DrawableMotion, mechanism: Mechanism
+) -> tuple[Array, dict[str, Array]]:
     """Compute the energies of a motion; potential energy is zero at the origin of ground.
 
     Only a simulated trajectory has the energy that contacts and springs store. Other motions are
@@ -96,7 +98,7 @@ def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, 
     return times[indices], {"kinetic": kinetic, "potential of gravity": height}
 
 
-def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+def draw_figures(motion: DrawableMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of each page of the plots of a motion."""
     times = np.asarray(motion.times, dtype=float)
     names = ColumnNames.from_model(getattr(motion, "model", None), mechanism)
@@ -119,14 +121,16 @@ def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[t
         yield from pages
 
 
-def _draw_contacts(times: Array, motion: ShownMotion) -> Iterator[tuple[str, Any]]:
+def _draw_contacts(times: Array, motion: DrawableMotion) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of the contact forces, if there are any."""
     contacts = list(_one_of_each_pair(contact_forces(motion)))
     if contacts:
         yield "contact_forces.png", _plot_contacts(times, contacts)
 
 
-def _draw_energies(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+def _draw_energies(
+    motion: DrawableMotion, mechanism: Mechanism | None
+) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of the energies, if the mechanism is known."""
     if mechanism is not None:
         yield "energy.png", _plot_energy(*compute_energies(motion, mechanism))

@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import ShownMotion, contact_forces, interpolate_columns
+from osimlite.view.motion import DrawableMotion, contact_forces, interpolate_columns
 from osimlite.view.scene import Bodies, ForceAnchor, Scene
 
 LONGEST_ARROW = 0.4
@@ -54,7 +54,7 @@ class DrawnForces:
     forces: Sequence[DrawnForce]
 
     @classmethod
-    def from_motion(cls, scene: Scene, motion: ShownMotion, times: Array) -> DrawnForces:
+    def from_motion(cls, scene: Scene, motion: DrawableMotion, times: Array) -> DrawnForces:
         """Return the recorded forces of a motion, interpolated at times (n,), s.
 
         Surfaces of one element on one body share a record, and have one force.

@@ -30,7 +30,7 @@ class MeasuredMarkers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Motion from a file, with the attributes of a :class:`osimlite.view.motion.ShownMotion`.
+    """Motion from a file, with the attributes of a :class:`osimlite.view.motion.DrawableMotion`.
 
     `remarks` are sentences about data that the files lack, `measured` the markers from which the
     motion was computed.

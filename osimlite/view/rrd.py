@@ -15,13 +15,13 @@ import numpy as np
 from osimlite.base.files import write_atomically
 from osimlite.base.require import require
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import ShownMotion, activity_color, get_values, read_activations
+from osimlite.view.motion import DrawableMotion, activity_color, get_values, read_activations
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Color, Scene
 
 
-def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Path) -> Path:
+def write_rrd(scene: Scene, q: Array, motion: DrawableMotion | None, path: str | Path) -> Path:
     """Write the visible parts of a model, and their motion, as a .rrd file.
 
     Args:

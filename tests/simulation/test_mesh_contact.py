@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.view.shown import Shown
+from osimlite.view.model_view import ModelView
 from tests.simulation.support import thrown
 
 
@@ -83,7 +83,7 @@ def test_a_recording_is_shown_with_the_forces_on_its_meshes(tmp_path):
     osimlite.write(model, inner / "thrown.osim")
     trajectory = osimlite.simulate(model, 0.15, folder=inner)
     trajectory.to_sto(tmp_path / "states.sto")
-    shown = Shown.of(model, file=inner / "thrown.osim", motion=tmp_path / "states.sto")
+    shown = ModelView.from_model(model, file=inner / "thrown.osim", motion=tmp_path / "states.sto")
     assert shown.motion is not None
     label = "contact.egg.force.Y"
     assert shown.motion.forces[label] == pytest.approx(trajectory.forces[label], abs=1e-6)

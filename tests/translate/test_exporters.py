@@ -89,6 +89,6 @@ def test_exporters_are_told_without_what_they_work_with() -> None:
         "numpy",
         "lxml",
         "pydantic",
-        "osimlite.view.shown",
+        "osimlite.view.model_view",
         "osimlite.translate.export",
     }

@@ -11,7 +11,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint
-from osimlite.view import Shown
+from osimlite.view import ModelView
 from osimlite.view.motion import read_activations
 from osimlite.view.recording import read_recording
 from tests.view.motions import Recorded
@@ -34,10 +34,12 @@ def model() -> Model:
     return model
 
 
-def moving(model: Model, states: dict[str, tuple[float, float]]) -> Shown:
+def moving(model: Model, states: dict[str, tuple[float, float]]) -> ModelView:
     rows = np.zeros((2, 0))
     columns = {label: np.array(values) for label, values in states.items()}
-    return Shown.of(model, motion=Recorded(np.array((0.0, 1.0)), (), rows, rows, {}, columns))
+    return ModelView.from_model(
+        model, motion=Recorded(np.array((0.0, 1.0)), (), rows, rows, {}, columns)
+    )
 
 
 def test_activations_have_the_names_of_both_versions_and_are_from_0_to_1(model):

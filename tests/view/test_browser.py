@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.view import Shown, Story
+from osimlite.view import ModelView, Story
 from tests.view.motions import Recorded, stroll
 
 WALKER, GAIT, SHOULDER = "walker", "m0014", "m0163"
@@ -30,9 +30,9 @@ def file_of(fixtures: Path, request):
     return found
 
 
-def shown(path: Path, motion=None, **more) -> Shown:
+def shown(path: Path, motion=None, **more) -> ModelView:
     model = osimlite.read(path)
-    return Shown.of(model, build_mechanism(model), file=path, motion=motion, **more)
+    return ModelView.from_model(model, build_mechanism(model), file=path, motion=motion, **more)
 
 
 def graph(page, mechanism) -> np.ndarray:
@@ -273,7 +273,7 @@ def test_the_server_keeps_up_the_constraints(file_of, open_page):
     view = shown(file_of(SHOULDER))
     mechanism = view.scene.mechanism
     held = [item.name for item in mechanism.constraints]
-    with view.server() as server:
+    with view.create_server() as server:
         page = open_page(server.url)
         assert page.run("v.data.constraints") and set(page.run("v.data.constraints")) < set(held)
         place = mechanism.coordinate_index("scapula_abduction")
@@ -288,7 +288,7 @@ def test_the_server_keeps_up_the_constraints(file_of, open_page):
 
 def test_a_motion_plays_and_stops_and_can_be_scrubbed(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
-    view = Shown.of(model, build_mechanism(model), motion=motion)
+    view = ModelView.from_model(model, build_mechanism(model), motion=motion)
     mechanism = view.scene.mechanism
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.page.select_option("#speed", "0.1")
@@ -324,7 +324,7 @@ def test_a_motion_plays_and_stops_and_can_be_scrubbed(open_page, tmp_path):
 
 def test_a_page_that_tells_something_plays_at_once_and_leads_to_others(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
-    view = Shown.of(model, build_mechanism(model), motion=motion)
+    view = ModelView.from_model(model, build_mechanism(model), motion=motion)
     pages = [("It strolls", "one.html"), ("It strolls again", "two.html")]
     for _, name in pages:
         view.write_page(tmp_path / name, Story(f"this is {name}", "osimlite --help", name, pages))
@@ -353,7 +353,9 @@ def test_the_camera_has_all_of_a_motion_in_sight_and_follows_what_travels(open_p
         motion = stroll()
         motion.values[:, mechanism.coordinate_index(name)] += course(motion.times)
         page = open_page(
-            Shown.of(model, mechanism, motion=motion).write_page(tmp_path / f"{name}.html")
+            ModelView.from_model(model, mechanism, motion=motion).write_page(
+                tmp_path / f"{name}.html"
+            )
         )
         assert page.run("v.data.motion.travels") == (name == "Pelvis_tx")
         for moment in (0.0, 0.25, 0.5):
@@ -366,7 +368,7 @@ def test_the_camera_has_all_of_a_motion_in_sight_and_follows_what_travels(open_p
 
 def test_an_arrow_starts_where_the_force_acts(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
-    view = Shown.of(model, build_mechanism(model), motion=motion)
+    view = ModelView.from_model(model, build_mechanism(model), motion=motion)
     from osimlite.view.pushes import DrawnForces
 
     row = 20
@@ -470,7 +472,7 @@ def test_words_at_the_edge_are_whole(file_of, open_page, tmp_path):
 
 def test_keys_play_step_and_choose_views(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
-    view = Shown.of(model, build_mechanism(model), motion=motion)
+    view = ModelView.from_model(model, build_mechanism(model), motion=motion)
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.page.keyboard.press("ArrowRight")
     assert page.run("v.time") == pytest.approx(motion.times[1])
@@ -502,19 +504,21 @@ def test_a_menu_closes_by_escape_and_by_a_click_elsewhere(open_page, tmp_path):
 
 def test_values_with_units_are_said_under_the_pointer(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
-    view = Shown.of(model, build_mechanism(model), motion=motion)
+    view = ModelView.from_model(model, build_mechanism(model), motion=motion)
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.run("v.setTime(0.2)")
     assert page.run("v.measured('/forceset/RFootForce')") == ["force 100.0 N"]
     from osimlite.models.source import make_model
 
-    page = open_page(Shown.of(make_model("jumper")).write_page(tmp_path / "jumper.html"))
+    page = open_page(
+        ModelView.from_model(make_model("jumper")).write_page(tmp_path / "jumper.html")
+    )
     (words,) = page.run("v.measured('/forceset/soleus_r')")
     assert words.startswith("length 0.") and words.endswith(" m")
 
 
-def shown_walker() -> Shown:
-    return Shown.of(dynamic_walker())
+def shown_walker() -> ModelView:
+    return ModelView.from_model(dynamic_walker())
 
 
 def test_signs_that_cover_each_other_are_one(fixtures, open_page, tmp_path):
@@ -536,7 +540,7 @@ def test_signs_that_cover_each_other_are_one(fixtures, open_page, tmp_path):
 
 def test_nothing_of_the_model_is_below_the_player(open_page, tmp_path):
     model = dynamic_walker()
-    view = Shown.of(model, build_mechanism(model), motion=stroll())
+    view = ModelView.from_model(model, build_mechanism(model), motion=stroll())
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.page.set_viewport_size({"width": 400, "height": 800})
     page.until("v.stage.covered > 60")
@@ -570,7 +574,7 @@ def test_a_path_without_points_is_said_before_anything_is_selected(open_page, tm
         coordinate_paths=["/jointset/j/a"],
     )
     model.add(osimlite.PathActuator(name="motor", path=path, optimal_force=1.0))
-    page = open_page(Shown.of(model).write_page(tmp_path / "page.html"))
+    page = open_page(ModelView.from_model(model).write_page(tmp_path / "page.html"))
     text = page.run("document.querySelector('#details').textContent")
     assert "not shown: /forceset/motor/" in text and "OpenSim does not draw it either" in text
     page.run("v.select('/bodyset/bone')")

@@ -12,7 +12,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.view import Shown, incomplete
+from osimlite.view import ModelView, incomplete
 from osimlite.view.incomplete import MAX_REMARKS, MAX_SAME, build_showable, describe_left_out
 from tests.cli.command import run
 
@@ -85,7 +85,7 @@ def test_a_model_in_memory_has_the_findings_of_its_left_out_parts(
     path = tmp_path / "m.osim"
     path.write_text(text.replace("/bodyset/RightShank<", "/bodyset/Nowhere<", 1), encoding="utf-8")
     model = osimlite.read(path)
-    codes = [finding.code for finding in Shown.of(model).findings]
+    codes = [finding.code for finding in ModelView.from_model(model).findings]
     assert "OSIM301" in codes and codes == [item.code for item in osimlite.validate(model).findings]
 
 

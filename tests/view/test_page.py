@@ -16,15 +16,15 @@ from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import write_sto
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.view import Shown
+from osimlite.view import ModelView
 from osimlite.view.page import page_data, page_text
 from osimlite.view.recording import compute_forces, read_recording
 from tests.view.motions import stroll
 
 
-def walker(**more) -> Shown:
+def walker(**more) -> ModelView:
     model = dynamic_walker()
-    return Shown.of(model, build_mechanism(model), **more)
+    return ModelView.from_model(model, build_mechanism(model), **more)
 
 
 def data_of(text: str):
@@ -58,7 +58,7 @@ def test_the_grid_lies_on_the_ground_of_the_model():
 def test_words_of_a_model_cannot_end_the_data():
     model = dynamic_walker()
     model.name = "a</script><script>alert(1)</script>"
-    view = Shown.of(model, build_mechanism(model))
+    view = ModelView.from_model(model, build_mechanism(model))
     text = page_text(page_data(model, view.scene, None, (), view.q))
     assert "<script>alert(1)" not in text
     assert data_of(text)["name"] == model.name
@@ -87,7 +87,11 @@ def test_sliders_know_what_stays_as_it_is():
     view.model.joint_set.objects[0].coordinates[0].locked = True
     mechanism = build_mechanism(view.model)
     data = page_data(
-        view.model, Shown.of(view.model, mechanism).scene, None, (), mechanism.assemble({})
+        view.model,
+        ModelView.from_model(view.model, mechanism).scene,
+        None,
+        (),
+        mechanism.assemble({}),
     )
     assert [c["still"] for c in data["coordinates"]].count("locked") == 1
     for coordinate, value in zip(data["coordinates"], data["q"], strict=True):
@@ -104,7 +108,7 @@ def ask(server, question: bytes, host: str | None = None):
 
 def test_the_server_answers_the_page_and_nobody_else():
     view = walker()
-    with view.server() as server:
+    with view.create_server() as server:
         with urllib.request.urlopen(server.url) as page:
             assert data_of(page.read().decode())["server"] is True
         assert (
@@ -125,7 +129,7 @@ def test_the_server_answers_the_page_and_nobody_else():
             assert caught.value.code in (403, 404)
             caught.value.close()
         with pytest.raises(OsimliteError, match="--port"):
-            view.server(int(server.url.rsplit(":", 1)[1].strip("/")))
+            view.create_server(int(server.url.rsplit(":", 1)[1].strip("/")))
 
 
 def test_forces_of_a_file_of_states_are_those_of_the_simulation(tmp_path: Path):
@@ -184,6 +188,12 @@ def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):
 
 def test_a_model_without_bodies_is_shown_too(tmp_path: Path):
     pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
-    blank = Shown.of(osimlite.Model(name="blank"))
+    blank = ModelView.from_model(osimlite.Model(name="blank"))
     assert "blank" in blank.write_page(tmp_path / "blank.html").read_text()
     assert blank.write_picture(tmp_path / "blank.png", size=(40, 30)).stat().st_size > 0
+
+
+def test_the_former_name_of_the_class_warns():
+    with pytest.warns(DeprecationWarning, match=r"use osimlite\.view\.ModelView$"):
+        former = osimlite.view.Shown
+    assert former is osimlite.view.ModelView

@@ -11,7 +11,7 @@ import pytest
 
 from osimlite.errors import MissingDependency
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.view import Shown
+from osimlite.view import ModelView
 from osimlite.view.pushes import DrawnForces
 from tests.view.motions import stroll
 
@@ -27,7 +27,7 @@ def read(path: Path) -> dict[str, dict[str, Any]]:
 
 def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
     motion = stroll(11)
-    shown = Shown.of(dynamic_walker(), motion=motion)
+    shown = ModelView.from_model(dynamic_walker(), motion=motion)
     scene = shown.scene
     result = read(shown.write_rrd(tmp_path / "walk.rrd"))
     poses = [scene.compute_poses(row) for row in motion.values]
@@ -67,4 +67,4 @@ def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
 def test_without_rerun_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(MissingDependency, match=r"osimlite\[rerun\]"):
-        Shown.of(dynamic_walker()).write_rrd(tmp_path / "walk.rrd")
+        ModelView.from_model(dynamic_walker()).write_rrd(tmp_path / "walk.rrd")

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.view import Shown, animate
+from osimlite.view import ModelView, animate
 from osimlite.view.collect import build_scene
 from osimlite.view.kernels import kernels_text, program_data
 from osimlite.view.motion import activity_color
@@ -147,7 +147,7 @@ def active_motion(model: osimlite.Model, level: float) -> Recorded:
 @pytest.mark.parametrize("level", [0.0, 0.5])
 def test_pictures_show_tendons_and_fibers_by_activation(jumper, level, tmp_path):
     image = pytest.importorskip("PIL.Image")
-    shown = Shown.of(jumper, motion=active_motion(jumper, level))
+    shown = ModelView.from_model(jumper, motion=active_motion(jumper, level))
     picture = np.asarray(image.open(shown.write_picture(tmp_path / "a.png", (500, 500))))
     assert count_pixels(picture, TENDON) > 100
     assert count_pixels(picture, activity_color(level)) > 300
@@ -170,7 +170,7 @@ def test_strong_muscles_are_drawn_thicker(jumper, tmp_path):
         model = jumper.copy_deep()
         for muscle in (part for part in model.walk() if hasattr(part, "max_isometric_force")):
             muscle.max_isometric_force = 500.0 * factor
-        shown = Shown.of(model, motion=active_motion(model, 1.0))
+        shown = ModelView.from_model(model, motion=active_motion(model, 1.0))
         picture = np.asarray(image.open(shown.write_picture(tmp_path / "a.png", (500, 500))))
         areas.append(count_pixels(picture, activity_color(1.0)))
     # The radius grows with the square root of the force.

@@ -9,7 +9,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.geometry import Mesh
 from osimlite.schema.geometry_types import Brick, Cylinder
 from osimlite.translate.export import to_urdf
-from osimlite.view import Shown
+from osimlite.view import ModelView
 
 
 def test_every_shape_is_where_the_scene_has_it(fixtures, tmp_path):
@@ -23,7 +23,7 @@ def test_every_shape_is_where_the_scene_has_it(fixtures, tmp_path):
     )
     shank.attached_geometry[-1].appearance.color = (0.2, 0.4, 0.6)
     folders = [fixtures / "meshes"]
-    view = Shown.of(model, folders=folders)
+    view = ModelView.from_model(model, folders=folders)
     urdf = to_urdf(model, geometry=folders)
     urdf.write(tmp_path)
     robot = yourdfpy.URDF.load(str(next(tmp_path.glob("*.urdf"))))

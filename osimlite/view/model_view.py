@@ -1,4 +1,4 @@
-"""Model with scene, motion and findings, as the page, the pictures and the server show it."""
+"""View of a model: its scene, motion and findings, for the page, pictures, files and the server."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
 from osimlite.view.incomplete import build_showable, describe_left_out
 from osimlite.view.motion import (
-    ShownMotion,
+    DrawableMotion,
     activity_color,
     get_values,
     interpolate_columns,
@@ -38,27 +38,28 @@ from osimlite.view.scene import Color, Scene
 from osimlite.view.server import PageServer
 
 HOME = (1.0, 0.35, 1.3)
-"""Direction from the model to the viewer: components to the front, up, and to the right."""
+"""Direction from the model to the camera of a picture: forward, up, and to the model's right."""
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
-    """Model with its scene, motion and findings, ready to be shown.
+class ModelView:
+    """Model with its scene, motion and findings, ready to be drawn.
 
     Attributes:
-        model: shown model, without parts that cannot be built.
+        model: model without the parts that cannot be built.
         scene: drawable objects of the model.
-        q: coordinate values (n,) of the first pose, rad or m.
-        motion: motion of the model; None for a still model.
-        remarks: sentences about parts that cannot be shown.
-        checked: model or model file that the validator checks; None for `model`.
+        q: coordinate values (n,) of the initial pose, rad or m.
+        motion: motion of the model, or None for a model in a fixed pose.
+        remarks: sentences about parts that cannot be drawn.
+        checked: input of the validator: the model file, or the model with all its parts; None for
+            `model`.
         mesh_folders: absolute paths of the folders with mesh files, for the validator.
     """
 
     model: Model
     scene: Scene
     q: Array
-    motion: ShownMotion | None = None
+    motion: DrawableMotion | None = None
     remarks: tuple[str, ...] = ()
     checked: Model | Path | None = None
     mesh_folders: tuple[str, ...] = ()
@@ -67,7 +68,7 @@ class Shown:
     def findings(self) -> Sequence[Finding]:
         """The findings of ``osimlite validate``, with the settings of the project.
 
-        The model is checked at the first access, since pictures do not need the findings.
+        The model is checked at the first access, because pictures do not need findings.
         """
         config = Config(mesh_paths=self.mesh_folders)
         if isinstance(self.checked, Path):
@@ -77,51 +78,50 @@ class Shown:
         ).findings
 
     @classmethod
-    def of(
+    def from_model(
         cls,
         model: Model,
         mechanism: Mechanism | None = None,
         folders: Sequence[str | Path] = (),
         *,
         file: Path | None = None,
-        motion: ShownMotion | Path | None = None,
+        motion: DrawableMotion | Path | None = None,
         forces: Path | None = None,
         values: Mapping[str, float] | None = None,
         wrapping: str = OPENSIM,
         left_out: Sequence[tuple[str, str]] = (),
-    ) -> Shown:
-        """Build the scene of a model, read its motion, and describe parts that cannot be shown.
+    ) -> ModelView:
+        """Build the scene of a model and read its motion.
+
+        Parts that cannot be built are left out of the scene; `remarks` and the findings name them.
 
         Args:
-            model: model to show.
-            mechanism: mechanism of `model`; built by default, without the parts that cannot be
-                built.
-            folders: further folders with mesh files, besides the folder of `file`, as for
-                `to_urdf`.
-            file: file of the model, which gives findings their lines; None to check the model
-                itself.
-            motion: motion, or path of its file (.sto, .mot); None for a still model.
-            forces: file with contact forces, used with a motion from a file.
+            model: model to draw.
+            mechanism: multibody system of the same model; built if None.
+            folders: folders with mesh files, searched besides the folder of `file`.
+            file: file that the model was read from, which gives findings their lines; None: the
+                model itself is checked.
+            motion: motion, or a file (.sto, .mot) with one; None for a fixed pose.
+            forces: file with contact forces, for a motion from a file.
             values: coordinate values by name (rad, m); they replace those of a motion from a file.
-            wrapping: method of wrapping paths around surfaces, see
+            wrapping: method that bends paths around surfaces, see
                 :class:`osimlite.simulation.Options`.
-            left_out: paths of the parts that were removed from `model` because they cannot be
-                built, with the reasons; not used without `mechanism`.
+            left_out: paths of the parts that the caller has removed from `model` because they
+                cannot be built, with the reasons.
 
         Raises:
-            OsimliteError: a file is missing or invalid, or no pose fulfils the
+            OsimliteError: a file is missing or has the wrong contents; no pose satisfies the
                 constraints.
-            SettingError: there is no such wrapping.
+            SettingError: the wrapping method is unknown.
         """
-        # The validator checks the complete model: parts that cannot be built are not shown, but
-        # have findings.
+        # Findings are about the complete model, also about parts that are not drawn.
         checked: Model | Path = model if file is None else file
         if mechanism is None:
             model, mechanism, left_out = build_showable(model)
         mesh_folders = MeshFolders(None if file is None else file.parent, folders)
         scene = build_scene(model, mechanism, mesh_folders, wrapping)
         searched = tuple(str(folder.resolve()) for folder in mesh_folders.searched)
-        # Reasons why parts cannot be built precede those why parts cannot be drawn.
+        # Parts that could not be built come before parts that could not be drawn.
         if left_out:
             scene = replace(scene, remarks=[*left_out, *scene.remarks])
         remarks = [*describe_left_out(scene.remarks)]
@@ -140,36 +140,47 @@ class Shown:
         )
 
     def write_page(self, path: str | Path, story: Story | None = None) -> Path:
-        """Write one self-contained HTML page; with a story it plays the motion at once."""
+        """Write one self-contained HTML page with the viewer.
+
+        Args:
+            path: file to write.
+            story: title, text and settings of the page, which may play the motion at once.
+
+        Returns:
+            The path.
+        """
         write_atomically(path, self.page_text(story))
         return Path(path)
 
     def write_glb(self, path: str | Path) -> Path:
-        """Write a file of glTF 2.0 (.glb), with the motion if there is one."""
+        """Write a glTF 2.0 file (.glb) with the model and its motion, and return its path."""
         return write_glb(self.scene, self.q, self.motion, path)
 
     def write_rrd(self, path: str | Path) -> Path:
-        """Write a recording for Rerun (.rrd), with the motion if there is one.
+        """Write a recording for Rerun (.rrd) with the model and its motion, and return its path.
 
         Raises:
             MissingDependency: rerun-sdk is not installed.
         """
         return write_rrd(self.scene, self.q, self.motion, path)
 
-    def server(self, port: int = 0) -> PageServer:
-        """Return a server of the page at a port of this machine; 0 selects any free port."""
+    def create_server(self, port: int = 0) -> PageServer:
+        """Return a server of the page at a port of this machine; 0 selects a free port."""
         data = page_data(self.model, self.scene, self.motion, self.findings, self.q, server=True)
         return PageServer(page_text(data), self.scene.mechanism, port)
 
     def write_picture(
         self, path: str | Path, size: tuple[int, int] = (1200, 900), time: float | None = None
     ) -> Path:
-        """Write a picture (PNG, or another format that pillow knows by the suffix).
+        """Write a picture as PNG, or in another format that Pillow derives from the suffix.
 
         Args:
             path: file to write.
             size: width and height in pixels.
-            time: time of the motion, s; by default the first one.
+            time: time of the motion, s; the first time if None.
+
+        Returns:
+            The path.
 
         Raises:
             OsimliteError: the time is outside of the motion, or the format is unknown.
@@ -182,9 +193,9 @@ class Shown:
             *(p for _, p in scene.iterate_extents(bodies) if len(p)),
             *(arrow.point[None] for arrow in arrows),
         ]
-        # Without bodies the picture shows ground.
+        # A model without bodies still has ground to draw.
         points = np.concatenate(visible_points or [np.array(scene.compute_box(q))])
-        # Any horizontal direction will do if the X axis is vertical.
+        # A horizontal direction: perpendicular to X, or to Y where X is the vertical.
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
         camera = Camera.from_points(points, up, direction, size[0] / size[1])
@@ -202,11 +213,16 @@ class Shown:
     def _describe_moment(
         self, time: float | None
     ) -> tuple[Array, list[ForceArrow], frozenset[str], dict[str, Color]]:
-        """Return coordinate values (n,), arrows, loaded surfaces and muscle colours at a time."""
+        """Return what a picture shows at a time of the motion.
+
+        Returns:
+            Coordinate values (n,), force arrows, paths of the surfaces under load, and colours of
+            muscles by path.
+        """
         motion = self.motion
         if motion is None:
             if time is not None:
-                raise OsimliteError("a time needs a motion; name one after the model")
+                raise OsimliteError("a moment belongs to a motion; name one after the model")
             return self.q, [], frozenset(), {}
         first, last = float(motion.times[0]), float(motion.times[-1])
         if time is not None and not first <= time <= last:
@@ -216,7 +232,8 @@ class Shown:
         moment = np.array([first if time is None else time])
         values = get_values(motion, self.scene.mechanism)
         q = interpolate_columns(motion, values, moment)[0]
-        # Arrows are scaled by the largest force of the complete motion, so that pictures compare.
+        # The scale of arrows follows the largest force of the whole motion, so that pictures
+        # compare.
         largest_force = DrawnForces.from_motion(
             self.scene, motion, np.asarray(motion.times, dtype=float)
         ).largest
