@@ -222,7 +222,7 @@ class ModelView:
         motion = self.motion
         if motion is None:
             if time is not None:
-                raise OsimliteError("a moment belongs to a motion; name one after the model")
+                raise OsimliteError("a time needs a motion; name one after the model")
             return self.q, [], frozenset(), {}
         first, last = float(motion.times[0]), float(motion.times[-1])
         if time is not None and not first <= time <= last:
@@ -232,8 +232,7 @@ class ModelView:
         moment = np.array([first if time is None else time])
         values = get_values(motion, self.scene.mechanism)
         q = interpolate_columns(motion, values, moment)[0]
-        # The scale of arrows follows the largest force of the whole motion, so that pictures
-        # compare.
+        # Arrows are scaled by the largest force of the complete motion, so that pictures compare.
         largest_force = DrawnForces.from_motion(
             self.scene, motion, np.asarray(motion.times, dtype=float)
         ).largest
