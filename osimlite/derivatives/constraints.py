@@ -135,7 +135,7 @@ def _select_independent_rows(rows: Array) -> list[int]:
 def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     """Return the law of accelerations that fulfil the given independent equations.
 
-    As in the kernel `by_multipliers`, the tree's factorization of the mass matrix gives the
+    As in the kernel `solve_by_multipliers`, the tree's factorization of the mass matrix gives the
     accelerations by each equation's force.
     """
 

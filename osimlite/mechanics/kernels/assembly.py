@@ -128,12 +128,12 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     """Fill q with the nearest pose in which clamped coordinates are in their ranges.
 
     Args:
-        a: the assembly.
+        a: mechanism and assembly with their work vectors.
         target: desired values of the coordinates (n,).
         q: filled with the pose (n,).
 
     Returns:
-        Whether there is one.
+        Whether there is such a pose.
     """
     size = a.model[MODEL.DOFS]
     status = at(a.p, ASSEMBLY.HEAD)
@@ -166,12 +166,12 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     """Fill q with the nearest pose, whatever the ranges.
 
     Args:
-        a: the assembly; its work vector begins with the values of fixed coordinates.
+        a: mechanism and assembly; the work vector begins with the values of fixed coordinates.
         target: desired values of the coordinates (n,).
         q: filled with the pose (n,).
 
     Returns:
-        Whether there is one.
+        Whether there is such a pose.
     """
     size, tolerance = a.model[MODEL.DOFS], a.c[ASSEMBLY_NUMBERS.TOLERANCE]
     copy_numbers(size, a.w, q)
@@ -240,7 +240,7 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
     """Return half the sum of the squared changes that count.
 
     Args:
-        a: the assembly.
+        a: mechanism and assembly with their work vectors.
         target: desired values of the coordinates (n,).
         q: present values (n,).
     """
@@ -257,7 +257,7 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
     """Move dependent coordinates that do not count to the values that their couplers give.
 
     Args:
-        a: the assembly.
+        a: mechanism and assembly with their work vectors.
         q: pose (n,); changed.
     """
     size = a.model[MODEL.DOFS]
@@ -278,13 +278,13 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     """Move q to where the equations hold, by Newton's method with the shortest steps.
 
     Args:
-        a: the assembly.
-        q: pose (n,); changed.
+        a: mechanism and assembly with their work vectors.
+        q: pose to start from (n,); filled with the last pose of the iteration.
         is_assembled: whether the pose fulfils the equations within the tolerance already; then all
             coordinates move alike.
 
     Returns:
-        Whether they do.
+        Whether the equations hold.
     """
     size = a.model[MODEL.DOFS]
     count = count_equations(a)
@@ -332,7 +332,8 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     """Find Newton's step in the null space of the linearized equations.
 
     Args:
-        a: assembly; its work vector is filled with the step of every degree of freedom (rad or m).
+        a: mechanism and assembly; the work vector is filled with the step of every degree of
+            freedom (rad or m).
         target: desired values of the coordinates (n,).
         q: present values (n,).
         has_curvature: whether the Hessian contains the equations times their multipliers, besides the cost.

@@ -46,7 +46,7 @@ class ASSEMBLY_ARRAY(metaclass=Record):
 
 
 class HOLD(metaclass=Record):
-    """What determines the value of a degree of freedom."""
+    """Ways in which the value of a degree of freedom is determined."""
 
     FREED = 0
     """Degree of freedom that the search moves."""
@@ -96,10 +96,10 @@ def list_freed(a: Assembly) -> int:
     """List the degrees of freedom that may change.
 
     Args:
-        a: the assembly; its list is filled.
+        a: mechanism and assembly; the list of freed degrees of freedom is filled.
 
     Returns:
-        Their number.
+        Number of these degrees of freedom.
     """
     size = a.model[MODEL.DOFS]
     status = at(a.p, ASSEMBLY.HEAD)
@@ -116,7 +116,7 @@ def evaluate_equations(a: Assembly, q: Floats) -> float:
     """Evaluate errors and rows of the equations of a pose.
 
     Args:
-        a: the assembly; its work vector is filled with errors and rows.
+        a: mechanism and assembly; the work vector is filled with errors and rows.
         q: pose (n,).
 
     Returns:
@@ -167,7 +167,7 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
         is_eased: whether coordinates that do not count move more easily, by EASE.
 
     Returns:
-        Their rank.
+        Rank of the equations.
     """
     size = a.model[MODEL.DOFS]
     count = count_equations(a)

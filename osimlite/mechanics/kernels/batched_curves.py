@@ -60,7 +60,7 @@ def request_value(x: Floats, lanes: Floats, number: int, offset: int, z: float) 
         lanes: workspace of the requests.
         number: number of the request.
         offset: offset of the curve in `x`.
-        z: argument.
+        z: argument x of the curve.
     """
     # The result of a linear end needs no search, but the lane must take part in it without harm.
     c: Any = at(x, offset)
@@ -94,8 +94,8 @@ def request_sum(
         lanes: workspace of the requests.
         number: number of the request.
         offset: offset of the curve in `x`.
-        of_y: factor of the curve.
-        of_x: factor of its argument.
+        of_y: factor of the value y of the curve.
+        of_x: factor of the argument x of the curve.
         total: value of the sum.
     """
     c: Any = at(x, offset)

@@ -77,7 +77,7 @@ def correct_geodesics(
         first: number of the point before.
         last: number of the point after.
         count: number of touched obstacles.
-        rough: largest kink.
+        rough: largest kink before the correction.
         work: workspace of the search, with lines and kinks.
 
     Returns:
@@ -249,7 +249,7 @@ def differentiate_end(
         end: GROUND_START or GROUND_END of `OBSTACLE_WORK`.
         shift: derivative of the function by the position of the end.
         turn: derivative of the function by the rotation of its frame.
-        row: filled (4,).
+        row: filled with the derivatives by the four variations (4,).
     """
     a, r, a_rate, r_rate = jacobi_fields(obstacle_record, end)
     frame = at(obstacle_record, end)
@@ -313,13 +313,13 @@ def largest_component(a: Vector) -> float:
 def shoot_again(
     surface: Floats, geodesic: Floats, corrections: Floats, step: float, work: Floats
 ) -> bool:
-    """Apply a part of the corrections to a geodesic.
+    """Apply a fraction of the corrections to a geodesic.
 
     Args:
         surface: numbers of the surface.
         geodesic: geodesic; changed.
-        corrections: corrections of its four variations.
-        step: the part.
+        corrections: corrections of the four variations of the geodesic (4,).
+        step: fraction of the corrections, 0 to 1.
         work: workspace of an integration.
 
     Returns:

@@ -263,7 +263,7 @@ def shoot_geodesic(
         point: start; projected onto the surface.
         direction: direction; projected onto the tangent plane.
         length: length of the geodesic (m).
-        geodesic: filled.
+        geodesic: filled with the geodesic, see `GEODESIC`.
         work: workspace of GEODESIC_WORK_SIZE numbers.
 
     Returns:
@@ -319,7 +319,7 @@ def store_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
         p: numbers of the surface.
         point: point of the surface (m).
         direction: direction of the geodesic; projected onto the tangent plane.
-        end: filled.
+        end: filled with the end, see `END_NUMBERS`.
     """
     g = surface_gradient(p, point)
     # The function of the surface is positive inside, so that its gradient points inwards.
@@ -346,7 +346,8 @@ def integrate_by_merson(
         point: start; projected onto the surface.
         direction: direction; projected onto the tangent plane.
         length: length of the geodesic (m).
-        geodesic: filled; its first step is adapted for the next call.
+        geodesic: filled with the geodesic, see `GEODESIC`; its first step is adapted for the next
+            call.
         work: workspace of GEODESIC_WORK_SIZE numbers.
 
     Returns:
@@ -426,7 +427,7 @@ def integrate_by_extrapolation(
         point: start; projected onto the surface.
         direction: direction; projected onto the tangent plane.
         length: length of the geodesic (m).
-        geodesic: filled.
+        geodesic: filled with the geodesic, see `GEODESIC`.
         work: workspace of GEODESIC_WORK_SIZE numbers.
 
     Returns:
@@ -469,7 +470,7 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
         work: state y at the start of the step, changed if the step is exact; then workspace.
 
     Returns:
-        Whether it is exact.
+        Whether the step is exact enough.
     """
     y = work
     f = at(work, SIZE)

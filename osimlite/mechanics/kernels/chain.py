@@ -51,7 +51,7 @@ def chain_dynamics(
         data: filled with the mass matrix.
         y: state.
         f: rates of the coordinates, then the generalized forces, from which the bias is subtracted.
-        unused: any number.
+        unused: argument without meaning, which all laws have.
 
     Returns:
         `OUTCOME.OK`, or the outcome of the kernel that obtains the joint forces and the mass matrix
@@ -106,7 +106,7 @@ def subtract_inertia(
 
     Args:
         model: integers of the model.
-        data: results of its evaluation.
+        data: results of an evaluation.
         moment: moment of inertia about every axis (kg m²).
         freedom: last degree of freedom on the path from ground to the link.
         acceleration: angular acceleration of the link while udot = 0 (rad/s²).

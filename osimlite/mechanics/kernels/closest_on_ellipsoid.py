@@ -127,11 +127,11 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
     Args:
         a: half axis along the first coordinate (m).
         b: half axis along the second coordinate (m).
-        u: first coordinate (m).
-        v: second coordinate (m).
+        u: coordinate of the point along the half axis a (m).
+        v: coordinate of the point along the half axis b (m).
 
     Returns:
-        Its two coordinates.
+        Coordinates of the closest point along a and b (m).
     """
     aa, bb = a * a, b * b
     # At the centre the nearest points are the ends of the shorter axis; the sign decides between
@@ -169,7 +169,7 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
     Args:
         radii: half axes.
         start: start of the chord.
-        chord: vector from there to its end.
+        chord: vector from `start` to the end of the chord.
         work: workspace of 5 * LANES numbers.
     """
     a, b, c = radii

@@ -418,13 +418,13 @@ def add_outer_product(
 
     Args:
         size: size of the matrix.
-        factor: the multiple.
+        factor: factor of the outer product.
         a: first vector.
-        first: start of its nonzero entries.
-        end: end of its nonzero entries.
+        first: start of the nonzero entries of a.
+        end: end of the nonzero entries of a.
         b: second vector.
-        start: start of its nonzero entries.
-        stop: end of its nonzero entries.
+        start: start of the nonzero entries of b.
+        stop: end of the nonzero entries of b.
         matrix: matrix (size, size); changed.
     """
     for i in range(first, end):

@@ -45,10 +45,10 @@ def constrained_dynamics(
         data: results with the mass matrix.
         y: state.
         f: rates of the coordinates, then the generalized forces, which the accelerations replace.
-        unused: any number.
+        unused: argument without meaning, which all laws have.
 
     Returns:
-        `OUTCOME.OK`, or SINGULAR_MASS.
+        `OUTCOME.OK`, or `OUTCOME.SINGULAR_MASS`.
     """
     h = at(model, model[MODEL.CONSTRAINED])
     size = model[MODEL.DOFS]

@@ -184,7 +184,7 @@ def add_coordinate(
         y: state.
         f: rates of the coordinates.
         coordinate: integers of the coordinate, see `COORDINATE`.
-        factor: the multiple.
+        factor: factor of the rate.
         row: row of G (n,); changed.
 
     Returns:

@@ -61,9 +61,9 @@ class CRITERION(metaclass=Record):
     """Integers of a criterion.
 
     Attributes:
-        KIND: kind, such as CRITERION_TYPE.GAIT.
+        KIND: type of the criterion, such as `CRITERION_TYPE.GAIT`.
         PLACE: index in the sensor row, or a power.
-        NUMBERS, WORKSPACE: offsets of its numbers and its workspace.
+        NUMBERS, WORKSPACE: offsets of the numbers and of the workspace of the criterion.
     """
 
     KIND, PLACE, NUMBERS, WORKSPACE, SIZE = range(5)
@@ -123,7 +123,7 @@ class JUMP_WORK(metaclass=Record):
         START, HERE, PEAK, PREPARED: height of the mass centre at the start, now, at the highest point,
             and at the start of take-off (m).
         ENDED: whether the jumper has sunk or come down.
-        DOES: phase, such as JUMP_PHASE.PREPARES.
+        DOES: phase of the jump, such as `JUMP_PHASE.PREPARES`.
     """
 
     START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)

@@ -118,7 +118,7 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
         data: workspace of an evaluation.
         y: state.
         f: udot after the rates; replaced by the generalized forces (N, N m).
-        unused: any number.
+        unused: argument without meaning, which all laws have.
 
     Returns:
         `OUTCOME.OK`, or the outcome of a kernel that failed, see `evaluate`.

@@ -269,8 +269,8 @@ def sum_powers(
         n: number of unknowns.
         power: exponent p.
         unit: scale of the unknowns.
-        x: start (n,).
-        end: end (n,).
+        x: start of the way (n,).
+        end: end of the way (n,).
         step_length: fraction of the way.
     """
     total = 0.0
@@ -399,7 +399,7 @@ def transpose_times(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats
         sizes: sizes of the problem, with the sparsity of A.
         columns: scaled columns of A.
         multipliers: multipliers λ (m,).
-        y: filled (n,).
+        y: filled with Aᵀ λ (n,).
     """
     m = sizes[EFFORT_SIZES.EQUATIONS]
     for j in range(sizes[EFFORT_SIZES.UNKNOWNS]):
@@ -443,7 +443,7 @@ def update_primal(
         numbers: exponent and bounds.
         columns: scaled columns of A, followed by b.
         work: workspace of `solve_weighted_least_squares`, with y.
-        x: filled (n,).
+        x: filled with the unknowns (n,).
         residual: filled with b - A x (m,).
         terms: filled with the sizes of the terms (m,).
 
@@ -505,7 +505,7 @@ def fill_dual_hessian(
         numbers: exponent and bounds.
         columns: scaled columns of A.
         work: workspace of `solve_weighted_least_squares`, with y.
-        matrix: filled (m, m).
+        matrix: lower triangle filled (m, m).
     """
     m, n = sizes[EFFORT_SIZES.EQUATIONS], sizes[EFFORT_SIZES.UNKNOWNS]
     for k in range(m * m):

@@ -218,7 +218,7 @@ def find_pair(surfaces: Ints, pairs: int, first_surface: int, second_surface: in
 def is_separating(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, pair_item: int
 ) -> bool:
-    """Compute one contact, and tell whether it touches without a force.
+    """Compute one contact, and return whether it touches without a force.
 
     Args:
         model: integers of the model.

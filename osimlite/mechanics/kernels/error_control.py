@@ -86,7 +86,8 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
 
     Args:
         h: step just tried (s).
-        error: norm of its estimated error; infinite or not a number after a failed evaluation.
+        error: norm of the estimated error of this step; infinite or not a number after a failed
+            evaluation.
         accuracy: accepted error norm.
         cut: whether the step was shortened by a limit, so that it cannot justify a longer one.
         order: order of the error.
@@ -118,7 +119,7 @@ def judge_step(h: Floats, t1: float, error: float, order: float) -> None:
     Args:
         h: record of the method.
         t1: time at the end of the step (s).
-        error: norm of its error.
+        error: norm of the error of the step.
         order: order of the error.
     """
     limit = h[METHOD_WORK.LAST_TIME]

@@ -314,11 +314,11 @@ def add_reflex(data: Floats, offset: int, gain: float, rate: float) -> float:
     Args:
         data: results with the controls.
         offset: offset of the control in data.
-        gain: gain (s/m).
+        gain: gain of the reflex (s/m).
         rate: lengthening speed v of the muscle (m/s).
 
     Returns:
-        The control.
+        Control with the reflex.
     """
     total: float = data[offset] + gain * max(rate, 0.0)
     data[offset] = total

@@ -136,7 +136,7 @@ def lay_chain(
         work: workspace of a search.
 
     Returns:
-        Whether it touches.
+        Whether the chain touches the surface.
     """
     first = point_in_surface(pose, line_start(chain, k))
     second = point_in_surface(pose, line_end(chain, k, count))

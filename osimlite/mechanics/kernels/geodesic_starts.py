@@ -68,7 +68,7 @@ point where it meets the surface; its direction there; and its length on the sur
 
 
 class BENDING(metaclass=Record):
-    """How a surface bends a segment."""
+    """Ways in which a surface bends a segment."""
 
     NOT = 0.0
     """A surface does not bend the segment."""
@@ -134,7 +134,7 @@ def start_on_cylinder(
 
     Args:
         radius: radius of the cylinder (m).
-        half_length: half its length (m).
+        half_length: half the length of the cylinder (m).
         first: start of the segment.
         second: end of the segment.
         side_out: direction of the active side, zeros for the complete surface.
@@ -224,9 +224,9 @@ def turns_left(
 
     Args:
         first_angle: angle of the first end from the middle of the active side (rad).
-        first_tangent_angle: angle from there to its tangents (rad).
+        first_tangent_angle: angle from the first end to its tangents (rad).
         second_angle: angle of the second end (rad).
-        second_tangent_angle: angle from there to its tangents (rad).
+        second_tangent_angle: angle from the second end to its tangents (rad).
         sweep: angle from end to end to the left, not negative (rad).
     """
     left1 = cos(first_angle + first_tangent_angle) >= 0.0

@@ -125,8 +125,8 @@ class LINK(metaclass=Record):
 
     Attributes:
         PARENT: number of the parent link, -1 for ground.
-        FIRST_OPERATION, END_OPERATION: range of its operations.
-        FIRST_DOF, END_DOF: range of its degrees of freedom.
+        FIRST_OPERATION, END_OPERATION: range of the operations of the link.
+        FIRST_DOF, END_DOF: range of the degrees of freedom of the link.
     """
 
     PARENT, FIRST_OPERATION, END_OPERATION, FIRST_DOF, END_DOF, SIZE = range(6)
@@ -137,8 +137,8 @@ class OPERATION(metaclass=Record):
 
     Attributes:
         MOTION: type of the motion, see `MOTION`.
-        BEFORE: type of the fixed transform before it, see `TRANSFORM`.
-        DOF: degree of freedom that is its amount, or -1.
+        BEFORE: type of the fixed transform before the motion, see `TRANSFORM`.
+        DOF: degree of freedom that is the amount of the motion, or -1.
         FUNCTION: number of the law that gives the amount or the motion of a ball; or ALONE, TOGETHER.
         ARGUMENTS, ARGUMENT_COUNT: offset in the model and number of the arguments of that law, which
             are degrees of freedom or -1 for a constant one.
@@ -158,8 +158,8 @@ class DOF(metaclass=Record):
 
     Attributes:
         ABOVE: next degree of freedom on the path to ground, or -1.
-        ROW: offset in data of its row of the mass matrix.
-        DEPTH: number of degrees of freedom above it.
+        ROW: offset in data of the row of the degree of freedom in the mass matrix.
+        DEPTH: number of degrees of freedom on the path to ground above this one.
     """
 
     ABOVE, ROW, DEPTH, SIZE = range(4)
@@ -169,9 +169,9 @@ class ITEM(metaclass=Record):
     """Integers of an item, or of the controls.
 
     Attributes:
-        LAW: address of its kernel.
-        NUMBERS, RECORD: offsets of its parameters in reals and of its results in data.
-        FIRST_CONTACT: number of the first contact of its element.
+        LAW: address of the kernel of the item.
+        NUMBERS, RECORD: offsets of the item's parameters in reals and of its results in data.
+        FIRST_CONTACT: number of the first contact of the force element.
         OWN: offset of further integers that depend on the kernel.
     """
 
@@ -182,7 +182,7 @@ class EQUILIBRIUM(metaclass=Record):
     """Integers of an item that can be brought into equilibrium.
 
     Attributes:
-        KERNEL: address of the kernel that does it.
+        KERNEL: address of the kernel that sets the item's states to equilibrium.
         ITEM: offset of the item.
     """
 
@@ -193,10 +193,11 @@ class RESPONSE(metaclass=Record):
     """Integers of a force along one displacement.
 
     Attributes:
-        KERNEL: address of the kernel that computes its derivatives.
-        ITEM: offset of its item.
-        FIRST_STATE, STATES: offset among the item's integers of the indices of its states, and their number.
-        SENSE: -1 if it pulls against the displacement, else 1.
+        KERNEL: address of the kernel that computes the derivatives of the force.
+        ITEM: offset of the item of the force.
+        FIRST_STATE, STATES: offset among the item's integers of the indices of the force's states,
+            and number of these states.
+        SENSE: -1 if the force pulls against the displacement, else 1.
     """
 
     KERNEL, ITEM, FIRST_STATE, STATES, SENSE, SIZE = range(6)
@@ -206,7 +207,8 @@ class RUN(metaclass=Record):
     """Integers of a run of consecutive items.
 
     Attributes:
-        LAW: address of the kernel that computes all of them at once, 0 if each has its own.
+        LAW: address of the kernel that computes all items of the run at once, 0 if each has its own
+            kernel.
         FIRST, END: range of the items.
         WORKSPACE: offset in data of workspace for curves, see `batched_curves`.
     """
@@ -265,9 +267,9 @@ class CONSTRAINT(metaclass=Record):
     """Integers of a constraint.
 
     Attributes:
-        LAW, NUMBERS: number of its law, and offset of its parameters in reals.
-        FIRST_EQUATION, END_EQUATION: range of its equations.
-        END_POSITION: end of those that constrain positions.
+        LAW, NUMBERS: number of the constraint's law, and offset of its parameters in reals.
+        FIRST_EQUATION, END_EQUATION: range of the constraint's equations.
+        END_POSITION: end of the equations that constrain positions.
         OWN: offset of further integers that depend on the law.
     """
 
@@ -354,7 +356,7 @@ class PRODUCT(metaclass=Record):
 
     Attributes:
         ONE, TWO: numbers of the shares.
-        ENTRY: entry of the other program's mass matrix that they multiply.
+        ENTRY: entry of the other program's mass matrix by which the product is multiplied.
         PLACE: offset in data of the entry of the mass matrix that the product is added to.
     """
 
@@ -366,7 +368,7 @@ class EXCESS(metaclass=Record):
 
     Attributes:
         LINK: number of the link.
-        DOF: last degree of freedom on the path to it.
+        DOF: last degree of freedom on the path to the link.
         NUMBER: offset in reals of the excess moment of inertia (kg m²).
     """
 
@@ -374,7 +376,7 @@ class EXCESS(metaclass=Record):
 
 
 class JOINT_KIND(metaclass=Record):
-    """What a joint of another program follows.
+    """Sources that a joint of another program can follow.
 
     Attributes:
         LINE: a multiple of a degree of freedom.
@@ -439,8 +441,8 @@ class LINK_WORK(metaclass=Record):
 
     Attributes:
         ROTATION: rotation in ground by rows.
-        POSITION: position of its origin (m).
-        ORIGIN: point of ground that its spatial vectors are taken about (m).
+        POSITION: position of the link's origin (m).
+        ORIGIN: point of ground about which the link's spatial vectors are taken (m).
         VELOCITY: spatial velocity.
         ACCELERATION: spatial acceleration while udot = 0, relative to free fall.
         INERTIA: mass, first moment, xx, yy, zz, xy, xz, yz; of its subtree after the evaluation.

@@ -59,7 +59,7 @@ def factorise_by_law(model: Ints, data: Floats, count: int, a: Floats, smallest:
         smallest: relative threshold of independence.
 
     Returns:
-        The rank.
+        Rank of the equations.
     """
     data[WORK.SCRATCH] = smallest
     return call(
@@ -81,7 +81,7 @@ def solve_by_law(
     Args:
         model: integers of the model.
         count: number of equations.
-        a: factor.
+        a: factor from `factorise_by_law`.
         values: right sides (count,).
         work: workspace (count,).
         reals: filled with the shortest solution (n,).
@@ -106,7 +106,7 @@ def factorise_law(
         model: integers of the model.
         reals: not used.
         data: results; SCRATCH holds the threshold of independence.
-        y: not used.
+        y: workspace, not used here.
         f: left sides, replaced by the factor.
         count: number of equations.
 
@@ -128,12 +128,12 @@ def minimum_norm_law(
         model: integers of the model.
         reals: right sides (count,).
         data: workspace (count,).
-        y: factor.
+        y: factor from `factorise_law`.
         f: filled with the shortest solution (n,).
         count: number of equations.
 
     Returns:
-        The rank.
+        Rank of the equations.
     """
     size = model[MODEL.DOFS]
     rank = int(y[factor_size(count, size) - 1])
@@ -210,7 +210,7 @@ def make_reflection(first: int, end: int, stride: int, length: float, v: Floats)
     Args:
         first: index of the entry.
         end: end of the vector.
-        stride: distance between its entries.
+        stride: distance between the entries of the vector.
         length: norm of the vector from the entry on.
         v: vector, replaced by the Householder vector of norm sqrt(2).
 
@@ -236,7 +236,7 @@ def apply_reflection(
 
     Args:
         first: index of the first entry of both.
-        end: end of both.
+        end: end of the entries of both vectors.
         stride: distance between the entries of v.
         v: Householder vector of norm sqrt(2).
         x_stride: distance between the entries of x.
@@ -257,7 +257,7 @@ def solve_minimum_norm(
     Args:
         count: number of equations.
         size: number of unknowns.
-        a: factor.
+        a: factor from `factorise_equations`.
         rank: number of independent equations.
         values: right sides (count,).
         work: workspace (count,).
@@ -294,7 +294,7 @@ def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
 
     Args:
         size: number of unknowns.
-        a: factor.
+        a: factor from `factorise_equations`.
         rank: number of independent equations.
         x: rotated unknowns (size,), replaced by the unknowns.
     """
@@ -307,7 +307,7 @@ def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
 
     Args:
         size: number of unknowns.
-        a: factor.
+        a: factor from `factorise_equations`.
         rank: number of independent equations.
         basis: filled with the vectors of the basis, one after the other.
     """
@@ -355,7 +355,7 @@ def solve_cholesky(size: int, a: Floats, x: Floats) -> None:
 
     Args:
         size: size of the matrix.
-        a: factor.
+        a: factor from `factorise_cholesky`.
         x: right side (size,), replaced by the solution.
     """
     for i in range(size):
@@ -472,7 +472,7 @@ def solve_factorised(size: int, a: Floats, x: Floats) -> None:
 
     Args:
         size: size of the matrix.
-        a: factors.
+        a: factors from `factorise_matrix`.
         x: right side (size,), replaced by the solution.
     """
     for i in range(size):

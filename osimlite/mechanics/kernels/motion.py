@@ -143,7 +143,7 @@ def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
     Args:
         rows: filled with the rotation (9,) and the position (3,).
         axes: axes of the frame, the columns of the rotation.
-        origin: position of its origin (m).
+        origin: position of the frame's origin (m).
     """
     x_axis, y_axis, z_axis = axes
     rows[0], rows[3], rows[6] = x_axis
@@ -259,7 +259,7 @@ def set_spatial_vector(row: Floats, turn: Vector, shift: Vector) -> None:
     """Store a spatial vector, angular part first.
 
     Args:
-        row: filled (6,).
+        row: filled with the spatial vector (6,).
         turn: angular part.
         shift: linear part.
     """
@@ -272,7 +272,7 @@ def add_spatial_vector(row: Floats, factor: float, turn: Vector, shift: Vector) 
 
     Args:
         row: spatial vector (6,); changed.
-        factor: the multiple.
+        factor: factor of the added vector.
         turn: angular part.
         shift: linear part.
     """

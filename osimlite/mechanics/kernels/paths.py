@@ -268,7 +268,7 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
         item: offset of the item in the model.
 
     Returns:
-        The length.
+        Length of the path (m).
     """
     i = at(model, item)
     result = at(data, model[item + ITEM.RECORD])
@@ -406,7 +406,7 @@ def pull_each(
         reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
-        f: workspace of its derivative.
+        f: workspace for the rates of a state.
         count: number of states.
         states: states (count, y).
         forces: filled with the moment arms (count, items, n).

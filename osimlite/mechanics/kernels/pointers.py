@@ -1,7 +1,8 @@
 """Vectors of kernels: views, calls of laws by address, and plain operations on states.
 
-`at` and `call` exist in machine code but not in Python; here is what they mean in Python.
-:mod:`osimlite.simulation.engines.compiler` replaces these two by instructions.
+`at` and `call` exist in machine code but not in Python; here is what they mean in Python. The
+writers in :mod:`osimlite.mechanics.codegen` and :mod:`osimlite.simulation.engines.numba_laws`
+replace these two by operations on pointers.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def at(vector: Vector, place: int) -> Vector:
     """Return the vector from an offset on, as a view.
 
     Args:
-        vector: vector.
+        vector: array of numbers.
         place: offset of the first entry of the view.
     """
     return vector[place:]
@@ -78,8 +79,8 @@ def copy_numbers(count: int, values: Floats, to: Floats) -> None:
 
     Args:
         count: number of entries.
-        values: source.
-        to: destination; changed.
+        values: vector to copy from.
+        to: vector to copy to; changed.
     """
     for k in range(count):
         to[k] = values[k]

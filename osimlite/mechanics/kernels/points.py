@@ -88,7 +88,7 @@ def unit_twist(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
 
 
 def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
-    """Return the position in ground of a point that is given in a link (m).
+    """Return the position in ground of a point that is fixed in a link (m).
 
     Args:
         model: integers of the model.
@@ -109,7 +109,7 @@ def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
 
 
 def direction(model: Ints, data: Floats, link: int, local_direction: Vector) -> Vector:
-    """Return a direction that is given in a link, along the axes of ground.
+    """Return a direction that is fixed in a link, along the axes of ground.
 
     Args:
         model: integers of the model.
@@ -127,7 +127,7 @@ def place_frame(
 
     Args:
         model: integers of the model.
-        data: results of its evaluation.
+        data: results of an evaluation.
         link: number of the link.
         rows: rotation of the frame in the link, by rows.
         point: origin of the frame in the link (m).

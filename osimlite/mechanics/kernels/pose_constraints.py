@@ -32,11 +32,11 @@ def fulfil_constraints(m: Fit, y: Floats) -> bool:
     """Move a pose into the ranges, to prescribed values, and onto couplers and equations.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state; its coordinates are changed.
 
     Returns:
-        Success.
+        Whether the pose fulfils all equations afterwards.
     """
     p = m.p
     c = m.c
@@ -58,7 +58,7 @@ def set_dependents(m: Fit, y: Floats) -> None:
     """Set all dependent coordinates by their couplers, in the order of the couplers.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state; its coordinates are changed.
     """
     p = m.p
@@ -74,11 +74,11 @@ def restore_equations(m: Fit, y: Floats) -> bool:
     """Move a pose onto the equations by minimum-norm Newton steps of the free coordinates.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state; its coordinates are changed.
 
     Returns:
-        Success.
+        Whether the pose fulfils the equations afterwards.
     """
     p = m.p
     v = m.v
@@ -133,7 +133,7 @@ def compute_curvature(m: Fit, y: Floats) -> None:
     The derivatives of the cost must be known, and are lost.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the pose.
     """
     p = m.p

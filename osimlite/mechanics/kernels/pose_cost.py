@@ -45,7 +45,7 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     Compute its gradient and both parts of its Hessian by all free coordinates.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the pose; speeds are set to 1.
 
     Returns:
@@ -93,7 +93,7 @@ def evaluate_pose(m: Fit, y: Floats) -> None:
     """Evaluate a pose: links, columns of the coordinates, and equations.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state; its speeds are set to 1.
     """
     model = m.model
@@ -183,7 +183,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
     """Compute gradient and Hessian by the degrees of freedom, inwards from the leaves.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the pose.
     """
     model = m.model
@@ -236,7 +236,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
     """Convert the derivatives and the equations to those by the independent coordinates.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the pose.
     """
     p = m.p
@@ -289,7 +289,7 @@ def evaluate_coupler(
     """Evaluate a coordinate that depends on others, and fill the derivatives by these.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         i: integers of the coupler.
         y: state.
         gradient: filled with the derivatives by the arguments.

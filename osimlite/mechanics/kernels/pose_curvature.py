@@ -53,7 +53,7 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floa
     """Add to the Hessian the contribution of the axes of one joint.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         link: link of the joint.
         load: sum of moments and forces on the subtree of the link.
@@ -80,7 +80,7 @@ def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
     """Add to the Hessian the second derivative of the function of one axis.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         number: number of the axis.
         pull: generalized force of the springs along the axis.
@@ -116,7 +116,7 @@ def axis_ints(m: Fit, number: int) -> Ints:
     """Return the operation of an axis, and its part of a ball.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         number: number of the axis.
     """
     return at(m.p, m.p[FIT.AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
@@ -126,7 +126,7 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     """Return the twist per unit amount of one axis of a link.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         link: link whose origin of spatial vectors is used.
         number: number of the axis.
@@ -164,11 +164,11 @@ def add_axis_product(m: Fit, y: Floats, first_axis: int, second_axis: int, amoun
     """Add to the Hessian a multiple of the product of two axes' derivatives by all coordinates.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         first_axis: number of the first axis.
         second_axis: number of the second axis.
-        amount: the multiple.
+        amount: factor of the product.
     """
     size = m.model[MODEL.DOFS]
     bend = at(m.v, m.p[FIT.BEND])
@@ -186,7 +186,7 @@ def count_arguments(m: Fit, number: int) -> int:
     """Return the number of coordinates that an axis depends on.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         number: number of the axis.
     """
     model = m.model
@@ -201,7 +201,7 @@ def axis_argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     """Return a coordinate that an axis depends on, and the derivative of its amount by it.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         number: number of the axis.
         k: number of the coordinate among those of the axis.

@@ -130,7 +130,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     """Move a pose to the best fit of a frame.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state; changed.
 
     Returns:
@@ -244,7 +244,7 @@ def update_measured_pattern(m: Fit, y: Floats) -> None:
     coordinate is idle if it moves nothing that is measured.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of a pose.
     """
     p = m.p
@@ -342,7 +342,7 @@ def compute_weights(m: Fit) -> bool:
     """Compute the weights of this frame, normalized over the measured markers and sensors.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
 
     Returns:
         Whether anything is measured.
@@ -393,9 +393,9 @@ def descend_to_minimum(
     """Descend from a pose whose cost and derivatives are known to the best one nearby.
 
     Args:
-        m: the fit.
-        start: start; changed.
-        y: filled with the pose; marks remain of coordinates at ends of their ranges.
+        m: inputs and workspace of the fit.
+        start: pose to start from (n,), whose cost and derivatives are known; changed.
+        y: filled with the best pose (n,); coordinates at ends of their ranges stay marked.
         value: cost of the start.
         damping: damping of the first step.
         lightest: smallest damping.

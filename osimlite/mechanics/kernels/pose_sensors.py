@@ -99,7 +99,7 @@ def sensor_rotation(m: Fit, sensor: int) -> Vector:
     """Return the rotation vector from the measured orientation of a sensor to its present one.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         sensor: number of the sensor.
 
     Returns:

@@ -27,9 +27,9 @@ def start_away_from_ends(m: Fit, from_pose: Floats, start: Floats, inwards: floa
     """Write a start in which no coordinate with a range is near an end of it.
 
     Args:
-        m: the fit.
-        from_pose: pose (n,).
-        start: filled (n,).
+        m: inputs and workspace of the fit.
+        from_pose: pose from which the start is made (n,).
+        start: filled with the start (n,).
         inwards: distance from the ends, at most half of the range (rad or m).
     """
     ranges = at(m.c, m.p[FIT.RANGES_AT])
@@ -49,9 +49,9 @@ def start_turned_subtree(
     Subjects walk in both directions, and a descent from half a turn away may end elsewhere.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         from_pose: pose to start from.
-        start: filled.
+        start: filled with the start (n,).
         freedom: degree of freedom of the turn.
         angle: angle of the turn (rad).
 
@@ -82,7 +82,7 @@ def joint_to_ground(m: Fit, freedom: int) -> int:
     """Return the link whose joint to ground has a degree of freedom, or -1.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         freedom: degree of freedom.
     """
     model, result = m.model, -1
@@ -97,7 +97,7 @@ def is_angle(m: Fit, freedom: int) -> bool:
     """Return whether a free degree of freedom turns anything in the pose that was evaluated last.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         freedom: degree of freedom.
     """
     # The first half of the column is the angular velocity of the bodies per unit speed; it is 0 for
@@ -111,7 +111,7 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
     """Return whether a coordinate is at exactly one end of a finite range.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         freedom: degree of freedom.
     """
@@ -131,9 +131,9 @@ def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     their ranges omit little.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the best pose so far.
-        start: filled (n,).
+        start: filled with the start (n,).
         freedom: degree of freedom.
 
     Returns:
@@ -161,9 +161,9 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     motion head over heels: the second angle goes back from there.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the best pose so far.
-        start: filled (n,).
+        start: filled with the start (n,).
         freedom: degree of freedom of the second angle.
 
     Returns:
@@ -191,12 +191,12 @@ def start_inside_ranges(m: Fit, y: Floats, start: Floats) -> bool:
     """Write a start in which coordinates at ends of their ranges are inside.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the best pose so far.
-        start: filled (n,).
+        start: filled with the start (n,).
 
     Returns:
-        Whether there are any.
+        Whether there are such coordinates.
     """
     ranges = at(m.c, m.p[FIT.RANGES_AT])
     result = False
@@ -213,10 +213,10 @@ def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: fl
     """Write a pose without the full turns that were made from the first one, if it costs no more.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state of the best pose.
         first: pose that the search started from (n,).
-        start: filled (n,).
+        start: filled with the pose (n,).
         value: cost of the best pose.
 
     Returns:

@@ -32,7 +32,7 @@ def list_free_coordinates(m: Fit) -> int:
         m: the fit; its list of free coordinates is filled.
 
     Returns:
-        Their number.
+        Number of these coordinates.
     """
     p, count = m.p, 0
     for k in range(m.model[MODEL.DOFS]):
@@ -46,7 +46,7 @@ def gather_free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Flo
     """Return the equations for the free coordinates.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         free: number of free coordinates.
         has_step: 1 if the steps of coordinates at ends of ranges are subtracted, else 0.
 
@@ -109,7 +109,7 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     """Compute the step of all coordinates to the minimum of the model within the ranges.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         y: state.
         damping: damping of the step.
         bends: whether the model includes the part of the Hessian beyond Gauss-Newton.
@@ -156,7 +156,7 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
     """Compute the step of the free coordinates, after that of the coordinates at ends of ranges.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         free: number of free coordinates.
         damping: damping of the step.
         bent: factor of the part of the Hessian beyond Gauss-Newton.
@@ -209,7 +209,7 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     """Compute the step of the free coordinates in the null space of the equations.
 
     Args:
-        m: the fit.
+        m: inputs and workspace of the fit.
         free: number of free coordinates.
         offset: offset of the right side and the matrix in the workspace.
         smallest: smallest pivot relative to the stiffness.

@@ -30,7 +30,7 @@ def evaluate_states(
         reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
-        f: workspace of its derivative.
+        f: workspace for the rates of a state.
         stage: stage of each evaluation, see `STAGE`.
         states: time, state, and accelerations if there are any, one after another.
         order: numbers of states and of accelerations per state, address of the law, number of results,
@@ -83,13 +83,14 @@ def push_each_actuator(
         reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
-        f: workspace of its derivative.
+        f: workspace for the rates of a state.
         law: address of `dynamics.inverse`.
         states: time, state and accelerations, one after another.
-        order: numbers of states and of actuators; per actuator its item, the index of its control, the
-            item of its path and the index of its tension per unit control, both -1 without a path.
-        results: filled per state with the missing generalized forces (n,), and per actuator with the
-            generalized forces for a control of 1 (n,) and the tension.
+        order: numbers of states and of actuators; then for each actuator its item, the index of its
+            control, the item of its path and the index of its tension per unit control, both -1
+            without a path.
+        results: filled with the missing generalized forces (n,), then the generalized forces for a
+            control of 1 (n,) and the tension of each actuator, for each state.
 
     Returns:
         `OUTCOME.OK`, or the outcome of the evaluation that failed.
@@ -163,11 +164,11 @@ def evaluate_items(
         reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
-        f: workspace of its derivative.
+        f: workspace for the rates of a state.
         count: number of states.
         states: states, one after another.
         order: number of results, number of entries of data to clear before each state, the indices of
-            both; then per state the number of the item to evaluate, -1 for all.
+            both; then for each state the number of the item to evaluate, -1 for all.
         results: filled with the results, state by state; NaN for a state that fails.
 
     Returns:

@@ -262,10 +262,10 @@ def collect_position_errors(model: Ints, data: Floats, errors: Floats) -> float:
     Args:
         model: integers of the model.
         data: results with the equations.
-        errors: filled (p,).
+        errors: filled with the errors (p,).
 
     Returns:
-        Their root mean square; locks count as equations without error, as in Simbody.
+        Root mean square of the errors; locks count as equations without error, as in Simbody.
     """
     h = at(model, model[MODEL.CONSTRAINED])
     count = 0
@@ -288,10 +288,10 @@ def compute_speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -
         model: integers of the model.
         data: results with the equations.
         u: generalized speeds (n,).
-        errors: filled (m,).
+        errors: filled with the errors (m,).
 
     Returns:
-        Their root mean square; locks count as equations without error, as in Simbody.
+        Root mean square of the errors; locks count as equations without error, as in Simbody.
     """
     h = at(model, model[MODEL.CONSTRAINED])
     size = model[MODEL.DOFS]
@@ -313,7 +313,7 @@ def write_position_jacobian(model: Ints, data: Floats, y: Floats, rows: Floats) 
         model: integers of the model.
         data: results with the equations.
         y: state.
-        rows: filled (p, n).
+        rows: filled with the derivatives (p, n).
     """
     h = at(model, model[MODEL.CONSTRAINED])
     size = model[MODEL.DOFS]

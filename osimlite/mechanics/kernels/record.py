@@ -20,7 +20,7 @@ from osimlite.mechanics.laws.vectors import dot, vector
 
 
 class ENDING(metaclass=Record):
-    """How a run ended."""
+    """Reasons why a run ended."""
 
     DONE = 0
     """Run that reached its last time."""
@@ -108,7 +108,7 @@ class Motion(NamedTuple):
     """
 
     model: Ints  # the mechanism
-    reals: Floats  # its numbers
+    reals: Floats  # numbers of the mechanism
     data: (
         Floats  # results and workspace; the record of the integration method at RUN_SIZES.METHOD_AT
     )
@@ -226,9 +226,10 @@ def compute_levels(m: Motion, y: Floats, levels: Floats) -> None:
     """Compute the levels of contacts and watches, whose changes of sign are events.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         y: state that was evaluated.
-        levels: filled; per contact 1 if it transmits a force, else -1; per watch the value above its level.
+        levels: filled with 1 for each contact that transmits a force, else -1, then with the value
+            above its level for each watch.
     """
     pairs = m.model[MODEL.CONTACTS]
     for pair in range(pairs):
@@ -328,7 +329,7 @@ def insert_event(m: Motion, first: int, t: float, number: int, rises: bool) -> i
     row is long enough.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         first: first event of the step.
         t: time of the event (s).
         number: number of the contact, or number of contacts plus that of the watch.

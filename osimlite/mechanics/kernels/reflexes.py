@@ -103,7 +103,7 @@ class TERM(metaclass=Record):
 
     Attributes:
         TARGET: control that the term is added to.
-        SENSOR: number of its sensor, -1 for none.
+        SENSOR: index of the sensor of the term, -1 for none.
         KIND: FREE, OF_SENSOR or OF_RESULT of `TERM_TYPE`; without a sensor the power of time.
         LEG, STATES: leg whose states decide, and these states as bits.
         GATE: number of the gate that may suppress the term, or -1.

@@ -129,7 +129,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     """Integrate from the state y, which is changed, until a condition ends the run.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         y: state at the start, then at the end.
         is_going: whether the derivative at the end of the previous run is that at the start.
 
@@ -243,10 +243,10 @@ def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     evaluation.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         t1: time at the end of the step (s).
         y1: state at the end.
-        f1: filled with its derivative.
+        f1: filled with the rates of y1.
 
     Returns:
         Whether the derivative is finite.
@@ -266,7 +266,7 @@ def take_step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
     """Find a step whose error is accepted.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         t0: time at the start (s).
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.

@@ -95,7 +95,7 @@ class SOURCE(metaclass=Record):
     """Integers of a source.
 
     Attributes:
-        KIND: kind, such as SOURCE_TYPE.IN_ROW.
+        KIND: type of the source, such as `SOURCE_TYPE.IN_ROW`.
         PLACE: index in the row, or number of a link.
         MORE: second index in the row, or offset of the numbers: point and direction; axes of a frame
             and factors of the angles; or an axis.
@@ -151,7 +151,7 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         y: state.
         i: plan of the row.
         p: numbers of the row.
-        row: filled.
+        row: filled with the measurements.
     """
     muscles, freedoms, bodies = i[SENSES.MUSCLES], i[SENSES.COORDINATES], i[SENSES.BODIES]
     muscle_ints, optimal = at(i, SENSES.HEAD), at(p, SENSOR_NUMBERS.HEAD)
@@ -215,7 +215,7 @@ def foot_position(i: Ints, row: Floats, leg: int) -> float:
 
 
 def foot_lead(i: Ints, row: Floats, leg: int) -> float:
-    """Return how far the foot of a leg is ahead of the pelvis along x of ground (m).
+    """Return the distance of the foot of a leg ahead of the pelvis along x of ground (m).
 
     Args:
         i: plan of the sensor row.

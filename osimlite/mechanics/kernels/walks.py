@@ -27,10 +27,10 @@ from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, fill_sens
 
 
 class ORDER(metaclass=Record):
-    """What `walk_several` does in place of a number of control steps."""
+    """Orders for `walk_several` other than a number of control steps."""
 
     FEEL = -1
-    """Order to fill the sensor rows only, in place of a number of control steps."""
+    """Order to fill the sensor rows only."""
     BEGIN = -2
     """Order to fill the sensor rows, and to start reflexes and excitations."""
     START = -3
@@ -166,12 +166,12 @@ def integrate_control_step(m: Motion, y: Floats, has_derivative: bool) -> bool:
     """Integrate a state over one control step, as a run of its own.
 
     Args:
-        m: the run.
+        m: inputs and records of the run.
         y: state; changed.
         has_derivative: whether the derivative at the end of the previous step is that at the start.
 
     Returns:
-        Whether it reaches the end.
+        Whether the state reaches the end of the control step.
     """
     # Every control step starts at time 0, so that times have the same digits in all steps.
     m.clock[0] = 0.0
@@ -275,7 +275,7 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
     """Fill the sensor row of a state, and start reflexes or criteria.
 
     Args:
-        a: the walk.
+        a: inputs and records of the walk.
         y: state.
         order: FEEL, BEGIN or START of `ORDER`.
 
@@ -315,7 +315,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
     the previous excitations.
 
     Args:
-        a: the walk.
+        a: inputs and records of the walk.
         y: state; changed.
         steps: largest number of control steps.
         is_recorded: whether each step is recorded.
@@ -527,7 +527,7 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
     A control step also begins at the very end of the run.
 
     Args:
-        a: the walk; criteria are not used.
+        a: inputs and records of the walk; criteria are not used.
         y: state; changed.
 
     Returns:
@@ -562,7 +562,7 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     the method would try next.
 
     Args:
-        a: the walk.
+        a: inputs and records of the walk.
         y: state.
 
     Returns:

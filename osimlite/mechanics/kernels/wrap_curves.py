@@ -259,11 +259,11 @@ def distance_to_sphere(start: Vector, ray: Vector) -> float:
     """Return the multiple of a direction that leads from a point to the unit sphere.
 
     Args:
-        start: point.
-        ray: direction.
+        start: point from which the direction leads.
+        ray: direction, of any length.
 
     Returns:
-        The multiple, NaN if the line misses the sphere.
+        Multiple of `ray`; NaN if the line misses the sphere.
     """
     square, half = dot(ray, ray), dot(start, ray)
     inner = half * half - square * (dot(start, start) - 1.0)

@@ -245,8 +245,8 @@ def apex_between(first: Vector, second: Vector, radius: float, on_far_side: bool
     cuts the cylinder; on the far side of the axis if `on_far_side`.
 
     Args:
-        first: first end.
-        second: second end.
+        first: first end of the segment (m).
+        second: second end of the segment (m).
         radius: radius of the cylinder (m).
         on_far_side: whether the apex is on the far side of the axis.
     """
@@ -311,10 +311,10 @@ def smooth_heights(
     of convergence.
 
     Args:
-        first: first end.
-        second: second end.
-        first_tangent: first tangent point.
-        second_tangent: second tangent point.
+        first: first end of the segment (m).
+        second: second end of the segment (m).
+        first_tangent: tangent point of the first end (m).
+        second_tangent: tangent point of the second end (m).
         arc: length of the arc, seen along the axis (m).
         turn: angle of the arc (rad).
 

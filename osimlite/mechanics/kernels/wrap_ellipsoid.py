@@ -170,8 +170,8 @@ def ellipsoid_height(radii: Vector, point: Vector) -> float:
     """Return (x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside.
 
     Args:
-        radii: half axes.
-        point: point.
+        radii: half axes of the ellipsoid.
+        point: point in the frame of the ellipsoid.
     """
     x, y, z = point
     a, b, c = radii
@@ -215,8 +215,8 @@ def support_point(
     Args:
         method: HYBRID, MIDPOINT or AXIAL of `ELLIPSOID_METHOD`.
         radii: half axes.
-        start: point where the chord enters.
-        chord: vector to the point where it leaves.
+        start: point where the chord enters the ellipsoid.
+        chord: vector from `start` to the point where the chord leaves the ellipsoid.
         ray: vector between the ends of the segment.
         work: workspace of the fan.
 
@@ -274,7 +274,7 @@ def tangent_point(
         start: start of the search.
         end: end of the segment.
         normal: unit normal of the plane.
-        offset: offset of the plane along it.
+        offset: offset of the plane along its normal.
     """
     weights = invert_components(multiply_elementwise(radii, radii))
     by_end = times(2.0, multiply_elementwise(weights, end))
@@ -335,12 +335,12 @@ def tangent_residuals(
         weights: reciprocal squares of the half axes.
         by_end: gradient of the fourth equation.
         normal: unit normal of the plane.
-        offset: offset of the plane along it.
-        r: point.
+        offset: offset of the plane along its normal.
+        r: point of the surface.
         d: offset of the tangent plane.
 
     Returns:
-        Four residuals.
+        Residuals of the four equations.
     """
     square = dot(multiply_elementwise(weights, r), r)
     return dot(normal, r) - offset, square - 1.0, 2.0 * square + d, dot(by_end, r) + d
@@ -406,11 +406,11 @@ def measure_polyline(
 
     Args:
         radii: half axes.
-        first_tangent: first point.
-        second_tangent: last point.
+        first_tangent: first point of the polyline.
+        second_tangent: last point of the polyline.
         normal: unit normal n of the plane n . x = offset.
         offset: offset of the plane.
-        pieces: number of segments.
+        pieces: number of segments of the polyline.
         is_long: whether the polyline takes the longer way.
 
     Returns:
@@ -488,7 +488,7 @@ def bends_back(end: Vector, tangent: Vector, next_point: Vector) -> bool:
 
     Args:
         end: end of the segment.
-        tangent: tangent point next to it.
+        tangent: tangent point next to the end.
         next_point: next corner of the path on the surface.
     """
     return dot(minus(end, tangent), minus(next_point, tangent)) > 0.0

@@ -149,7 +149,7 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
 
     Args:
         first: end from which the search starts (m).
-        second: other end (m).
+        second: second end of the line (m).
         ring: radius of the ring (m).
     """
     dx, dy, dz = minus(second, first)

@@ -140,7 +140,7 @@ def find_tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, V
     Args:
         point: point outside of the circle.
         radius: radius of the circle.
-        axis: unit normal of its plane.
+        axis: unit normal of the plane of the circle.
 
     Returns:
         The tangent points to the left and to the right about the axis.
@@ -291,8 +291,8 @@ def pair_on_side(
     """Return the tangent points of both ends on the active side.
 
     Args:
-        first: first end.
-        second: second end.
+        first: first end of the segment (m).
+        second: second end of the segment (m).
         a1: first candidate of the first end.
         b1: second candidate of the first end.
         a2: first candidate of the second end.

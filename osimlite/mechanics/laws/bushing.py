@@ -48,8 +48,8 @@ def xyz_rates(b: float, c: float, wx: float, wy: float, wz: float) -> tuple[floa
         b: second angle (rad).
         c: third angle (rad).
         wx: x component of the angular velocity of M in F, along the axes of M (rad/s).
-        wy: y component.
-        wz: z component.
+        wy: y component of this angular velocity (rad/s).
+        wz: z component of this angular velocity (rad/s).
 
     Returns:
         Rates of a, b and c.
@@ -93,7 +93,7 @@ def bushing_dissipation(v: float, c: float) -> float:
     """Return the power c v^2 that one of the six dampers dissipates (W).
 
     Args:
-        v: rate of its deviation, rad/s (m/s).
+        v: rate of the deviation, rad/s (m/s).
         c: damping, N m/(rad/s) (N/(m/s)).
     """
     return c * v * v

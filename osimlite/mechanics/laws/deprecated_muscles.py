@@ -222,8 +222,8 @@ def thelen_velocity(
         active: isometric force, fully activated.
         velocity_force: force f that depends on the velocity.
         damping: constant c that is added to the denominator.
-        shape: Af.
-        eccentric_limit: Flen.
+        shape: property Af of the muscle.
+        eccentric_limit: property Flen: largest force of lengthening fibers over the isometric one.
     """
     # Without activation the isometric force would be 0 and the curve degenerate.
     isometric = max(activation, 1e-6) * active
@@ -260,7 +260,7 @@ def thelen_shortening(
         velocity_force: force f that depends on the velocity.
         isometric: isometric force at the present activation.
         damping: constant c that is added to the denominator.
-        shape: Af.
+        shape: property Af of the muscle.
     """
     return (velocity_force - isometric) / (isometric + velocity_force / shape + damping)
 
@@ -276,8 +276,8 @@ def thelen_lengthening(
         velocity_force: force f that depends on the velocity.
         isometric: isometric force at the present activation.
         damping: constant c that is added to the denominator.
-        shape: Af.
-        eccentric_limit: Flen, the largest force of lengthening fibers over the isometric one.
+        shape: property Af of the muscle.
+        eccentric_limit: property Flen: largest force of lengthening fibers over the isometric one.
     """
     return (velocity_force - isometric) / (
         (2.0 + 2.0 / shape)

@@ -59,12 +59,12 @@ def umberger2010(
 
     Args:
         activation: activation of the fibers.
-        excitation: excitation.
+        excitation: excitation of the muscle.
         active_force: active fiber force (N).
         fiber_length: fiber length (m).
         fiber_velocity: fiber velocity, negative for shortening (m/s).
         force_length: factor of the active force by length.
-        m: muscle and probe.
+        m: parameters of the muscle and of its probe.
 
     Returns:
         Power of the muscle (W): heat rates and work rate per kg of muscle, times its mass.
@@ -174,13 +174,13 @@ def bhargava2004(
 
     Args:
         activation: activation of the fibers.
-        excitation: excitation.
+        excitation: excitation of the muscle.
         active_force: active fiber force (N).
         passive_force: passive fiber force (N).
         fiber_velocity: fiber velocity, negative for shortening (m/s).
         force_length: factor of the active force by length.
         maintained: factor of the heat of maintenance by length.
-        m: muscle and probe.
+        m: parameters of the muscle and of its probe.
 
     Returns:
         Power of the muscle (W).
@@ -281,13 +281,13 @@ def bhargava2004_smoothed(
 
     Args:
         activation: activation of the fibers.
-        excitation: excitation.
+        excitation: excitation of the muscle.
         active_force: active fiber force (N).
         passive_force: passive fiber force (N).
         fiber_velocity: fiber velocity, negative for shortening (m/s).
         force_length: factor of the active force by length.
         maintained: factor of the heat of maintenance by length.
-        m: muscle and probe.
+        m: parameters of the muscle and of its probe.
         transitions: parameters of the transitions.
 
     Returns:

@@ -263,7 +263,7 @@ def millard2012_acceleration_equilibrium(
         curves: curves of the muscle.
 
     Returns:
-        Whether there is one, the fiber length (m), and its velocity (m/s).
+        Whether there is such a length, the fiber length (m), and the fiber velocity (m/s).
     """
     length, rate = inputs.length, inputs.rate
     # OpenSim starts with a tendon strained by 1 % and at rest. Its tolerance is that of a force,

@@ -279,8 +279,8 @@ def combine_length_curves(
         tendon: value of the tendon force-length curve.
 
     Returns:
-        Velocity or what determines it, factor of the active force by velocity, and the factor by
-        length, passive force and tendon force.
+        Velocity, or the value that determines it, factor of the active force by velocity, factor by
+        length, passive force, and tendon force; all normalized.
     """
     velocity, by_velocity = fibers.velocity, 1.0
     if m.is_rigid or fibers.velocity_source == NONE:
@@ -328,7 +328,7 @@ def combine_velocity_curve(
         missed: residual of the search.
 
     Returns:
-        What determines the velocity, the velocity, and the factor of the active force.
+        Value that determines the velocity, normalized velocity, and factor of the active force.
     """
     if fibers.velocity_source == DAMPED:
         is_found, velocity = check_damped_velocity(
@@ -381,8 +381,8 @@ def compute_muscle_results(
         velocity: normalized fiber velocity.
         by_velocity: factor of the active force by velocity.
         by_length: factor of the active force by length.
-        elastic: passive force.
-        tendon: tendon force.
+        elastic: normalized passive force.
+        tendon: normalized tendon force.
 
     Returns:
         The results of `millard2012_equilibrium`.
@@ -459,13 +459,14 @@ def find_damped_velocity(
         m: parameters of the muscle.
         active: activation.
         by_length: factor of the active force by length.
-        elastic: passive force.
-        tendon: tendon force.
+        elastic: normalized passive force.
+        tendon: normalized tendon force.
         cos: cosine of pennation.
         curves: curves of the muscle.
 
     Returns:
-        Whether there is one, the velocity, and the factor of the active force there.
+        Whether there is such a velocity, the normalized velocity, and the factor of the active
+        force there.
     """
     isometric = active * by_length
     velocity_force = tendon / cos - elastic
@@ -531,7 +532,7 @@ def millard2012_equilibrium_length(
         curves: curves of the muscle.
 
     Returns:
-        Whether there is one, and the fiber length (m).
+        Whether there is such a length, and the fiber length (m).
     """
     length = inputs.length
     active = min(max(inputs.excitation if m.is_excited else inputs.activation, m.least), 1.0)

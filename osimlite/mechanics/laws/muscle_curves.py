@@ -96,10 +96,10 @@ def force_velocity(
 
     Args:
         concentric_end: slope at the maximum shortening velocity.
-        concentric_near: slope near it.
+        concentric_near: slope near the maximum shortening velocity.
         isometric: slope at zero velocity.
         eccentric_end: slope at the maximum lengthening velocity.
-        eccentric_near: slope near it.
+        eccentric_near: slope near the maximum lengthening velocity.
         eccentric_limit: factor at the maximum lengthening velocity.
         concentric_curviness: curviness for shortening.
         eccentric_curviness: curviness for lengthening.
@@ -208,7 +208,7 @@ def tendon_force_length(
 
     Args:
         one: strain at the maximum isometric force.
-        stiffness: stiffness there.
+        stiffness: slope at this strain.
         toe: force at the end of the toe region.
         curviness: curviness.
 

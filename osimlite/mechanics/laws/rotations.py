@@ -27,7 +27,7 @@ def combine_axes(axes: Axes, a: Vector) -> Vector:
 
     Args:
         axes: axes, usually those of a frame in another one.
-        a: components along them.
+        a: components of the vector along the axes.
     """
     x, y, z = a
     x_axis, y_axis, z_axis = axes

@@ -128,7 +128,7 @@ def degroote_passive(length: float, strain: float) -> tuple[float, float]:
         strain: strain at a force of 1.
 
     Returns:
-        Force and integral.
+        Normalized force, and its integral over the normalized length.
     """
     # Without this offset the force of short fibers would stay positive.
     none = exp(PASSIVE_SHAPE * (SHORTEST - 1.0) / strain)
@@ -187,7 +187,7 @@ def degroote(
     Args:
         inputs: inputs of the muscle.
         m: parameters of the muscle.
-        tendon: further parameters.
+        tendon: parameters of the tendon.
 
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
@@ -278,10 +278,10 @@ def degroote_equilibrium(
     Args:
         inputs: inputs of the muscle; the tendon force is not used.
         m: parameters of the muscle.
-        tendon: further parameters.
+        tendon: parameters of the tendon.
 
     Returns:
-        Whether there is one, and the force.
+        Whether there is such a force, and the normalized tendon force.
     """
     low, high = 0.0, LARGEST_FORCE
     at_low = degroote_residual(low, inputs, m, tendon)
@@ -309,7 +309,7 @@ def degroote_residual(
         force: normalized tendon force.
         inputs: inputs of the muscle.
         m: parameters of the muscle.
-        tendon: further parameters.
+        tendon: parameters of the tendon.
     """
     # A constant tendon force: the velocity of the fibers is that of the path, not that of the
     # equilibrium.

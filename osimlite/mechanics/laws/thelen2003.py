@@ -372,7 +372,7 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
         m: parameters of the muscle.
 
     Returns:
-        Whether there is one, and the fiber length (m).
+        Whether there is such a length, and the fiber length (m).
     """
     length = inputs.length
     active = min(max(inputs.activation, m.least), 1.0)

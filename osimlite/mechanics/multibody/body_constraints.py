@@ -57,14 +57,14 @@ class _Between(ConstraintEquations, Generic[P]):
 
 @dataclass(frozen=True, eq=False)
 class PointEquations(_Between[StationPlacement]):
-    """Holds two stations together, as a ball joint does."""
+    """Constraint that holds two stations together, as a ball joint does."""
 
     name: str = "point constraint"
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceConstraint(_Between[StationPlacement]):
-    """Keeps two stations at a distance, as a rod between ball joints does."""
+    """Constraint that keeps two stations at a distance, as a rod between ball joints does."""
 
     distance: float  # m
     name: str = "distance constraint"
@@ -72,7 +72,7 @@ class DistanceConstraint(_Between[StationPlacement]):
 
 @dataclass(frozen=True, eq=False)
 class PointOnLineEquations(ConstraintEquations):
-    """Keeps a station of a follower body on a line that is fixed in another body."""
+    """Constraint that keeps a station of a follower body on a line of another body."""
 
     line: StationPlacement  # point of the line
     along: Array  # direction (3,) of the line in the frame of its body
@@ -98,7 +98,7 @@ class PointOnLineEquations(ConstraintEquations):
 
 @dataclass(frozen=True, eq=False)
 class WeldEquations(_Between[FramePlacement]):
-    """Holds two frames together.
+    """Constraint that holds two frames together.
 
     The equations are three scalar products that vanish, of each axis of one frame with the next
     axis of the other, and the distance of the origins.

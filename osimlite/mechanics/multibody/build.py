@@ -54,7 +54,7 @@ def build_mechanism(
     wrong inertia, which `opensim_derivatives` reproduces. Forces and geometry have no influence.
 
     Args:
-        model: the model.
+        model: model to convert.
         opensim_derivatives: whether to reproduce two wrong second derivatives of OpenSim 4.6.
             First, Simbody differentiates the angular velocity of a CustomJoint as if only its first
             coordinate drove the first rotation, and only the first two the first two. Accelerations
@@ -66,7 +66,7 @@ def build_mechanism(
             program enables them.
 
     Returns:
-        The mechanism.
+        Mechanism of the model.
 
     Raises:
         ModelError: a reference has no target, a joint connects a body with itself or has the wrong

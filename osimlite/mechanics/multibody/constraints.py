@@ -79,7 +79,7 @@ class ConstraintEquations(Protocol):
 
 @dataclass(frozen=True)
 class CoordinateConstraint(ConstraintEquations):
-    """Constrains one coordinate, and no body directly."""
+    """Constraint on one coordinate, which involves no body directly."""
 
     bodies: ClassVar[tuple[int, ...]] = ()
     coordinate: int
@@ -96,7 +96,7 @@ class CoordinateConstraint(ConstraintEquations):
 
 @dataclass(frozen=True)
 class Lock(CoordinateConstraint):
-    """Keeps the value of one coordinate constant.
+    """Constraint that keeps the value of one coordinate constant.
 
     It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint does
     not change, whatever angular velocity this requires. Any value is accepted as long as it stays
@@ -108,7 +108,7 @@ class Lock(CoordinateConstraint):
 
 @dataclass(frozen=True)
 class PrescribedCoordinate(CoordinateConstraint):
-    """Makes one coordinate follow a function of time (s).
+    """Constraint that makes one coordinate follow a function of time (s).
 
     The error is the coordinate minus the function.
     """
@@ -119,7 +119,7 @@ class PrescribedCoordinate(CoordinateConstraint):
 
 @dataclass(frozen=True)
 class Coupler(ConstraintEquations):
-    """Makes one coordinate a function of others.
+    """Constraint that makes one coordinate a function of others.
 
     The error is the function minus the dependent coordinate.
     """

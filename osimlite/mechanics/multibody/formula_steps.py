@@ -190,7 +190,7 @@ class SimplifiedSteps:
         """Return the register of a multiple; a multiple of a multiple has one factor.
 
         Args:
-            factor: factor.
+            factor: factor of the multiple.
             register: register of the multiplied step.
         """
         inner = self._factor_of_multiple(register)

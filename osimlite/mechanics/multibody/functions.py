@@ -468,7 +468,7 @@ def _find_interval(knots: Sequence[float], x: float) -> int:
 
     Args:
         knots: knots, which increase.
-        x: one of them.
+        x: one of the knots.
     """
     if x <= knots[0] or x >= knots[-1]:
         return 0 if x <= knots[0] else len(knots) - 2

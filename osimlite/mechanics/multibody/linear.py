@@ -63,7 +63,7 @@ def solve_least_norm(rows: Array, values: Array, tolerance: float) -> Array:
 
     Args:
         rows: matrix (m, n).
-        values: right sides (m,).
+        values: right-hand sides (m,).
         tolerance: singular values below this part of the largest one count as zero.
     """
     return np.asarray(np.linalg.lstsq(rows, values, rcond=tolerance)[0], dtype=np.float64)

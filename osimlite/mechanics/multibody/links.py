@@ -509,7 +509,7 @@ class LinkPacker:
         """Write the records of constraints, if there are any.
 
         Args:
-            enforced: constraints.
+            enforced: constraints whose records are written.
             locks: number of coordinates that are locked besides.
         """
         if not enforced:

@@ -143,7 +143,7 @@ class SimbodyAccelerationError(JointMotion):
 
     Attributes:
         turns: the three rotations of the joint, which follow this motion.
-        coordinates: none.
+        coordinates: empty, because the motion depends on those of `turns`.
     """
 
     turns: tuple[AxisMotion, ...]

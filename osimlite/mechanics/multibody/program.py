@@ -31,8 +31,8 @@ class PackedMechanism:
 
     Attributes:
         model: integers, with addresses that are valid in this process.
-        reals: numbers, without gravity.
-        heavy: numbers, with gravity.
+        reals: numbers of the mechanism without gravity.
+        heavy: numbers of the mechanism with gravity.
         laws: names of the laws that are called.
         tree: links of the mechanism.
         order: index in the mechanism of the coordinate of each degree of freedom.

@@ -49,7 +49,7 @@ def smoothing_spline(
     Args:
         x: abscissae (n,), which increase; n >= 2m.
         y: ordinates (n,).
-        half_order: m.
+        half_order: m, where the degree is 2m - 1.
         error_variance: variance of the ordinates; the smoothing is chosen so that the residuals
             have it. Zero gives a spline through the points; a negative number chooses the smoothing
             by generalized cross validation.
@@ -69,7 +69,7 @@ def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[Piecewi
     Args:
         x: abscissae (n,), which increase; n >= 2m.
         y: ordinates (n, k).
-        half_order: m.
+        half_order: m, where the degree is 2m - 1.
 
     Returns:
         One spline per column.
@@ -184,7 +184,7 @@ def _compute_pieces(points: Array, values: Array, half_order: int) -> Array:
     Args:
         points: abscissae (n,).
         values: ordinates (n, k).
-        half_order: m.
+        half_order: m, where the degree is 2m - 1.
 
     Returns:
         Coefficients (n + 1, 2m, k).
@@ -215,7 +215,7 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
     Args:
         points: abscissae (n,).
         values: ordinates (n, k).
-        half_order: m.
+        half_order: m, where the degree is 2m - 1.
     """
     result = np.empty((len(points), half_order, values.shape[1]))
     result[:, 0] = values
@@ -315,7 +315,7 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
     Args:
         points: abscissae (n,).
         values: ordinates (n,).
-        half_order: m.
+        half_order: m, where the degree is 2m - 1.
         error_variance: variance of the ordinates, or a negative number for cross validation.
     """
     n = len(values)

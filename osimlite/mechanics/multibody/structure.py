@@ -35,7 +35,7 @@ Values = ArrayLike | Mapping[str, float]
 @methods_of_any_numbers
 @dataclass(frozen=True, eq=False)
 class MechanismStructure:
-    """What a mechanism consists of, with its names.
+    """Parts of a mechanism, found by their names.
 
     Attributes:
         name: name of the model.
@@ -215,11 +215,11 @@ def make_vector(values: ArrayLike, quantity: str) -> Array:
     """Return three numbers as an array (3,).
 
     Args:
-        values: the numbers.
-        quantity: description of them, for messages.
+        values: three numbers.
+        quantity: noun for these numbers, for messages.
 
     Raises:
-        ModelError: there are not three.
+        ModelError: `values` does not have three numbers.
     """
     result = np.asarray(values, dtype=float)
     if result.shape != (3,):

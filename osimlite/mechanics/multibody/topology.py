@@ -50,7 +50,7 @@ def new_base(loose: Sequence[str], links: Sequence[JointEdge]) -> str:
 
     Args:
         loose: paths of the bodies.
-        links: joints.
+        links: joints between bodies or ground.
     """
     children = {link.child for link in links}
     parents = [link.parent for link in links]
@@ -67,7 +67,7 @@ def spanning_tree(
     until a body with mass ends it.
 
     Args:
-        links: joints.
+        links: joints between bodies or ground.
         ground: path of ground.
         masses: mass of each body, by path (kg).
 

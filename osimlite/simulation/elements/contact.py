@@ -95,7 +95,7 @@ class PairContact:
         pairs: pairs that may touch.
         vt: transition velocity, m/s.
         early_return: whether to reproduce Simbody's defect, see
-            `osimlite.mechanics.laws.hunt_crossley.contact_forces`.
+            `osimlite.mechanics.kernels.ellipsoid_contacts.early_return`.
     """
 
     states: ClassVar[tuple[StateVariable, ...]] = ()

@@ -45,10 +45,10 @@ class Intrinsic(NamedTuple):
     """Rules of a function that is not a kernel.
 
     Attributes:
-        infer: returns the type of the result from the arguments and their types; raises a TypeError
-            for wrong arguments.
-        write: returns the text from those of the arguments, their types, and the type of the
-            result.
+        infer: function that returns the type of the result from the arguments and their types; it
+            raises a TypeError for wrong arguments.
+        write: function that returns the text from those of the arguments, their types, and the type
+            of the result.
         early: type of the result while types of arguments are not known yet, if it depends on none.
         has_effects: whether it may read and write memory.
     """

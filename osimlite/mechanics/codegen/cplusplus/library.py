@@ -276,8 +276,8 @@ def write_library(kernels: Kernels) -> str:
     """Return kernels as the text of one C++ translation unit.
 
     Args:
-        kernels: by the name of the exported symbol, the function and how many derivatives its
-            numbers carry; 0 for plain numbers.
+        kernels: function and number of derivatives that each float carries (0 for plain floats), by
+            the name of the exported symbol.
 
     Returns:
         The complete text but the header, which it includes as `kernel_runtime.h`.
@@ -297,8 +297,8 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
     fewer kernels.
 
     Args:
-        kernels: by the name of the exported symbol, the function and how many derivatives its
-            numbers carry.
+        kernels: function and number of derivatives that each float carries (0 for plain floats), by
+            the name of the exported symbol.
         count: the largest number of units.
 
     Returns:
@@ -325,8 +325,8 @@ def make_library(kernels: Kernels) -> Library:
     """Return a library that exports kernels.
 
     Args:
-        kernels: by the name of the exported symbol, the function and how many derivatives its
-            numbers carry.
+        kernels: function and number of derivatives that each float carries (0 for plain floats), by
+            the name of the exported symbol.
     """
     library = Library()
     for symbol, (function, directions) in kernels.items():

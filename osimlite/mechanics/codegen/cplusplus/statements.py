@@ -28,8 +28,8 @@ class FunctionWriter(ExpressionWriter):
     """Writer of one function.
 
     Args:
-        function: the function with its types.
-        names: the library that it belongs to.
+        function: function with the types of its variables and expressions.
+        names: library that contains the function.
     """
 
     def __init__(self, function: Specialisation, names: Names) -> None:
