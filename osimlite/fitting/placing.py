@@ -75,9 +75,8 @@ def place_markers(
         )
     if not is_in_range.any() or not start < end:
         raise SettingError(
-            f"the time range of the markers, {start:g} to {end:g} s, has no frames to average; "
-            "set one that begins "
-            f"before it ends, within {data.times[0]:g} to {data.times[-1]:g} s"
+            f"no frames of the static trial to average from {start:g} to {end:g} s; set a time range "
+            f"within {data.times[0]:g} to {data.times[-1]:g} s that begins before it ends"
         )
     # The pose is fitted to the mean of the frames, in which a marker that was missed once is NaN.
     mean = MarkerData(

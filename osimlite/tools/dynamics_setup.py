@@ -98,7 +98,7 @@ def describe_gaps(motion: Motion) -> str:
     if not motion.unbalanced:
         return ""
     names = join_words([path.rpartition("/")[2] for path in motion.unbalanced])
-    return f"NaN stands where no equilibrium of fibers and tendon was found of {names}, and for what depends on it.\n"
+    return f"NaN: no equilibrium of fibers and tendon was found for {names} at this time, and the value depends on it.\n"
 
 
 def build_model(job: Job) -> Model:

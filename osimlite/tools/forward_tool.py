@@ -95,7 +95,8 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
         y = state_rows.create_state(simulation, row)
         if start != setup.initial_time:
             outcome.add_message(
-                "start", f"{start:g} s, the time of the row of the states file that is used"
+                "start",
+                f"{start:g} s, because the states_file has its last row up to initial_time there",
             )
     if setup.solve_for_equilibrium_for_auxiliary_states:
         y = simulation.engine.equilibrate_muscles(start, y)

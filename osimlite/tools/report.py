@@ -168,7 +168,7 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     yield (
         '<h2>Is it good enough?</h2><p class="note">The worst value of each kind. Good: within '
         "every published limit; okay: "
-        "beyond the stricter of two limits; bad: beyond "
+        "within the looser of two limits only; bad: beyond "
         "all. Limits: up to the first number a value is good, up to the second it is okay.</p>"
         "<table><tr><th>result</th><th>value</th><th>limits</th><th>quantity</th></tr>"
         f"{rows}</table>{unchecked}"

@@ -272,8 +272,8 @@ def collect_actuators(
         "muscle": ("Muscle forces", "Dashed red: max_isometric_force."),
         "other": (
             "Reserves and residuals",
-            "Forces and moments that no muscle makes; ideally small. Dashed red: the limits of the "
-            "model; the last table has published ones.",
+            "Forces and moments of actuators other than muscles; ideally small. Dashed red: the limits of "
+            "the model. The last table has published limits.",
         ),
     }
     return [

@@ -91,7 +91,7 @@ def test_a_new_name_is_told_with_the_old_and_an_old_one_in_an_old_file_is_none(t
         (
             1,
             "info",
-            "the file has the format 40600, OpenSim 4.5 writes 40500 and reads the file as such",
+            "the file has version 40600; OpenSim 4.5 writes version 40500, and reads the file as if it had that version",
         ),
         (4, "error", name + "called actuator_list"),
     ]

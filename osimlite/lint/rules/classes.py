@@ -210,8 +210,8 @@ def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
         if spec is not None:
             assert subject.source is not None
             report(
-                f"{describe_object(owner)} finds its {spec.tag} by that name; OpenSim ignores "
-                f"this {note.word}",
+                f"OpenSim ignores this {note.word}: in {describe_object(owner)} it must have the name "
+                f"'{spec.tag}'",
                 owner,
                 number=note.number,
                 attribute="name",

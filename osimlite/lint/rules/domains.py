@@ -170,8 +170,8 @@ def _report_lost_transition(subject: Subject, report: FindingCollector, force: A
         )
         if math.isfinite(limit) and is_lost:
             report(
-                f"transition of {subject.describe_part(force)} is {force.transition:g}, which is "
-                f"lost beside its {name} of {limit:g}: OpenSim rejects the model",
+                f"transition of {subject.describe_part(force)} is {force.transition:g}, too "
+                f"small to change its {name} of {limit:g} when it is added: OpenSim rejects the model",
                 force,
                 consequence=REFUSES,
                 tag="transition",

@@ -152,7 +152,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
         reason = (
             ""
             if is_read
-            else f", which {note.why or 'OpenSim does not open for a member of a set'}"
+            else f", which {note.why or 'OpenSim does not read, because the object is a member of a set'}"
         )
         consequence = (
             ": OpenSim ignores the content given here"

@@ -151,14 +151,14 @@ def report_length_of_wrap(subject: Subject, report: FindingCollector) -> None:
         path = f"the path of {describe_object(owner)}"
         if item.length < 0.0:
             report(
-                f"OpenSim counts {path} on '{item.surface}' as {1000.0 * item.length:.3g} mm "
-                f"{item.pose}",
+                f"OpenSim computes a length of {1000.0 * item.length:.3g} mm for {path} on "
+                f"'{item.surface}' {item.pose}",
                 owner,
             )
         else:
             report(
                 f"{path} goes straight through '{item.surface}' {item.pose}: OpenSim finds no "
-                "points",
+                "tangent points",
                 owner,
             )
 

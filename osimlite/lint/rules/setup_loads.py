@@ -218,7 +218,7 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
             if len(lifted) > 2 and max(lifted) > 0.03 and min(lifted) > -0.02:
                 report(
                     f"{describe_object(force)} is expressed in {force.force_expressed_in_body}, "
-                    "and its numbers look like those of ground: they point up as they are",
+                    "but its components point up when they are read in ground: is it expressed in ground?",
                     force,
                     tag="force_expressed_in_body",
                 )

@@ -115,7 +115,7 @@ PASSIVE_GOOD = Threshold(
     "%",
     "largest accepted passive force, as a share of the strength of the muscle",
 )
-PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "and from which on that is bad")
+PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "a larger passive force is bad")
 
 
 @rule(

@@ -157,7 +157,7 @@ def report_swapped_markers(trial: Trial, report: FindingCollector) -> None:
         report,
         [SWAPPED],
         OSIMLITE,
-        "exchange their names in the file of markers, from where to where it says",
+        "exchange their names in the marker file, at these times",
         "share",
     )
 
@@ -219,7 +219,7 @@ def report_filter_content(trial: Trial, report: FindingCollector) -> None:
         report,
         [NOISE],
         OSIMLITE,
-        "take a lowpass_cutoff_frequency that leaves the motion; 6 Hz are usual for walking",
+        "choose a lowpass_cutoff_frequency that removes noise and keeps the motion; 6 Hz are usual for walking",
         "noise",
     )
 

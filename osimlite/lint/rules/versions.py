@@ -43,8 +43,8 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
         and later_changes.format < (subject.version or 0) <= CURRENT_VERSION
     ):
         report(
-            f"the file has the format {subject.version}, OpenSim {target} writes {later_changes.format} "
-            "and reads the file as such",
+            f"the file has version {subject.version}; OpenSim {target} writes version {later_changes.format}, "
+            "and reads the file as if it had that version",
             number=0,
             attribute="Version",
             severity=INFO,

@@ -204,7 +204,7 @@ def measure_reserves(
             continue
         judged_count += 1
         subject = f"the reserve of '{name}' relative to its joint moment"
-        comparison = f"{reserve[row]:.3g} N m at {table.times[row]:g} s, the motion takes {np.abs(moment).max():.3g} N m"
+        comparison = f"{reserve[row]:.3g} N m at {table.times[row]:g} s; the peak joint moment is {np.abs(moment).max():.3g} N m"
         peak = 100.0 * float(reserve[row] / np.abs(moment).max())
         position = tool.folder.locate_row(file, row)
         yield (
