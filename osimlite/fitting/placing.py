@@ -90,6 +90,8 @@ def place_markers(
         target = dict(
             zip(data.names, selected.sum(axis=0) / is_seen.sum(axis=0)[:, None], strict=True)
         )
+    # Before markers are removed, so that the error names those of the model.
+    mean.find_shared_names([marker.name for marker in model.components(Marker)])
     markers = model.marker_set.objects
     removed = tuple(marker.name for marker in markers if marker.name not in target)
     for marker in [marker for marker in markers if marker.name in removed]:

@@ -20,6 +20,7 @@ from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
 from osimlite.io.document.cache import get_object
+from osimlite.lint.project_files import is_table
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
 from osimlite.tools.named_files import find_named_files, find_own_results
@@ -73,7 +74,7 @@ class RunInterruption(OsimliteError):
 def find_setups(names_or_patterns: Iterable[str | Path]) -> list[Path]:
     """Return setup files by names and patterns such as ``subjects/*/setup_ik.xml``.
 
-    Patterns skip models and sets, such as the loads or the markers that setups read. No file is
+    Patterns skip tables, models and sets, such as the loads or the markers that setups read. No file is
     returned twice.
 
     Args:
@@ -88,11 +89,13 @@ def find_setups(names_or_patterns: Iterable[str | Path]) -> list[Path]:
         if has_magic(name_or_pattern) and not os.path.exists(name_or_pattern):
             matches = find_files(name_or_pattern)
             setups = [
-                Path(match) for match in matches if not isinstance(get_object(match), Model | Set)
+                Path(match)
+                for match in matches
+                if not is_table(match) and not isinstance(get_object(match), Model | Set)
             ]
             if not setups:
                 raise OsimliteError(
-                    f"no setup matches '{name_or_pattern}': it matches models and sets only; name setup "
+                    f"no setup matches '{name_or_pattern}': it matches models, sets and tables only; name setup "
                     "files"
                     if matches
                     else f"no file matches '{name_or_pattern}'; correct the pattern, or change to the folder "

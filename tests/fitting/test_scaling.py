@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import ModelError, SettingError
+from osimlite.errors import ModelError, OsimliteError, SettingError
 from osimlite.fitting.measuring import select_frames
 from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.scaling import get_scale_rules, scale_model
@@ -177,6 +177,8 @@ def test_what_cannot_be_scaled_is_told() -> None:
     assert notes is not None and notes.notes == [
         "measurement 'length' is left out: the data have no marker 'bottom'"
     ]
+    with pytest.raises(OsimliteError, match=r"is one of the model \(top and bottom\)"):
+        osimlite.scale(model, {"elsewhere": STATIC["top"]}, place=True)
     gap = {**STATIC, "bottom": [[0.0, np.nan, 0.0], *STATIC["bottom"][1:]]}
     notes = osimlite.scale(model, gap, measurements=LENGTH).measured
     assert notes is not None and "were not seen in every frame" in notes.notes[0]

@@ -163,6 +163,9 @@ def test_names_and_patterns(trials: Path) -> None:
     assert find_setups([trials / "model.osim"]) == [trials / "model.osim"], "what is named is meant"
     with pytest.raises(OsimliteError, match=r"no setup matches '.*/grf\*\.xml'"):
         find_setups([f"{trials}/trial0/grf*.xml"])
+    (trials / "trial0" / "walk.trc").write_text("PathFileType\n")
+    with pytest.raises(OsimliteError, match="it matches models, sets and tables only"):
+        find_setups([f"{trials}/trial0/walk.t*"])
     with pytest.raises(OsimliteError, match=r"no file matches 'nothing\*\.xml'"):
         find_setups(["nothing*.xml"])
 

@@ -29,12 +29,12 @@ SLACK = Threshold(
     "inertia-slack",
     1e-6,
     "",
-    "relative excess up to which an inertia counts as possible; files have rounded numbers",
+    "largest accepted relative error of an inertia, because files have rounded numbers",
 )
 GYRATION = Threshold(
-    "largest-radius-of-gyration", 5.0, "m", "the mass of a body cannot lie further from its centre"
+    "largest-radius-of-gyration", 5.0, "m", "largest plausible radius of gyration of a body"
 )
-MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
+MASS = Threshold("largest-mass", 1000.0, "kg", "largest plausible mass of a body")
 
 
 @rule("OSIM501", "missing-mass", severity=ERROR, consequences=(REFUSES,))

@@ -22,7 +22,7 @@ GRAVITY = Threshold(
     "largest-gravity",
     30.0,
     "m/s^2",
-    "a larger gravity is not that of a place where people walk",
+    "largest plausible gravity",
 )
 BEYOND = Threshold(
     "limit-beyond-range",

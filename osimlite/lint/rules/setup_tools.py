@@ -148,8 +148,8 @@ optimization fails without residual actuators.
 18 nothing-analyzed, warning, in kinematics: An analysis names no body or coordinate. Nothing is written.
 - <coordinates></coordinates>
 + <coordinates>all</coordinates>
-19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed along coordinates without equilibrium. Fibers stay
-at their default lengths, independent of the coordinates.
+19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed without being put into equilibrium. Fibers keep
+their default lengths, whatever the coordinates are.
   <AnalysisSet name="analyses"> <objects> <MuscleAnalysis name="muscles"/> </objects> </AnalysisSet>
 - <solve_for_equilibrium_for_auxiliary_states>false</solve_for_equilibrium_for_auxiliary_states>
 + <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>

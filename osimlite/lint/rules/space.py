@@ -173,7 +173,7 @@ DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep insi
 DEPTH_SHARE = Threshold(
     "contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface"
 )
-LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
+LENGTH = Threshold("largest-length", 10.0, "m", "largest plausible length on a body")
 
 
 @rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, DEPTH_SHARE))
