@@ -130,7 +130,7 @@ class SimulationError(OsimliteError):
     """Error of a motion that cannot be computed any further."""
 
     exit_code = 1
-    trajectory: Any = None  # what was recorded up to there, an `Trajectory`; None before any step
+    trajectory: Any = None  # recorded part of the motion, a `Trajectory`; None before any step
 
 
 class SettingError(SimulationError):

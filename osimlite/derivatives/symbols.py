@@ -139,7 +139,7 @@ class RecordedVector:
 
     __slots__ = ("cells", "first")
     journals: list[dict[tuple[int, int], tuple[list[Any], int, Any]]] = []  # noqa: RUF012 - one for all
-    """For each open branch, the cells that were written with their previous values."""
+    """Cells that each open branch has written, with their previous values."""
 
     def __init__(self, cells: list[Any], first: int = 0) -> None:
         self.cells = cells

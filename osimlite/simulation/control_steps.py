@@ -91,10 +91,10 @@ class KernelController:
     paths: tuple[str, ...]  # paths of the controls, in the controller's order
     step: float  # length of a control step, s
     sensors: tuple[str, ...]  # labels of the recorded sensors
-    senses: Ints  # see :mod:`osimlite.mechanics.kernels.sensors`
-    known: Floats  # its numbers
-    plan: Ints  # see :mod:`osimlite.mechanics.kernels.reflexes`
-    numbers: Floats  # its numbers
+    senses: Ints  # plan of the sensor row, see :mod:`osimlite.mechanics.kernels.sensors`
+    known: Floats  # numbers of the sensor row
+    plan: Ints  # integers of the reflexes, see :mod:`osimlite.mechanics.kernels.reflexes`
+    numbers: Floats  # numbers of the reflexes
     gains: Mapping[str, float]  # gains by name, from which the numbers follow
 
     @property

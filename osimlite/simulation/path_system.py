@@ -37,7 +37,7 @@ class MeasuredPath(Silent):
     """
 
     path: str  # path of the owner
-    along: Along  # the path itself
+    along: Along  # path in terms of the mechanism
     states: tuple[StateVariable, ...] = ()
 
     @property

@@ -52,7 +52,7 @@ MAX_STEPS = 100
 LONGEST_STEP = 0.5
 """Largest change of a coordinate in one step towards the constraints (m or rad)."""
 OUTSIDE = 1e-12
-"""How far a coordinate may be outside of its range (m or rad)."""
+"""Largest distance of a coordinate outside of its range (m or rad)."""
 EXACT = 1e-15
 """Errors of equations below this are rounding errors (m or rad)."""
 SHORTEST_STEP = 1e-13

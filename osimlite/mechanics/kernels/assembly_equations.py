@@ -82,11 +82,11 @@ class Assembly(NamedTuple):
     basis of the null space, Hessian, and workspace.
     """
 
-    model: Ints  # the mechanism
-    reals: Floats  # its numbers
+    model: Ints  # integers of the mechanism
+    reals: Floats  # numbers of the mechanism
     data: Floats  # workspace of an evaluation
     y: Floats  # workspace of a state
-    f: Floats  # workspace of its rates
+    f: Floats  # workspace of the rates of a state
     p: Ints  # integers of the assembly, see `ASSEMBLY`
     c: Floats  # numbers of the assembly, see `ASSEMBLY_NUMBERS`
     w: Floats  # workspace, see `assembly_work_size`

@@ -60,7 +60,7 @@ class VECTOR_TYPE(metaclass=Record):
     AXIS = 0
     """An axis that is fixed in a link."""
     ARM = 1
-    """From a point of one link to a point of another."""
+    """A vector from a point of one link to a point of another."""
     MEETING = 2
     """An arm whose rate is that of its end relative to the coincident point of link 1."""
 

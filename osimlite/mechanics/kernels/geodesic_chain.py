@@ -35,7 +35,7 @@ class SURFACE_POSE(metaclass=Record):
     """Pose of a surface: rotation by rows and position in ground come first."""
 
     HOW = 12
-    """How the surface may bend the segment, see `BENDING`."""
+    """Way in which the surface may bend the segment, see `BENDING`."""
     ABOUT = 13
     """Axis about which it turns the segment."""
     SIZE = 16

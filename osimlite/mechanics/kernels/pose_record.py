@@ -126,8 +126,8 @@ SENSOR_NUMBERS = 10
 class Fit(NamedTuple):
     """Fit of poses: the mechanism with its workspace, and integers, numbers and workspace of the fit."""
 
-    model: Ints  # the mechanism
-    reals: Floats  # its numbers
+    model: Ints  # integers of the mechanism
+    reals: Floats  # numbers of the mechanism
     data: Floats  # workspace of an evaluation
     f: Floats  # workspace of the rates of a state
     p: Ints  # integers of the fit, see `FIT`

@@ -107,21 +107,21 @@ class Motion(NamedTuple):
     if falling or rising through the level ends the run, 0 if neither does.
     """
 
-    model: Ints  # the mechanism
+    model: Ints  # integers of the mechanism
     reals: Floats  # numbers of the mechanism
     data: (
         Floats  # results and workspace; the record of the integration method at RUN_SIZES.METHOD_AT
     )
-    sizes: Ints  # see `RUN_SIZES`
+    sizes: Ints  # sizes and settings, see `RUN_SIZES`
     clock: Floats  # time and next step to try, s; changed
-    counts: Ints  # see `COUNTS`; changed
-    times: Floats  # of the reports, s (r,)
+    counts: Ints  # counts of the run, see `COUNTS`; changed
+    times: Floats  # times of the reports, s (r,)
     reports: Floats  # states at these times (r, y)
-    log: Floats  # of each step the time, y, f (k, 1 + 2y)
-    forces: Floats  # of each step the force on surface 2 of each pair (k, P, 3)
-    events: Floats  # see `insert_event` (e, 3 or 3 + y)
-    peaks: Floats  # largest force of each pair at the end of a step, and its time (P, 2)
-    watches: Ints  # see `compute_levels` (w, 3)
+    log: Floats  # time, y and f at each step (k, 1 + 2y)
+    forces: Floats  # force on surface 2 of each pair at each step, N (k, P, 3)
+    events: Floats  # events, see `insert_event` (e, 3 or 3 + y)
+    peaks: Floats  # largest force of each pair at the end of a step (N), and its time (s) (P, 2)
+    watches: Ints  # integers of the watches (w, 3)
     levels: Floats  # station in the link, direction in ground, and level of each watch (w, 7)
 
 

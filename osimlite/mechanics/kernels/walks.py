@@ -62,8 +62,8 @@ The history of the sensors follows, then the workspace of the criteria.
 class Walk(NamedTuple):
     """Inputs and records of a walk.
 
-    The record has per control step the state at its start, excitations and loads; for other runs
-    see `begin_control_step`.
+    The record of a walk has the state at the start, excitations and leg loads of each control step;
+    for that of other runs see `begin_control_step`.
     """
 
     m: Motion  # run of the walk
@@ -78,7 +78,7 @@ class Walk(NamedTuple):
     row: Floats  # sensor row
     excitations: Floats  # excitations during the control step (c,)
     record: Floats  # record of control steps
-    progress: Ints  # see `PROGRESS`
+    progress: Ints  # progress of the walk, see `PROGRESS`
 
 
 def hold_several(

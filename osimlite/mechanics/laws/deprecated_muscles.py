@@ -38,15 +38,15 @@ class OldMuscle(NamedTuple):
     optimal: float  # optimal_fiber_length, m
     slack: float  # tendon_slack_length, m
     fastest: float  # max_contraction_velocity, 1/s
-    height: float  # of the fibers, optimal sin(pennation_angle_at_optimal), m
+    height: float  # height of the fibers: optimal sin(pennation_angle_at_optimal), m
 
 
 class Guess(NamedTuple):
     """Guess of an equilibrium of fibers and tendon."""
 
-    length: float  # of the fibers, m
-    cos: float  # of pennation
-    strain: float  # of the tendon, not negative
+    length: float  # fiber length, m
+    cos: float  # cosine of the pennation angle
+    strain: float  # tendon strain, not negative
 
 
 def cos_pennation_of_fibers(length: float, height: float) -> float:

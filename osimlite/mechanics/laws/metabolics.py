@@ -22,9 +22,9 @@ class Umberger2010(NamedTuple):
     max_contraction_velocity: float  # optimal fiber lengths a second
     optimal_fiber_length: float  # m
     mass: float  # kg
-    ratio_slow_twitch_fibers: float  # part of the fibers
-    muscle_effort_scaling_factor: float  # of excitation, activation and active force
-    aerobic_factor: float  # of all heat
+    ratio_slow_twitch_fibers: float  # fraction of slow fibers
+    muscle_effort_scaling_factor: float  # factor of excitation, activation and active force
+    aerobic_factor: float  # factor of all heat rates
     activation_maintenance_rate_on: float
     shortening_rate_on: float
     mechanical_work_rate_on: float
@@ -138,12 +138,12 @@ class Bhargava2004(NamedTuple):
     max_isometric_force: float  # N
     optimal_fiber_length: float  # m
     mass: float  # kg
-    ratio_slow_twitch_fibers: float  # part of the fibers
+    ratio_slow_twitch_fibers: float  # fraction of slow fibers
     activation_constant_slow_twitch: float  # W/kg
     activation_constant_fast_twitch: float  # W/kg
     maintenance_constant_slow_twitch: float  # W/kg
     maintenance_constant_fast_twitch: float  # W/kg
-    muscle_effort_scaling_factor: float  # of excitation, activation and active force
+    muscle_effort_scaling_factor: float  # factor of excitation, activation and active force
     activation_rate_on: float
     maintenance_rate_on: float
     shortening_rate_on: float
@@ -257,10 +257,10 @@ class SmoothTransitions(NamedTuple):
     `form` 0 is no smoothing, 1 the hyperbolic tangent, 2 the function of Huber.
     """
 
-    form: float  # of the transitions: 0, 1 or 2
-    velocity_smoothing: float  # how sharp the transition of shortening to lengthening is
-    power_smoothing: float  # how sharply negative power is kept out
-    heat_rate_smoothing: float  # how sharply heat is kept above 1 W/kg
+    form: float  # form of the transitions: 0, 1 or 2
+    velocity_smoothing: float  # sharpness of the transition from shortening to lengthening
+    power_smoothing: float  # sharpness of the lower bound of the power, 0
+    heat_rate_smoothing: float  # sharpness of the lower bound of the heat rate, 1 W/kg
 
 
 def bhargava2004_smoothed(

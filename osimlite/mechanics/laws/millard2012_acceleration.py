@@ -45,7 +45,7 @@ class Millard2012Acceleration(NamedTuple):
     short_damping: float  # fiber_compressive_force_length_damping, s
     passive_damping: float  # fiber_force_length_damping, s
     steep_damping: float  # fiber_compressive_force_cos_pennation_damping, s
-    fiber_damping: float  # of the fibers in parallel to the active force, over F, s
+    fiber_damping: float  # damping of the fibers parallel to the active force, over F, s
     rising: float  # activation time constant, s
     falling: float  # deactivation time constant, s
     least: float  # smallest activation in the formula of its rate
@@ -70,15 +70,15 @@ class AccelerationCurves(NamedTuple):
 class MuscleDynamics(NamedTuple):
     """Forces and accelerations of fibers, tendon and the mass between them."""
 
-    cos: float  # of pennation
-    by_length: float  # active force at rest, fully activated
+    cos: float  # cosine of the pennation angle
+    by_length: float  # normalized active force at full activation and zero velocity
     by_velocity: float  # factor of the active force by velocity
-    passive: float  # what fibers bear besides the active force, N
-    tension: float  # of the tendon, N
-    acceleration: float  # of the fiber length, m/s^2
-    slope: float  # its derivative over fiber length at the same speeds, 1/s^2
-    stiffness: float  # of the fibers along the tendon, N/m
-    tendon_stiffness: float  # N/m
+    passive: float  # force of the fibers without the active force, N
+    tension: float  # tendon force, N
+    acceleration: float  # second derivative of the fiber length, m/s^2
+    slope: float  # derivative of `acceleration` by the fiber length at constant speeds, 1/s^2
+    stiffness: float  # stiffness of the fibers along the tendon, N/m
+    tendon_stiffness: float  # stiffness of the tendon, N/m
 
 
 def evaluate_dynamics(

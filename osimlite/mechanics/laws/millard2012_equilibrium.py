@@ -60,7 +60,7 @@ class Millard2012Equilibrium(NamedTuple):
     falling: float  # deactivation_time_constant, s
     is_rigid: float  # ignore_tendon_compliance, 1 or 0
     is_excited: float  # ignore_activation_dynamics, 1 or 0: the excitation is the activation
-    damping: float  # of the fibers, over F; 0 if they have none
+    damping: float  # damping of the fibers, over F; 0 without damping
     least: float  # smallest activation
     height: float  # constant height of the fibers, see `pennation_constants`, m
     shortest: float  # smallest fiber length by the largest pennation angle, m
@@ -74,7 +74,7 @@ class MillardCurves(NamedTuple):
 
     active: Sequence[float]  # active force over fiber length
     velocity: Sequence[float]  # factor of the active force over fiber velocity
-    inverse: Sequence[float]  # roughly the inverse of that
+    inverse: Sequence[float]  # fiber velocity over this factor: roughly the inverse of `velocity`
     passive: Sequence[float]  # passive force over fiber length
     tendon: Sequence[float]  # force over tendon length
 
@@ -85,15 +85,17 @@ class MillardFibers(NamedTuple):
     Before a curve is evaluated, its argument is in place of its value.
     """
 
-    velocity_source: float  # what determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
-    velocity: float  # normalized, or what determines it
-    by_velocity: float  # factor of the active force
+    velocity_source: (
+        float  # condition that determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
+    )
+    velocity: float  # normalized fiber velocity, or the value that determines it
+    by_velocity: float  # factor of the active force by velocity
     active: float  # activation
-    length: float  # of the fibers, m
-    cos: float  # of pennation
-    by_length: float  # active force at rest, fully activated
-    elastic: float  # passive force
-    tendon: float  # tendon force
+    length: float  # fiber length, m
+    cos: float  # cosine of the pennation angle
+    by_length: float  # normalized active force at full activation and zero velocity
+    elastic: float  # normalized passive force
+    tendon: float  # normalized tendon force
     change: float  # rate of activation, 1/s
 
 

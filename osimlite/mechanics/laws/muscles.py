@@ -20,13 +20,13 @@ NO_ANGLE = 2.0**-52
 class MuscleInputs(NamedTuple):
     """Inputs of the law of a muscle; a state that the muscle does not have is 0."""
 
-    length: float  # of the path, m
-    rate: float  # of it, m/s
-    excitation: float  # the control
-    activation: float = 0.0  # state
-    fiber_length: float = 0.0  # state, m
-    fiber_velocity: float = 0.0  # state, m/s
-    normalized_tendon_force: float = 0.0  # state
+    length: float  # length of the path, m
+    rate: float  # lengthening speed of the path, m/s
+    excitation: float  # control of the muscle
+    activation: float = 0.0  # state: activation
+    fiber_length: float = 0.0  # state: fiber length, m
+    fiber_velocity: float = 0.0  # state: fiber velocity, m/s
+    normalized_tendon_force: float = 0.0  # state: tendon force over the maximum isometric force
 
 
 def first_order_activation_rate(

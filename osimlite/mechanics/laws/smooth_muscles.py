@@ -39,7 +39,7 @@ class SmoothMuscle(NamedTuple):
     fastest: float  # max_contraction_velocity, 1/s
     scale: float  # active_force_width_scale
     damping: float  # fiber_damping
-    height: float  # of the fibers, optimal sin(pennation_angle_at_optimal), m
+    height: float  # height of the fibers: optimal sin(pennation_angle_at_optimal), m
     passive: float  # 1 if passive fibers bear a force, else 0
     follows: float  # 1 if activation is a state, 0 if it equals the excitation
     rising: float  # activation_time_constant, s

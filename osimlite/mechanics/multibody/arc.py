@@ -24,7 +24,7 @@ class ArcPoint(SmoothFunction):
     angle θ, cos θ = cos a cos b, the rod is an arc of radius length / θ.
     """
 
-    component: int  # of the position of the end: 0, 1 or 2
+    component: int  # component of the position of the end: 0, 1 or 2
     length: float  # length of the rod, m
     neutral: tuple[float, float]  # angles that are added to the two arguments, rad
 

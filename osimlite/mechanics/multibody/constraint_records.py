@@ -35,13 +35,13 @@ Balls = Mapping[tuple[int, ...], int]
 class ConstraintRecord(NamedTuple):
     """Record of one constraint, before it has a position in the vectors."""
 
-    law: str  # name of its law
-    ints: list[int]  # its own integers
-    numbers: list[float]  # its own numbers
+    law: str  # name of the law
+    ints: list[int]  # integers of the constraint behind those of `CONSTRAINT`
+    numbers: list[float]  # numbers of the constraint
     equations: int = 1  # number of equations
-    positions: int = 1  # number of these, from the first on, that constrain positions
-    work_size: int = 0  # length of its workspace
-    work_offset_index: int = -1  # index among its integers of the offset of the workspace
+    positions: int = 1  # number of equations, from the first on, that constrain positions
+    work_size: int = 0  # length of the workspace of the law
+    work_offset_index: int = -1  # index in `ints` of the offset of the workspace
 
 
 class _Vector(NamedTuple):

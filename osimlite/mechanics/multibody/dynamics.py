@@ -55,8 +55,8 @@ class MassCentres:
     """Mass centres of the b bodies of a mechanism at one state, along the axes of ground."""
 
     state: MechanismKinematics
-    masses: Array  # (b,), kg
-    arms: Array  # from the body origins to the mass centres (b, 3), m
+    masses: Array  # masses (b,), kg
+    arms: Array  # vectors from the body origins to the mass centres (b, 3), m
 
     @classmethod
     def compute(cls, state: MechanismKinematics) -> MassCentres:

@@ -255,8 +255,8 @@ class MultivariatePolynomial(Multivariate):
     OpenSim 4.6's Hessian of such a polynomial is wrong: it has the gradient in each column.
     """
 
-    coefficients: tuple[float, ...]  # of the monomials
-    powers: tuple[tuple[int, ...], ...]  # of each argument in each monomial
+    coefficients: tuple[float, ...]  # coefficients of the monomials
+    powers: tuple[tuple[int, ...], ...]  # power of each argument in each monomial
     opensim_derivatives: bool = False  # whether the Hessian is OpenSim's
 
     @classmethod

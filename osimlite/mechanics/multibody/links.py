@@ -129,13 +129,13 @@ class Operation:
     """Fixed transform, and one motion after it; see `layout.OPERATION`."""
 
     kind: int  # type of the motion, see `layout.MOTION`
-    before: Array  # fixed transform before it (4, 4)
-    arguments: list[int]  # indices of its coordinates in the mechanism
-    function: Any = None  # function that gives its amount, None if a coordinate does
+    before: Array  # fixed transform before the motion (4, 4)
+    arguments: list[int]  # indices in the mechanism of the coordinates of the motion
+    function: Any = None  # function that gives the amount, None if a coordinate does
     radii: Array = field(default_factory=lambda: np.zeros(3))  # half axes of an ellipsoid, m
-    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
+    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # axis of a slide
     turns: list[Operation | None] = field(default_factory=list)  # rotations of a drift's joint
-    looked_at: list[int] = field(default_factory=list)  # of a drift: sign, two coordinates
+    looked_at: list[int] = field(default_factory=list)  # sign and two coordinates of a drift
     joint: str = ""  # path of the joint
 
 

@@ -19,8 +19,8 @@ GROUND = -1
 class MassProperties:
     """Mass, mass centre and inertia of a body."""
 
-    mass: float  # kg
-    center: Array = field(default_factory=lambda: np.zeros(3))  # in the body frame (3,), m
+    mass: float  # mass, kg
+    center: Array = field(default_factory=lambda: np.zeros(3))  # mass centre in the body (3,), m
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))  # about the mass centre, kg m²
 
     def about_origin(self) -> Array:

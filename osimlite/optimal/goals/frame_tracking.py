@@ -173,7 +173,7 @@ def compute_squared_angle(point: PointSymbols, frame: FrameSymbols, quaternion: 
 
 @dataclass(frozen=True, eq=False)
 class FrameReference:
-    """What frames of the model track: a file of values, or a motion to compute the values from.
+    """Reference that frames of the model track: a file of values, or a motion that gives them.
 
     Attributes:
         goal: goal with the reference.

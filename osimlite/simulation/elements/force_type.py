@@ -324,7 +324,7 @@ class DeclaredForce:
     component: type  # class of the component
     path: str  # path of the component
     name: str  # name of the component
-    location: Any  # where it acts, in the form of its geometry
+    location: Any  # location at which the force acts, from `read` of the geometry
     values: tuple[Any, ...]  # values of the parameters
     # state variable of each state of the force type; None for a state that the component lacks
     optional_states: tuple[StateVariable | None, ...] = ()

@@ -397,7 +397,7 @@ class Penalty(Measure):
     """Penalty of values outside a range, accumulated over time: the base of measures of ranges."""
 
     _statistics: tuple[tuple[str, int], ...] = ()
-    """Per criterion its mode (average, highest, lowest or sum) and its offset in the workspace."""
+    """Mode (average, highest, lowest or sum) and offset in the workspace of each criterion."""
 
     def penalize(
         self, node: SettingNode, criterion_type: int, index: int = 0, factor: float = 1.0

@@ -126,7 +126,7 @@ class Gains:
 
     Attributes:
         parts: names of the parameters.
-        current_value: value of the first one.
+        current_value: value of the first parameter.
     """
 
     parts: tuple[str, ...]
@@ -134,7 +134,7 @@ class Gains:
 
 
 Target = Start | Property | Control | FunctionParameter | Slope | Gains
-"""What a variable changes."""
+"""Numbers that a variable can change."""
 
 
 @dataclass(frozen=True)

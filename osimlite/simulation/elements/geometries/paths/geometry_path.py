@@ -39,7 +39,7 @@ from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.registry import register_path
 
 TOLERANCE = 1e-5
-"""As in OpenSim, a conditional point is active this far beyond its range, rad or m."""
+"""Distance beyond its range up to which a conditional point is active, as in OpenSim, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +47,14 @@ class Node:
     """Point of a path.
 
     Attributes:
-        body: index of its body.
+        body: index of the body in which the point is.
         frame: frame (4, 4) of the location in the body.
         location: position in the frame, m, to which `functions` are added.
-        kind: kind of the node.
-        coordinate: index in the mechanism of the coordinate that it depends on, or -1.
+        kind: type of the node, see `NODE_TYPE`.
+        coordinate: index in the mechanism of the coordinate that the point depends on, or -1.
         range: range of this coordinate, rad or m.
         functions: functions of the coordinate for a moving location.
-        name: name of the point, or of the surface that it is on.
+        name: name of the point, or of the surface on which it is.
     """
 
     body: int
@@ -103,9 +103,9 @@ class Surface:
 
     Attributes:
         number: number of the surface among those of the path.
-        tangent: node at its center, with its axes.
+        tangent: node at the centre of the surface, with the axes of the surface.
         law: name of the kernel of the surface; empty if the surface is not active.
-        curve: name of the kernel that traces a path on it, unless that is a geodesic.
+        curve: name of the kernel that traces a path on the surface, unless the path is a geodesic.
         numbers: parameters of the kernel, or those of `geodesic_starts`.
         first: index of the first point of the range in which the path may wrap.
         last: index of the last point of the range.
@@ -444,7 +444,7 @@ LAWS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "WrapEllipsoid": ("wrap_ellipsoid", "trace_ellipsoid", ("dimensions",)),
     "WrapTorus": ("wrap_torus", "trace_torus", ("inner_radius", "outer_radius")),
 }
-"""By the class of a surface: its kernel, the kernel that traces a path on it, and properties that are its sizes."""
+"""Kernel of each class of surfaces, kernel that traces a path on it, and properties with the sizes."""
 
 SIGNS = {"": 1.0, "+": 1.0, "-": -1.0}
 """Sign of a quadrant by its text."""
