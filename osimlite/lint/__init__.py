@@ -1,4 +1,4 @@
-"""The linter: rules on texts, typed models and their component trees, without simulating anything."""
+"""Linter: rules on texts, typed models and their component trees, without any simulation."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def validate(
     classes: Paths = (),
     config: Config | None = None,
 ) -> Report:
-    """Check a model, a setup, a table, or all that is in a folder against every rule.
+    """Check a model, a setup, a table, or all files of a folder against every rule.
 
     Args:
         model: a Model, the path of a file or a folder, or a Source. Findings have a line and a column
@@ -93,7 +93,7 @@ def assert_valid(
     """Fail a test with all findings unless a model has neither errors nor warnings.
 
     Args:
-        model: the model.
+        model: model, or path of its file.
         ignore: codes or names of rules to ignore.
     """
     report = validate(model, ignore=ignore)

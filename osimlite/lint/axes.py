@@ -1,4 +1,4 @@
-"""Coordinates on the axes of a CustomJoint, and what OpenSim 4.6 does with names that do not match."""
+"""Coordinates on the axes of a CustomJoint, and the treatment of unknown names in OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ def list_axes(joint: CustomJoint) -> list[TransformAxis]:
 
 
 def list_coordinates(joint: Joint) -> list[Coordinate]:
-    """Return the coordinates that a joint declares, without other objects among them, which OpenSim ignores."""
+    """Return the coordinates that a joint declares; OpenSim ignores other objects among them."""
     return [item for item in joint.coordinates if isinstance(item, Coordinate)]
 
 
 def list_axis_names(joint: CustomJoint) -> list[str]:
-    """Return the coordinates that the axes name, each once, in the order of their first use."""
+    """Return the coordinates that the axes name, in the order of their first use."""
     return list(dict.fromkeys(name for axis in list_axes(joint) for name in axis.names))
 
 
 def refuses_axes(joint: CustomJoint) -> bool:
     """Return whether OpenSim rejects the joint because of the coordinates that its axes name.
 
-    OpenSim goes through the names in the order of :func:`list_axis_names` and makes up a coordinate
-    for each that the joint does not declare. It fails if the one made up does not come right after
-    those declared, if no axis names any, and if it would have to put declared coordinates in
-    another order while their number is not that of the names. Measured on 1,200 random joints. A
-    name that no component may have is rejected as well, and one that a frame of the joint has:
-    OpenSim calls the frame otherwise then and does not find it.
+    OpenSim goes through the names in the order of :func:`list_axis_names`, and creates a coordinate
+    for each name that the joint does not declare. It fails in three cases: a created coordinate
+    does not come right after the declared ones; no axis names any coordinate; or declared
+    coordinates would have to change their order while their number differs from that of the names.
+    (Measured on 1,200 random joints.) OpenSim also rejects a name that no component may have, and
+    the name of a frame of the joint: it then renames the frame and does not find it.
     """
-    # OpenSim has renamed the second of a name by then, so that no axis names it.
+    # OpenSim has renamed the second coordinate of a name before, so that no axis names it.
     declared: list[str] = []
     for coordinate in list_coordinates(joint):
         declared.append(
@@ -48,7 +48,7 @@ def refuses_axes(joint: CustomJoint) -> bool:
         )
     names = list_axis_names(joint)
     if any(frame.name in names and frame.name not in declared for frame in joint.frames):
-        # The coordinate that is made up takes the name of the frame.
+        # The created coordinate takes the name of the frame.
         return True
     if not names:
         return bool(declared)

@@ -20,7 +20,7 @@ def write_baseline(path: str | Path, report: Report) -> int:
 
     Args:
         path: file of the baseline.
-        report: the findings.
+        report: findings of a check.
 
     Returns:
         Number of findings.
@@ -37,7 +37,7 @@ def subtract_baseline(path: str | Path, report: Report) -> Report:
 
     Args:
         path: file of the baseline.
-        report: the findings.
+        report: findings of a check.
 
     Raises:
         OsimliteError: the file is missing or is no baseline.

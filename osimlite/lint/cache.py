@@ -49,7 +49,7 @@ class Cache:
             key: key of the entry, from `make_key`.
         """
         try:
-            # Entries may be damaged or made by someone else, hence each value is checked before it
+            # Entries may be damaged or written by another program: each value is checked before it
             # is used.
             match json.loads(read_file(self._get_entry_path(file))):
                 case {
@@ -95,12 +95,12 @@ class Cache:
         """Cache the report of a file.
 
         Args:
-            file: its path.
-            key: what the entry holds for.
-            text: the text that was checked.
-            report: of it.
-            outside_paths: the paths at which the check looked for something.
-            since: when the check began, ns.
+            file: path of the file.
+            key: key of the entry, from `make_key`.
+            text: fingerprint of the text that was checked, from `fingerprint_text`.
+            report: report about the file.
+            outside_paths: paths of other files and folders on which the report depends.
+            since: time at which the check began, ns.
         """
         cache_path = self._get_entry_path(file)
         try:
@@ -133,7 +133,7 @@ class Cache:
 
 
 def make_key(file: str, config: Config) -> str:
-    """Return what a cache entry depends on: the path, the configuration, and the version of the code.
+    """Return a key from all that determines a report: path, configuration, version of the code.
 
     Args:
         file: path of the file.
@@ -169,7 +169,7 @@ def fingerprint_text(data: bytes) -> list[object]:
 
 
 def _stamp_file(file: str) -> list[int]:
-    """Return what changes with a file: its times (ns), its size and its inode."""
+    """Return a stamp that changes with a file: its times (ns), its size and its inode."""
     result = os.stat(file)
     return [result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino]
 
@@ -189,7 +189,7 @@ def _stamp_if_settled(file: str, moment: int) -> list[int] | None:
 def describe_code_version() -> str:
     """Return a text that identifies the code: in a working copy the newest modification time counts.
 
-    What is installed changes as a whole.
+    An installed package changes only as a whole.
     """
     # Only a working copy has pyproject.toml beside the package.
     package = Path(__file__).parents[1]
@@ -246,7 +246,7 @@ def _dump_finding(finding: Finding) -> list[object]:
 
 
 def _parse_finding(file: str, values: Any) -> Finding:
-    """Return the finding that `_dump_finding` made a list of; TypeError for anything else."""
+    """Return the finding from a list of `_dump_finding`; TypeError for anything else."""
     values = _check_types(values, *_FINDING)
     code, name, severity, message, line, column, length, component, suggestion, fix = values[:-1]
     consequence = values[-1]

@@ -1,4 +1,4 @@
-"""Base of everything that rules check: models, tables, setups, trials."""
+"""Base class of check targets: models, tables, setups, trials."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ class CheckTarget:
         return rule.about == self.about
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure paths and muscles or recall the results; return why not, if that fails.
+        """Measure paths and muscles, or recall the results; return the reason of a failure.
 
         Args:
-            anew: measure if there is no result yet; otherwise only recall one.
+            anew: whether to measure if there is no result yet; otherwise results are only recalled.
 
         Returns:
             The reason why nothing was measured; empty on success.
@@ -60,7 +60,7 @@ class CheckTarget:
         return ""
 
     def find_obstacles(self, *, anew: bool = True) -> str:
-        """Find what stops a computation, for rules that report it; return why not, if that fails.
+        """Find the reasons why the model cannot be computed; return why that failed, if so.
 
         Returns:
             The reason why nothing was computed; empty on success.

@@ -55,8 +55,8 @@ class Config:
         """Return the severity of a finding, given the severity `default` of its rule.
 
         Args:
-            rule: the rule.
-            default: severity that the finding has without settings.
+            rule: rule of the finding.
+            default: severity of the finding without settings.
         """
         # The first setting that matches decides, in the order of the configuration file.
         for selector, severity in self.severity.items():

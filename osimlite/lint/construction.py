@@ -126,14 +126,14 @@ def may_fail(subject: Subject) -> bool:
 
 
 def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
-    """Find what stops the computation of a model, and keep it with the subject.
+    """Find the reasons why a model cannot be computed, and cache them in the subject.
 
     Args:
-        subject: with the model.
-        anew: whether the model is built; otherwise only remembered results are taken.
+        subject: check target with the model, which keeps the obstacles.
+        anew: whether the model is built if necessary; otherwise only remembered results are used.
 
     Returns:
-        Why the model was not built; empty if it was, or if there was no need to.
+        Reason why the obstacles are unknown; empty if they are known.
     """
     if CONSTRUCTION in subject.cache:
         return ""

@@ -27,12 +27,12 @@ class Severity(StrEnum):
 
     @property
     def rank(self) -> int:
-        """0 for errors, more for what is less bad."""
+        """Rank of the severity: 0 for errors, larger for less severe findings."""
         return _RANKS[self]
 
 
 class Consequence(StrEnum):
-    """What OpenSim does with a file that has a fault.
+    """Consequence of a fault in OpenSim.
 
     REFUSES: it rejects the file or the model, crashes, or hangs, before it computes a motion.
     FAILS: it loads the model, and fails as soon as it needs the faulty part.
@@ -82,7 +82,7 @@ class Finding:
         component: absolute path of the component; empty without one.
         suggestion: text that would be correct at this position.
         fix: change that removes the finding.
-        consequence: what OpenSim does because of the fault; None if the rule does not say.
+        consequence: consequence of the fault in OpenSim; None if the rule does not say.
     """
 
     code: str
@@ -148,13 +148,13 @@ class MissingPackageNote(NamedTuple):
 
 
 MAX_LISTED = 5
-"""Findings that the text of a report lists."""
+"""Number of findings that the text of a report lists."""
 MAX_LINE_LENGTH = 160
-"""Letters of a finding in the text of a report."""
+"""Largest number of letters of a finding in the text of a report."""
 
 
 def _shorten_line(line: str) -> str:
-    """Return a line without what is beyond the most letters."""
+    """Return a line, cut after `MAX_LINE_LENGTH` letters."""
     return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 3]}..."
 
 
@@ -163,13 +163,13 @@ class Report:
     """All findings of one or several files, sorted by file and position.
 
     Attributes:
-        findings: the findings.
+        findings: findings, sorted by file and position.
         texts: text of each file with findings, for the snippets of a reporter.
         checked: number of files.
         known: number of findings that a baseline left out.
-        unmeasured: for each file where some rules did not run, because the model could not be
-            measured, a sentence with its name, the rules and the reason.
-        passed: files of a folder that were skipped because they are not OpenSim's.
+        unmeasured: sentences about files whose models could not be measured, each with the file,
+            the rules that did not run, and the reason.
+        passed: paths of files that were skipped because they are not OpenSim's.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -218,7 +218,7 @@ class Report:
         return Counter(finding.code for finding in self.findings)
 
     def missing_package_notes(self) -> list[MissingPackageNote]:
-        """Return a note for each file that was not measured for want of the numeric packages.
+        """Return a note for each file that was not measured because numeric packages are missing.
 
         Reports for programs contain these notes; other reasons follow from findings, which they
         contain anyway.

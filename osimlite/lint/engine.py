@@ -27,7 +27,7 @@ def check_source(source: Source, config: Config | None = None) -> Report:
     """Check a text: a table if its file name says so, otherwise a document.
 
     Args:
-        source: the text.
+        source: text of the file.
         config: configuration of the check.
 
     Returns:
@@ -45,7 +45,7 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
     """Return the check target of a text, chosen by the name of its file.
 
     Args:
-        source: the text.
+        source: text of the file.
         config: configuration of the check.
     """
     activate_plugin_classes(config)
@@ -79,7 +79,7 @@ def activate_plugin_classes(config: Config | None) -> None:
         config: configuration whose `classes` names the files of plug-in classes; None for none.
     """
     if config is None or not config.classes:
-        # Those of an earlier check in the same process must not stay.
+        # Classes of an earlier check in the same process must not stay.
         register_plugin_classes({})
         return
     # Imported here only, because few projects have plug-ins.
@@ -103,7 +103,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     """Run every selected rule, and return all findings sorted by position.
 
     Args:
-        subject: what is checked.
+        subject: check target, for example a model or a table.
         measure: whether to run rules that need measurements of paths and muscles, or a construction
             of the model, which takes longer.
         recall: whether to run these rules where cached results exist, even without `measure`.
@@ -125,7 +125,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     if measuring:
         why_not = subject.measure(anew=measure) if measure or recall else "not requested"
     left_out = [*(measuring if why_not else []), *(building if unbuilt else [])]
-    # What stops a computation is not reported where another rule has reported its cause.
+    # Failures of a computation are not reported where another rule has reported their cause.
     selected.sort(key=lambda rule: rule.about == CONSTRUCTION)
     checks: dict[Check, dict[str, Rule]] = {}
     for rule in selected:
@@ -144,7 +144,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     comments = subject.suppressions()
     if comments:
         findings = _apply_suppressions(subject, comments, findings, left_out)
-    # Rules may find the same fault on two ways, for example by a class and by its base.
+    # Two rules may find the same fault, for example by a class and by its base.
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
     why_not = why_not or unbuilt

@@ -6,9 +6,9 @@ They are listed in the module of the rule::
     - <accuracy>0.5</accuracy>
     + <accuracy>1e-5</accuracy>
 
-The code of a fault is that of its rule and two digits more, so that whatever names the rule
-(`--select`, a comment, a setting, a baseline) means all its faults. `ik` is the document around the
-lines of the example, and a fault that has fixes says of what kind: ``error, fix safe, in ik``.
+The code of a fault is that of its rule with two more digits. A name of the rule (in `--select`, a
+comment, a setting or a baseline) therefore means all its faults. `ik` is the document around the
+lines of the example. A fault with fixes states their kind: ``error, fix safe, in ik``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from osimlite.base.named_tuples import NamedTuple
 class RuleFault(NamedTuple):
     """Fault of a group rule: suffix of its code, name, severity, fixes, example.
 
-    In the `frame` a line with {} stands for the `lines` of the example.
+    In the `frame`, the `lines` of the example replace a line with {}.
     """
 
     number: str
@@ -34,7 +34,7 @@ class RuleFault(NamedTuple):
 
     @property
     def summary(self) -> str:
-        """The first sentence of the page."""
+        """First sentence of the page."""
         return self.text.partition(". ")[0].rstrip(".") + "."
 
     def page(self, group: str) -> str:

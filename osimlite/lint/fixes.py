@@ -18,7 +18,7 @@ def replace_text(
     """Return the fix that replaces the text at a position; None without a source, position or text.
 
     Args:
-        source: the text; None for a model made in Python.
+        source: text of the file; None for a model made in Python.
         position: position of the old text.
         text: new text; None without a suggestion.
         safe: whether the fix is certain.
@@ -36,7 +36,7 @@ def replace_name(
     """Return the fix that replaces a name; None if another text is at the position.
 
     Args:
-        source: the text; None for a model made in Python.
+        source: text of the file; None for a model made in Python.
         position: position of the name.
         expected: present name.
         text: new name.
@@ -62,7 +62,7 @@ def rename_tag(
     """Return the fix that gives an element another tag.
 
     Args:
-        source: the text; None for a model made in Python.
+        source: text of the file; None for a model made in Python.
         number: index of the element.
         tag: new tag; None without a suggestion.
         safe: whether the fix is certain.
@@ -82,7 +82,7 @@ def remove_element(source: Source | None, number: int) -> Fix | None:
     """Return the fix that deletes an element, with its line if nothing else is on it.
 
     Args:
-        source: the text; None for a model made in Python.
+        source: text of the file; None for a model made in Python.
         number: index of the element.
     """
     if source is None:
@@ -97,7 +97,7 @@ def comment_out(source: Source | None, number: int) -> Fix | None:
     A text that a comment cannot hold is left as it is: there is no fix then.
 
     Args:
-        source: the text; None for a model made in Python.
+        source: text of the file; None for a model made in Python.
         number: index of the element.
     """
     if source is None:
@@ -119,7 +119,7 @@ def remove_attribute(source: Source | None, number: int, name: str) -> Fix | Non
     """Return the fix that deletes an attribute.
 
     Args:
-        source: the text; None for a model made in Python.
+        source: text of the file; None for a model made in Python.
         number: index of the element.
         name: name of the attribute.
     """
@@ -133,7 +133,7 @@ def remove_text(source: Source, start: int, end: int) -> Fix:
     """Return the fix that deletes a text without meaning.
 
     Args:
-        source: the text.
+        source: text of the file.
         start: offset of the first character.
         end: offset after the last character.
     """
@@ -181,7 +181,7 @@ def apply_fixes(source: Source, report: Report, *, unsafe: bool = False) -> tupl
     """Return the bytes of a file after its fixes; raises as `apply_fixes_in_pieces` does.
 
     Args:
-        source: the text.
+        source: text of the file.
         report: findings with fixes.
         unsafe: whether to apply fixes that are not safe, too.
 
@@ -198,7 +198,7 @@ def apply_fixes_in_pieces(
     """Return the bytes of a file after its fixes in pieces, which are views for a table; a document keeps its encoding.
 
     Args:
-        source: the text.
+        source: text of the file.
         report: findings with fixes.
         unsafe: whether to apply fixes that are not safe, too.
 

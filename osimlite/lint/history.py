@@ -14,15 +14,15 @@ from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 NEWEST = "4.6"
-"""The release of OpenSim whose classes osimlite declares."""
+"""Release of OpenSim whose classes osimlite declares."""
 
 
 class LaterChanges(NamedTuple):
-    """What later releases added to a release.
+    """Classes and properties that releases after a given one added.
 
     `format` is the newest version of documents that the release writes. `classes` has the first
-    release of each class by its tag; `properties`, by class and tag, that of each property and the
-    name that it had before, if it had one.
+    release of each class by its tag. `properties` has the first release of each property and its
+    earlier name, if any, by class and tag.
     """
 
     format: int
@@ -31,7 +31,7 @@ class LaterChanges(NamedTuple):
 
 
 class NewProperty(NamedTuple):
-    """A property that came after a release, the release that has it first, and what it was called before."""
+    """Property that is newer than a release, the first release with it, and its earlier name."""
 
     spec: FieldSpec
     since: str
@@ -40,7 +40,7 @@ class NewProperty(NamedTuple):
 
 @cache
 def load_later_changes(release: str) -> LaterChanges:
-    """Return what later releases added to a release; OsimliteError if the release is unknown."""
+    """Return the additions of the releases after one; OsimliteError if the release is unknown."""
     if release == NEWEST:
         return LaterChanges(CURRENT_VERSION, {}, {})
     import json
@@ -70,7 +70,7 @@ def load_later_changes(release: str) -> LaterChanges:
 
 @cache
 def find_new_properties(cls: type[Object], release: str) -> list[NewProperty]:
-    """Return the properties that a class got after a release."""
+    """Return the properties of a class that are newer than a release."""
     later = load_later_changes(release).properties
     names = {
         spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}")

@@ -1,4 +1,4 @@
-"""The possible inertia nearest to one that is not."""
+"""Projection of an impossible inertia onto the nearest possible one."""
 
 from __future__ import annotations
 

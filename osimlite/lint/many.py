@@ -49,15 +49,15 @@ def check_files(
         files: paths, ``-`` for standard input.
         options: configuration with precedence over the settings of the project.
         cached: whether to take findings of unchanged files from the cache, and to cache new ones.
-        processes: number of processes; as many as are worth starting by default.
-        progress: called with the numbers of files that are done and of all files.
+        processes: number of processes; by default as many as are worth starting.
+        progress: function that receives the numbers of checked files and of all files.
 
     Returns:
         The reports of all files together.
 
     Raises:
         MissingFileError: a file is missing or cannot be read.
-        OsimliteError: the settings make no sense.
+        OsimliteError: the settings are invalid.
     """
     result: dict[str, Report] = {}
     texts = SourceTexts()
@@ -153,7 +153,7 @@ def _ignore_interrupts() -> None:
 
 
 def count_processes(jobs: list[CheckJob]) -> int:
-    """Return how many processes are worth starting for files of these sizes."""
+    """Return the number of processes that are worth starting for the sizes of the files."""
     size = 0
     for job in jobs:
         try:

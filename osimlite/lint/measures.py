@@ -37,10 +37,10 @@ MECHANISM = "mechanism"
 """Key of the mechanism that construction has built, kept with a subject until its paths and muscles are measured."""
 
 MEASURES = "measures"
-"""What rules are about that need them."""
+"""Value of `about` of the rules that need measurements, and key of these in a subject."""
 
 NEEDS_SIM = "they need osimlite[sim]"
-"""Begins the reason why nothing is measured where the numeric packages are not installed."""
+"""Beginning of the reason why nothing is measured without the numeric packages."""
 
 MAX_WRAPS_UNCOMPILED = 12
 """Number of wraps up to which kernels are not compiled for a model."""
@@ -49,7 +49,7 @@ _MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
 
 
 class CoordinateSetting(NamedTuple):
-    """A value of a coordinate in its unit: rad, m or none."""
+    """Value of a coordinate in its unit: rad, m or none."""
 
     coordinate: str
     value: float
@@ -80,15 +80,15 @@ class MeasuringPose(NamedTuple):
 class WrappingError(NamedTuple):
     """Path length around surfaces in OpenSim compared with geodesics."""
 
-    owner: str  # path of what has it
+    owner: str  # path of the component that has the path
     surfaces: tuple[str, ...]  # names of the surfaces
-    default: float  # by how much it is longer in the default pose, m; NaN if there is no geodesic
-    worst: float  # where that is most, m
-    pose: MeasuringPose  # there
+    default: float  # excess length in the default pose, m; NaN if there is no geodesic
+    worst: float  # largest excess length, m
+    pose: MeasuringPose  # pose with the largest excess length
 
 
 class PathJump(NamedTuple):
-    """Jump of a path length (m), where it is, and which points or surfaces appear or disappear there."""
+    """Jump of a path length (m), its pose, and the points or surfaces that appear or disappear."""
 
     owner: str
     size: float
@@ -106,43 +106,44 @@ class LengthOnSurface(NamedTuple):
 
 
 class MovingPoint(NamedTuple):
-    """A moving point at an end of its coordinate's range."""
+    """Moving point at an end of its coordinate's range."""
 
-    owner: str  # path of what has the point
-    point: str  # its name
-    end: CoordinateSetting  # of the range
-    # distance of the coordinate from the range in which the functions are defined (rad or m), 0 if
-    # inside
+    owner: str  # path of the component that has the point
+    point: str  # name of the point
+    end: CoordinateSetting  # end of the range of the coordinate
+    # Distance of the coordinate from the range in which the functions are defined (rad or m), 0 if
+    # inside.
     beyond: float
-    moved: float  # how far they let the point move on that way, m
-    # of the place over the coordinate that OpenSim continues with outside the range, m/rad or 1
+    moved: float  # displacement of the point over that distance, m
+    # Derivative of the position by the coordinate with which OpenSim continues outside of the
+    # range, m/rad or 1.
     rate: float
 
 
 class MuscleStart(NamedTuple):
     """Initial state and equilibrium of a muscle at the same activation in the default pose."""
 
-    owner: str  # its path
-    # fiber lengths in optimal fiber lengths; NaN without an equilibrium
+    owner: str  # path of the muscle
+    # Fiber lengths in optimal fiber lengths; NaN without an equilibrium.
     lengths: tuple[float, float]
-    tensions: tuple[float, float]  # of the tendon, in max_isometric_force
+    tensions: tuple[float, float]  # tendon forces in max_isometric_force
 
 
 class FiberReach(NamedTuple):
     """Equilibrium of muscle fibers: fully active at the shortest path, or at rest at the longest path."""
 
     owner: str  # path of the muscle
-    is_active: bool  # whether they are
-    pose: MeasuringPose  # where
-    length: float  # of the fibers, in optimal fiber lengths
-    is_limit: bool  # whether that is the least that its curves and its pennation allow
+    is_active: bool  # whether the muscle is fully active
+    pose: MeasuringPose  # pose with the shortest or longest path
+    length: float  # fiber length in optimal fiber lengths
+    is_limit: bool  # whether it is the least length that curves and pennation allow
 
 
 class Measures(NamedTuple):
     """Measurements of a model."""
 
-    # for each path the places in the mechanism of the coordinates that change its length; in what
-    # poses a path is looked at, those of all paths say
+    # Indices in the mechanism of the coordinates that change the length of a path, by path. All of
+    # these coordinates are swept, for every path.
     swept: dict[str, tuple[int, ...]]
     wrappings: list[WrappingError]
     jumps: list[PathJump]
@@ -180,7 +181,7 @@ def find_swept_coordinates(measures: Measures) -> set[int]:
 
 
 class NoMachineCodeError(OsimliteError):
-    """A model cannot be measured in a reasonable time, since kernels run as Python only."""
+    """Error for a model whose measurement takes too long, since kernels run as Python."""
 
 
 def has_measures(subject: Subject) -> bool:
@@ -189,11 +190,12 @@ def has_measures(subject: Subject) -> bool:
 
 
 def measure_subject(subject: Subject, *, anew: bool = True) -> str:
-    """Measure a model, or recall its measurements; return why not, if that fails.
+    """Measure a model, or recall its measurements; return the reason of a failure.
 
     Args:
-        subject: with the model.
-        anew: whether more is done than to recall what was measured before.
+        subject: check target with the model, which keeps the measurements.
+        anew: whether the model is measured if necessary; otherwise only earlier measurements are
+            recalled.
 
     Returns:
         The reason why the model was not measured; empty on success.
@@ -241,7 +243,7 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
         fault = error.__context__ if isinstance(error, OsimliteError) else error
         if not isinstance(fault, ArithmeticError | ValueError):
             return str(getattr(error, "message", error))
-        # Numbers that other rules have something to say of.
+        # Other rules report numbers with which nothing can be computed.
         return f"a number is too large to compute with ({fault})"
     subject.cache[MEASURES] = result
     if text_parts is not None:
@@ -264,8 +266,8 @@ _INDEPENDENT_CLASSES = {"Geometry", "Marker", "Controller", "Probe", "ContactGeo
 class TextParts(NamedTuple):
     """Digests of the parts of a text."""
 
-    rest: str  # of all that paths move with
-    paths: dict[str, str]  # of the element of each path's owner, by its path
+    rest: str  # digest of everything on which all paths depend
+    paths: dict[str, str]  # digest of the element of each path's owner, by component path
 
 
 class RememberedMeasures(NamedTuple):
@@ -311,8 +313,8 @@ def digest_parts(subject: Subject) -> TextParts | None:
     covered_end = 0
     for start, end, path in sorted(spans):
         if start >= covered_end:
-            # Space around an element says nothing, so that one more does not change what is around
-            # it.
+            # White space around an element has no meaning: an added element must not change the
+            # digest of its surroundings.
             rest_digest.update(source.text[covered_end:start].strip().encode("utf-8", "replace"))
             covered_end = end
         if path:
@@ -327,8 +329,8 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
     """Return cached measurements of a model with these parts; some paths may be missing.
 
     Args:
-        parts: of the text.
-        folder: where it may be kept.
+        parts: digests of the parts of the model's text.
+        folder: folder of the cache; None for the memory alone.
     """
     recalled = remembered.get(parts.rest)
     if recalled is None and folder is not None:
@@ -349,9 +351,9 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
     """Cache the measurements of a model.
 
     Args:
-        parts: of the text.
-        measures: of its model.
-        folder: where it is kept; in memory alone if None.
+        parts: digests of the parts of the model's text.
+        measures: measurements of the model.
+        folder: folder of the cache; None for the memory alone.
     """
     entry = remembered[parts.rest] = RememberedMeasures(parts.paths, measures)
     remembered.move_to_end(parts.rest)

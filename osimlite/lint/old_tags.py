@@ -1,4 +1,4 @@
-"""Tags of older formats: what stands for them now. In a file of the current version OpenSim passes over them."""
+"""Tags of older formats, which OpenSim ignores in current files, and their replacements."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
         "coordinates_in_degrees": "the header of the coordinate_file says inDegrees"
     },
 }
-"""Tags of real files that OpenSim 4.6 reads in no version of a document, and what does their work."""
+"""Tags of real files that OpenSim 4.6 reads in no version of a document, with replacements."""
 _COMMENTS: Final = frozenset(
     (
         "annotation",
@@ -129,7 +129,7 @@ _CONNECTEE = compile_later(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")
 
 
 def successor(cls: type[Object], tag: str) -> Successor | None:
-    """Return what replaces an old tag in objects of a class; None for a tag that no version had."""
+    """Return the replacement of an old tag in objects of a class; None for an unknown tag."""
     specs = get_field_specs(cls)
     for base in cls.__mro__:
         candidate = _OLD.get(base.__name__, {}).get(tag)
@@ -144,7 +144,7 @@ def successor(cls: type[Object], tag: str) -> Successor | None:
 
 
 def reason_unused(cls: type[Object], tag: str) -> str | None:
-    """Return what does the work of a tag that no version of OpenSim reads in a class, or None."""
+    """Return the replacement of a tag that no version of OpenSim reads in a class, or None."""
     for base in cls.__mro__:
         reason = _UNUSED.get(base.__name__, {}).get(tag)
         if reason is not None:

@@ -75,7 +75,7 @@ def describe_severity(rule: Rule) -> str:
 
 
 def describe_consequences(rule: Rule) -> str:
-    """Return what OpenSim does because of the errors of a rule, such as ``computes NaN``; empty if the rule does not say."""
+    """Return the consequences of the errors of a rule, such as ``computes NaN``; "" if unknown."""
     return ", or ".join(map(_CONSEQUENCE_TEXTS.__getitem__, rule.consequences))
 
 

@@ -1,12 +1,12 @@
-"""Where bodies are in a pose, as far as it can be told without the numeric library.
+"""Positions of bodies in a pose, as far as they can be computed without numpy.
 
-That is not needed to validate. So what takes it has no known place: a joint along a smoothing
-spline, and one whose motion is a rule of its class; and what hangs on another joint, on a
-prescribed coordinate or on a frame laid through stations. Constraints, which may move the model
-when it is assembled, are left out.
+The linter does not require numpy. Some positions are therefore unknown: those of joints along a
+smoothing spline or with a motion that only their class defines, and of everything beyond another
+joint, a prescribed coordinate or a frame through stations. Constraints, which may move the model
+when it is assembled, are ignored.
 
-Where centimetres do not matter, smoothing splines are taken for straight lines between their
-points, and prescribed coordinates have the values they are given.
+Where centimetres do not matter, smoothing splines are replaced by straight lines between their
+points, and prescribed coordinates have the values of the caller.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class FramePose(NamedTuple):
 
 
 FrameLocation = tuple[Component, FramePose] | None
-"""The body or ground that a frame is fixed to, and where it is on it."""
+"""Body or ground to which a frame is fixed, and the pose of the frame in it."""
 
 
 def make_offset(angles: Vector, position: Vector) -> FramePose:
@@ -110,8 +110,8 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
     """Return the body or ground that a frame is fixed to, and its pose there; None if unknown.
 
     Args:
-        subject: the check target.
-        frame: the frame.
+        subject: check target with the model.
+        frame: frame of the model; None if it is unknown.
     """
     pose = FramePose()
     depth = 0
@@ -149,7 +149,7 @@ def compute_poses(
     """Return the pose in ground of each body that can be located, by its identity.
 
     Args:
-        subject: the model.
+        subject: check target with the model.
         values: values of coordinates, rad or m; the others have their defaults. With values,
             positions may be off by some centimetres.
 
@@ -164,7 +164,7 @@ def compute_poses(
     # Breadth first from ground, as in the assembly of the tree of joints.
     while pending:
         base = pending.pop(0)
-        # A joint may connect its parent or its child to what is known; either end may be located
+        # Either the parent or the child of a joint may be the known end, and either may be located
         # first.
         for link in bones.find_joints(base):
             parent, child = ends[id(link.joint)]
@@ -202,7 +202,7 @@ class _JointMotion(NamedTuple):
     function: SmoothFunction | None = None
 
     def amount(self, values: Mapping[str, float]) -> float:
-        """Return how far the joint moves along this axis (rad or m)."""
+        """Return the rotation or translation along this axis (rad or m)."""
         arguments = [values.get(name, 0.0) for name in self.names]
         return arguments[0] if self.function is None else self.function.evaluate(arguments)[0]
 
@@ -295,8 +295,8 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
     """Return the rotation axes of a gimbal or custom joint in the default pose.
 
     Args:
-        subject: the check target.
-        joint: the joint.
+        subject: check target with the model.
+        joint: joint of the model.
 
     Returns:
         The coordinate of each rotation and its axis, a unit vector in the parent frame. Empty for a
@@ -309,7 +309,7 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
     for motion in _find_joint_motions(subject, False).get(id(joint), []):
         if not motion.turns or len(motion.names) != 1:
             continue
-        # Without a direction the rotation cannot be computed, and neither can all that follow.
+        # Without a direction neither this rotation nor the following ones can be computed.
         if motion.names[0] not in values or motion.axis == ZERO:
             return []
         result[motion.names[0]] = combine_axes(axes, motion.axis)

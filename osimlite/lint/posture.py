@@ -68,7 +68,7 @@ def locate_markers(setup: Setup) -> dict[str, Vector]:
     model = make_model_subject(setup)
     poses = compute_poses(model, {})
     result: dict[str, Vector] = {}
-    # What a set of markers adds has absolute paths.
+    # Markers that a set adds have absolute paths.
     added = [item for _, top in setup.added_sets for item in top.walk() if is_a(item, "Marker")]
     for marker in (*model.find_by_class("Marker"), *added):
         frame = locate_frame(
@@ -83,6 +83,6 @@ def locate_markers(setup: Setup) -> dict[str, Vector]:
 
 @cache_per_subject
 def make_model_subject(setup: Setup) -> Subject:
-    """Return the model that the tool of a setup works on, as rules on models see it."""
+    """Return the model of the tool of a setup as a check target for rules on models."""
     assert setup.tree is not None
     return Subject(setup.tree.model)

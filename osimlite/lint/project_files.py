@@ -30,11 +30,10 @@ _COMPOUND = compile_later(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
 def is_opensim_xml(beginning: bytes) -> bool:
     """Return whether XML with this beginning is OpenSim's: by its root, even misspelt, or its content.
 
-    What it holds is OpenSim's if two elements at least are properties of the class that they stand
-    in.
+    Content is OpenSim's if at least two elements are properties of the class of their parent.
     """
-    # A file in UTF-16 is read as well, and reported.
-    # UTF-16 of ASCII text is ASCII with zero bytes between.
+    # A file in UTF-16 is checked, too, and reported. UTF-16 of ASCII text is ASCII with zero bytes
+    # between.
     text = beginning.replace(b"\0", b"").decode("latin-1")
     if _ROOT.search(text):
         return True
@@ -65,7 +64,7 @@ def find_misspelt_name(word: str, candidates: Iterable[str]) -> str | None:
     """Return the known name that differs from a word in letter case and at most two letters; None without one.
 
     Args:
-        word: the word.
+        word: word to compare.
         candidates: known names.
     """
     lower_word = word.lower()
@@ -126,9 +125,9 @@ def _is_property(owner: str, tag: str) -> bool:
 
 
 DOCUMENTS = (".xml", ".omoco")
-"""Setups of tools and what they consist of."""
+"""Suffixes of setups of tools and of their parts."""
 PROJECT = (".osim", *DOCUMENTS, *TABLE_SUFFIXES)
-"""Everything that belongs to a project."""
+"""Suffixes of all files of a project."""
 
 
 def is_table(file: str | None) -> bool:
@@ -150,8 +149,8 @@ def find_project_files(
 ) -> list[str]:
     """Return the named files, and OpenSim's files with some suffixes in the named folders, each once.
 
-    With `only_ours`, XML of other programs is passed over even where it is named. What is passed
-    over is added to `passed`.
+    With `only_ours`, XML files of other programs are skipped even if they are named. Skipped files
+    are added to `passed`.
 
     Raises:
         MissingFileError: a path does not exist.
@@ -183,7 +182,7 @@ def find_project_files(
             result.append(str(path))
         else:
             skipped.append(str(path))
-    # Of a file that is named twice the first spelling of its path remains.
+    # A file that is named twice keeps the first spelling of its path.
     return list({os.path.abspath(file): file for file in reversed(result)}.values())[::-1]
 
 
@@ -193,6 +192,6 @@ def is_opensim_file(file: str) -> bool:
         return True
     try:
         return is_opensim_xml(read_at_most(file, BEGINNING))
-    # An unreadable file is reported by the check, not passed over.
+    # An unreadable file is reported by the check, not skipped.
     except OsimliteError:
         return True

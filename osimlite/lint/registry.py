@@ -1,4 +1,4 @@
-"""The registry of rules: what a rule is, how it is registered, and where all rules are.
+"""Registry of rules, with the classes of a rule and of its callback.
 
 A rule is a function of a subject and of `report`, which it calls once per finding. Its docstring is
 the page that ``osimlite rule CODE`` prints.
@@ -39,11 +39,11 @@ FAMILIES = {
     "8": "data",
     "9": "trials",
 }
-"""The families of rules by the first digit of their codes."""
+"""Names of the families of rules by the first digit of their codes."""
 
 
 class Threshold(NamedTuple):
-    """A limit at which a rule starts to report, which a project can change.
+    """Limit at which a rule starts to report, which a project can change.
 
     `name` is its key under ``[tool.osimlite.thresholds]``, `meaning` one phrase for the rule's page.
     """
@@ -83,22 +83,22 @@ class FindingCollector:
         differs in letter case only.
 
         Args:
-            message: what is wrong, the consequence in OpenSim, and the next step.
-            item: the object concerned.
+            message: sentence about the fault, its consequence in OpenSim, and the next step.
+            item: object that has the fault.
             fault: name of the fault, in a group rule.
             at: position in the text.
-            severity: severity, if it is not that of the rule.
-            consequence: what OpenSim does, for an error of a rule with several consequences.
-            suggestion: the text that would be right at this position.
+            severity: severity of the finding; by default that of the rule.
+            consequence: consequence in OpenSim, for an error of a rule with several consequences.
+            suggestion: text that would be right at this position.
             certain: whether the suggestion is certainly right.
-            fix: the fix.
-            **where: more arguments of :meth:`Subject.position`.
+            fix: change of the text that removes the finding.
+            **where: further arguments of :meth:`Subject.position`.
         """
         rule = self.rules.get(fault)
         subject = self.subject
         if rule is None:
             return
-        # Severities in the settings do not change what OpenSim does.
+        # Severities in the settings do not change the consequence in OpenSim.
         severity = severity or rule.severity_in(subject.version)
         if at is None and (item is not None or where.get("number") is not None):
             at = subject.position(item, **where)
@@ -140,15 +140,14 @@ FixKinds = Literal["", "safe", "unsafe", "both"]
 class Rule:
     """Registered rule.
 
-    `severity` is that of its findings unless it says otherwise of one; `before` has another for
-    documents older than a version, where OpenSim does something else with them. `fixes` says of
-    what kind its fixes are, `about` what it looks
-    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's
-    paths and muscles), ``construction`` (what stops the computation of a model), ``trial`` (what
-    was measured of a finished one). `consequences` are all things that OpenSim may do because of
-    its errors: a single one holds for all of them, of several each finding names its own. A rule
-    that tells faults apart is a `group`: there is a rule for each `fault`, all with the same
-    `check`.
+    `severity` is the default severity of its findings; `before` has another one for documents older
+    than a version, which OpenSim treats differently. `fixes` is the kind of its fixes. `about` is
+    the type of subject: ``model``, ``table``, ``document`` (a setup, or a part of one),
+    ``measures`` (of the model's paths and muscles), ``construction`` (obstacles to the computation
+    of a model), or ``trial`` (measurements of a finished trial). `consequences` lists the possible consequences
+    of its errors in OpenSim: a single one holds for all errors; of several, each finding names its
+    own. A rule that distinguishes faults is a `group`: there is a rule for each `fault`, all with
+    the same `check`.
     """
 
     code: str
@@ -165,7 +164,7 @@ class Rule:
 
     @property
     def family(self) -> str:
-        """The family the code belongs to."""
+        """Family of rules to which the code belongs."""
         return FAMILIES[self.code[4]]
 
     @property
@@ -192,7 +191,7 @@ class Rule:
 
     @property
     def summary(self) -> str:
-        """The first line of the page."""
+        """First line of the page."""
         summary = (
             self.fault.summary
             if self.fault is not None
@@ -209,9 +208,9 @@ class Rule:
     def consequence_of(
         self, severity: Severity, stated: Consequence | None = None
     ) -> Consequence | None:
-        """Return what OpenSim does because of a finding; None if the rule does not say.
+        """Return the consequence of a finding in OpenSim; None if the rule does not say.
 
-        OpenSim runs what has no error, by the definition of :class:`Severity`.
+        OpenSim runs files without errors, by the definition of :class:`Severity`.
 
         Args:
             severity: severity of the finding, before settings change it.
@@ -255,8 +254,8 @@ def rule(
 ) -> Callable[[Check], Check]:
     """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
 
-    With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples
-    that stand in `frames`.
+    With `faults` it is a group. The faults are listed in the form of :mod:`osimlite.lint.faults`,
+    with examples in the documents of `frames`.
 
     Returns:
         A decorator, which leaves the function as it is.
@@ -345,7 +344,7 @@ RULE_MODULES: Mapping[str, tuple[str, ...]] = {
     "table": ("marker_tables", "table_rows", "tables"),
     "trial": ("trial_forces", "trial_motion"),
 }
-"""Modules of `osimlite.lint.rules` by what their rules are about.
+"""Modules of `osimlite.lint.rules` by the type of subject that their rules check (`Rule.about`).
 
 Modules are loaded only for subjects of their kind.
 """

@@ -27,10 +27,10 @@ _MAX_FAULTS = 50
 class RowFault(NamedTuple):
     """Fault in the rows of a table: its kind and column, its first position, and how often it occurs.
 
-    `kind` is ``cell`` (no number), ``row`` (`number` says how many cells, `text` more),
+    `kind` is ``cell`` (no number), ``row`` (`number` of cells, `text` with details),
     ``comment``, ``blank``, ``order``, ``time`` (no number), ``part`` (a part of a marker), ``zero``
-    (a marker at the origin) or ``frame`` (a wrong number). `others` is how many more columns have
-    such a fault that is not told.
+    (a marker at the origin) or ``frame`` (a wrong number). `others` is the number of further
+    columns with such a fault, which are not reported.
     """
 
     kind: str
@@ -97,10 +97,10 @@ class TableRows:
 
 
 BLOCK = 16_000
-"""Bytes that are looked at together: few enough for the fastest memory of a processor."""
+"""Number of bytes that are examined together: few enough for the cache of a processor."""
 
 _LONGEST = 4_000_000
-"""Bytes of a line whose look would take too much memory."""
+"""Length of a line, in bytes, above which recognising its shape would take too much memory."""
 _SAMPLES = 64
 """Number of rows at the beginning that are all samples; later rows are sampled ever more sparsely."""
 _SAMPLED = 200_000
@@ -112,7 +112,7 @@ _WORD = compile_later(rb"\S+")
 _LETTER = compile_later(rb"[A-Za-z]")
 # A line with a digit, NaN or infinity is taken for a row, even if it has letters as well.
 _OF_ROW = compile_later(rb"\d|\b(?:nan|inf)", re.IGNORECASE)
-# OpenSim takes a line that begins with a tab or a blank for no frame.
+# For OpenSim, a line that begins with a tab or a blank is no frame.
 _FRAME = compile_later(rb"^[^\t\r\n ]", re.MULTILINE)
 
 
@@ -138,7 +138,7 @@ class RowScanner:
         """Scan the rows from an offset on, which is in this line of the file.
 
         Returns:
-            What was noted of the rows.
+            Number, times, faults and samples of the rows.
         """
         self.rows.cells = self.cells
         if self.markers:
@@ -191,7 +191,7 @@ class RowScanner:
                     elif self.rows.count:
                         self._note_fault("blank", 0, line + indices[0], 0, b"", times=len(indices))
             line += len(lines)
-        # Without rows every marker would be missing, which is not what is wrong with such a table.
+        # Without rows every marker would be missing, which is not the fault of such a table.
         if not self.rows.count:
             self.rows.unseen.clear()
         return self.rows
@@ -274,7 +274,7 @@ class RowScanner:
             start += len(cell) + 1
 
     def _count_missing_samples(self) -> int:
-        """Return how many more rows become samples."""
+        """Return the number of further rows that become samples."""
         return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(
             self.rows.samples
         )
@@ -287,7 +287,7 @@ class RowScanner:
 
     def examine_odd_line(self, text: bytes, line: int) -> None:
         """Examine one line that is not a valid row, cell by cell."""
-        # A byte for each character, so that places are those of characters.
+        # One byte for each character, so that offsets count characters.
         text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
         if not text.strip():
             if self.rows.count:
@@ -394,8 +394,8 @@ class RowScanner:
 
         Args:
             text: text of the row.
-            line: number of its line.
-            time: its time, s.
+            line: number of the line.
+            time: time of the row, s.
             previous_time: time of the row before, s.
         """
         # Rows of marker files have a frame number before the time.

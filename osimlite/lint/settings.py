@@ -77,7 +77,7 @@ def load_settings(folder: Path) -> Settings:
     """Return the settings of a folder: those of the nearest file that has any.
 
     Raises:
-        OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.
+        OsimliteError: the file is not TOML, or has an unknown or invalid setting.
     """
     result = find_settings(folder)
     return Settings() if result is None else _parse_settings(*result)

@@ -81,7 +81,7 @@ class Setup(Subject):
 
     @cached_property
     def items(self) -> list[Object]:
-        """Every object, in the order of the document."""
+        """Objects of the document, in its order."""
         return [] if self.top is None else list(self.top.walk())
 
     @cached_property
@@ -118,12 +118,12 @@ class Setup(Subject):
 
     def _find_element(self, item: Object | None) -> int | None:
         """Return the element of an object; the top element if the text does not contain the object."""
-        # The top element is the place of findings on what is missing in the document.
+        # Findings on missing parts of the document are at the top element.
         number = None if item is None else item._index
         return number if number is not None or self.top is None else self.top._index
 
     def list_outside_paths(self) -> list[str] | None:
-        """Return every path that the check looked at."""
+        """Return every path on which the check depends."""
         paths = super().list_outside_paths()
         return None if paths is None else [*paths, *self._looked_at]
 
@@ -136,14 +136,14 @@ class Setup(Subject):
                 yield FileReference(item, spec, name, self.resolve_path(name.strip()))
 
     def resolve_path(self, name: str) -> str:
-        """Return where OpenSim finds a file of this setup, if it is started in the folder of the setup."""
+        """Return the path of a file as OpenSim finds it when started in the folder of the setup."""
         folder = str(self.folder or Path())
         path = os.path.join(folder, name)
         # Recorded for the cache of reports: the finding changes when a file appears here.
         self._looked_at[path] = None
         if not os.path.isfile(path):
             self._looked_at[os.path.dirname(path)] = None
-            # A file that is not there is taken from the working folder.
+            # A file that is not in that folder is searched in the working folder.
             if os.path.isfile(name) and not os.path.isabs(name):
                 return name
         return path
@@ -177,7 +177,7 @@ class Setup(Subject):
     def iterate_neighbours(self) -> Iterator[tuple[str, Object]]:
         """Yield tools in this folder, its parent, and folders beside and below, with the paths of their setups.
 
-        A folder is read when its first tool is asked for: most sets are read by a tool of their own folder.
+        A folder is read at the first access: most sets belong to a tool in their own folder.
         """
         if self.folder is None:
             return
@@ -208,7 +208,7 @@ class Setup(Subject):
         """Return the tools that name a model in setup files directly in a folder, and note what was read.
 
         Args:
-            folder: the folder; its first `_MAX_NEIGHBOURS` documents are read.
+            folder: path of the folder; its first `_MAX_NEIGHBOURS` documents are read.
 
         Returns:
             Path of each setup, and its tool.
@@ -236,7 +236,7 @@ class Setup(Subject):
         return next(self.find_readers(), None)
 
     def find_readers(self) -> Iterator[tuple[str, Object]]:
-        """Yield the tool that this is, or all tools that read this; with the paths of their setups."""
+        """Yield this tool, or all tools that read this document, with the paths of their setups."""
         if self.top is None or self.file is None:
             return
         if _find_model_file(self.top) is not None:
@@ -276,12 +276,12 @@ class Setup(Subject):
 
     @cached_property
     def uses(self) -> list[Use]:
-        """Every name that stands in the document, of a component or of something else."""
+        """References to components and other things by name in the document."""
         result: list[Use] = []
         references_by_member: dict[int, Reference | None] = {}
         for item in self.setup_items:
             cls = type(item)
-            # What is named in a setup is looked up in the model: nothing in the document owns it.
+            # Names in a setup are searched in the model: no component of the document owns them.
             owner: Any = item if self.tree is None else self.tree.model
             names = references_by_member.get(id(item))
             if item.name and (names is not None or cls.name_reference is not None):
@@ -398,7 +398,7 @@ def is_given(name: str) -> bool:
 
 
 def get_content_type(spec: FieldSpec) -> str:
-    """Return what the file of a property contains: a class of objects, or a type of table."""
+    """Return the content of the file of a property: a class of objects, or a type of table."""
     return spec.reference.target.removesuffix(" file")
 
 
@@ -406,7 +406,7 @@ def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
     """Yield every file that an object names by a rule.
 
     Args:
-        item: the object.
+        item: object that names files.
         rule: rule of the reference, such as "file".
     """
     for spec in get_file_specs(type(item), rule):
@@ -421,7 +421,7 @@ def find_motion_file(file: str, tool: Object) -> str:
 
     Args:
         file: path of the setup.
-        tool: the tool.
+        tool: object of the tool.
     """
     name = next(
         (name for spec, name in list_files(tool, "file") if get_content_type(spec) == "motion"), ""

@@ -1,4 +1,4 @@
-"""Recognise lines that are rows of numbers, many lines at a time.
+"""Recognition of lines that are rows of numbers, many lines at a time.
 
 A block of lines becomes one large integer, a byte for each character: a shift by eight bits continues
 to the next character, and an addition carries a mark over a run of characters to what follows on
@@ -13,7 +13,7 @@ from functools import lru_cache
 
 from osimlite.base.named_tuples import NamedTuple
 
-# A code byte has the class of a character in its lower half, and in its upper half the classes that
+# The lower half of a code byte is the class of a character, the upper half the classes that
 # must not follow it.
 _SIGN = 1
 """Class of signs."""
@@ -27,7 +27,7 @@ _LAYOUT = (_SPACE | _POINT) << 4 | _SPACE
 """Bits of a code byte that distinguish separators."""
 
 _CHARACTERS = (
-    # What belongs to no number: it must not follow on anything.
+    # Characters that belong to no number must not follow any other.
     (bytes(range(256)), _SIGN | _POWER | _POINT, 0),
     (b"0123456789", 0, _SIGN),
     (b".", _POINT, _SIGN | _POINT),
@@ -107,7 +107,7 @@ def compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
     run_ends = (
         others << 8
     ) - others  # all bits of every other character: a mark that is added is carried to their end
-    # Two characters that must not follow on each other, and two points in one number.
+    # Mark forbidden pairs of characters, and two points in one number.
     invalid = (text << 4 | _POWER) & text & fifteens | (points << 8) + run_ends & points
     powers = text >> 1 & ones if text & twos else 0
     if powers:

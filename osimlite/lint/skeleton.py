@@ -18,7 +18,7 @@ from osimlite.schema.joints import Joint, WeldJoint
 
 @dataclass(slots=True)
 class JointLink:
-    """A joint with the frames it connects and the bodies (or ground) these are fixed to; None where unresolved."""
+    """Joint with its frames and their bodies (or ground); None for unresolved ones."""
 
     joint: Joint
     parent: Component | None
@@ -83,17 +83,17 @@ class _SkeletonEdge(NamedTuple):
 class TreeGrowth(NamedTuple):
     """Tree of bodies that OpenSim builds from a skeleton."""
 
-    loops: list[JointLink]  # the joints that close loops, in the order of the joints
-    # whether it rejects the model, or crashes, for the bodies that no joint connects to ground. It
-    # gives each of them, or one of each group, a joint to ground. With each joint that it makes it
-    # forgets the order of all joints before, which it then adds to the system last, in the order of
-    # the document: too late for offset frames, and for joints, on the bodies that they carry.
+    loops: list[JointLink]  # joints that close loops, in the order of the joints
+    # Whether OpenSim rejects the model, or crashes, because of bodies that no joint connects to
+    # ground. OpenSim gives each of them, or one of each group, a joint to ground. With each added
+    # joint it loses the order of all joints before it, and adds these to the system last, in the
+    # order of the document: too late for offset frames and joints on the bodies that they carry.
     fails: bool
 
 
 @cache_per_subject
 def grow_tree(subject: Subject) -> TreeGrowth:
-    """Return how OpenSim builds a tree from a skeleton."""
+    """Return the tree of bodies that OpenSim builds from a skeleton."""
     bones = build_skeleton(subject)
     ground = subject.path(bones.ground)
     masses = {subject.path(body): body.mass for body in bones.bodies}

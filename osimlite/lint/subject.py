@@ -57,9 +57,9 @@ def cache_per_subject(
 class Subject(CheckTarget):
     """Model under check. A model made in Python has no `source`, an unreadable text has no `model`.
 
-    `top` is the object at the top of the document, whatever it is; `cache_folder` the folder for what
-    is measured of it. If there was no machine code to measure it with, it `needs_remeasuring`: the next
-    check may find more.
+    `top` is the object at the top of the document, of any class; `cache_folder` is the folder for
+    its measurements. `needs_remeasuring` is true if machine code for the measurements was missing:
+    the next check may find more.
     """
 
     def __init__(self, content: Survey | Model, config: Config | None = None) -> None:
@@ -113,7 +113,7 @@ class Subject(CheckTarget):
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure paths and muscles, or recall the results; return why not, if that fails.
+        """Measure paths and muscles, or recall the results; return the reason of a failure.
 
         Returns:
             The reason why nothing was measured; empty on success.
@@ -121,7 +121,7 @@ class Subject(CheckTarget):
         return measure_subject(self, anew=anew)
 
     def find_obstacles(self, *, anew: bool = True) -> str:
-        """Build the model, or recall what stops that; return why it was not built, if it was not.
+        """Build the model, or recall the reasons against it; return why neither was done.
 
         Returns:
             The reason why the model was not built; empty on success.
@@ -134,7 +134,7 @@ class Subject(CheckTarget):
 
     @cached_property
     def folder(self) -> Path | None:
-        """The folder of the file, None for a model that is in no file."""
+        """Folder of the model file; None for a model without a file."""
         return (
             Path(self.file).parent if self.file is not None and Path(self.file).is_file() else None
         )
@@ -186,7 +186,7 @@ class Subject(CheckTarget):
 
     @cached_property
     def uses(self) -> list[Use]:
-        """Every reference of the model, in tree order."""
+        """References of the model, in tree order."""
         return list(self.tree.uses())
 
     @cached_property
@@ -196,7 +196,7 @@ class Subject(CheckTarget):
         return {id(use): resolve(use) for use in self.uses}
 
     def resolution(self, use: Use) -> Resolution:
-        """Return what a reference resolves to."""
+        """Return the resolution of a reference."""
         resolution = self._resolutions.get(id(use))
         return self.tree.resolve(use) if resolution is None else resolution
 
@@ -208,7 +208,7 @@ class Subject(CheckTarget):
     def owner(self, item: Object) -> Component:
         """Return the component that an object belongs to; the model, for an object that OpenSim ignores."""
         try:
-            # Objects that OpenSim ignores hang on no component.
+            # Objects that OpenSim ignores belong to no component.
             return self.tree.owner_of(item)
         except KeyError:
             assert self.model is not None
@@ -229,8 +229,8 @@ class Subject(CheckTarget):
         """Return the name of a property for messages, such as ``mass of Body 'pelvis'``.
 
         Args:
-            item: the object.
-            spec: its property.
+            item: object of the model.
+            spec: property of the object.
         """
         return f"{spec.tag} of {describe_object(item) if item.name else self.describe(item)}"
 
@@ -257,7 +257,7 @@ class Subject(CheckTarget):
         """Return a word of a list in the text, and how many equal words precede it.
 
         Args:
-            item: the object.
+            item: object of the model.
             tag: tag of the property.
             index: index of the word.
 
@@ -286,8 +286,8 @@ class Subject(CheckTarget):
         """Return whether the reader made a note about the text of this property.
 
         Args:
-            item: the object.
-            spec: its property.
+            item: object of the model.
+            spec: property of the object.
         """
         return (id(item), spec.name) in self._noted
 
@@ -303,7 +303,7 @@ class Subject(CheckTarget):
         """Return the index in the text of the element of a property; None if the text has none.
 
         Args:
-            item: the object.
+            item: object of the model.
             tag: tag of the property.
         """
         if self.source is None or item._index is None:
@@ -320,15 +320,16 @@ class Subject(CheckTarget):
         attribute: str | None = None,
         number: int | None = None,
     ) -> Position | None:
-        """Return the position of something in the text.
+        """Return the position of an object, a property, a word or an attribute in the text.
 
         Args:
-            item: the object; without other arguments the position is that of its start tag.
-            tag: a property of it: its text, or the start tag of the object if the property is not
-                given.
-            word: the `nth` occurrence of this word in that text.
-            nth: how many equal words precede it.
-            attribute: an attribute, for the position of its value.
+            item: object of the model; without other arguments the position is that of its start
+                tag.
+            tag: tag of a property, for the position of its text; if the text has no such property,
+                the position is that of the start tag of the object.
+            word: word in the text of the property or element, for its position.
+            nth: index of the occurrence of the word, from 0.
+            attribute: name of an attribute, for the position of its value.
             number: index of an element in the text, instead of `item`.
         """
         if self.source is None:
@@ -409,11 +410,11 @@ class Subject(CheckTarget):
         """Return the index in the text of the element that contains an object most closely.
 
         Args:
-            item: the object, or None.
+            item: object of the model, or None.
 
         Returns:
-            Index of its own element. For an object that the reader has added, such as a default
-            frame, that of the nearest component above it; None without one.
+            Index of the element of the object. For an object that the reader has added, such as a
+            default frame, that of the nearest component above it; None without one.
         """
         while item is not None:
             element_index = cast("int | None", item._index)

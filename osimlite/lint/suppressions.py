@@ -29,9 +29,9 @@ class Suppression:
     used: set[str] = field(default_factory=set)
 
     def covers(self, finding: Finding, has_name: Callable[[str], bool]) -> bool:
-        """Return whether the comment covers a finding, of a rule that `has_name` some names.
+        """Return whether the comment covers a finding, and mark it as used if so.
 
-        It is noted as used then.
+        `has_name` tells whether the rule of the finding has a code or name.
         """
         if finding.line is None or not self.first <= finding.line <= self.last:
             return False
@@ -45,8 +45,8 @@ class Suppression:
 def read_suppressions(source: Source) -> list[Suppression]:
     """Return every ignoring comment of a text.
 
-    Before the root element it speaks of the whole file, alone on its line of the element that
-    follows, at the end of a line of that line.
+    A comment before the root element applies to the complete file, a comment alone on its line to
+    the next element, and a comment at the end of a line to that line.
     """
     if "osimlite:" not in source.text:
         return []

@@ -21,12 +21,12 @@ _ROW = compile_later(rb"[^ \t\r\n][^\n]*")
 
 
 class Table(CheckTarget):
-    """Table under check; everything readable is available, whatever is wrong with the text.
+    """Table under check; everything readable is available, even if parts of the text are invalid.
 
     Args:
-        data: the bytes.
-        file: its path.
-        config: which rules run.
+        data: content of the file.
+        file: path of the file.
+        config: configuration of the check.
     """
 
     about: ClassVar[str] = "table"
@@ -39,7 +39,7 @@ class Table(CheckTarget):
 
     @cached_property
     def header(self) -> StorageHeader | MarkerHeader:
-        """The part before the rows."""
+        """Header before the rows."""
         return MarkerHeader(self.data) if self.is_markers else StorageHeader(self.data, self.file)
 
     @property
@@ -58,12 +58,12 @@ class Table(CheckTarget):
 
     @property
     def labels(self) -> list[Word]:
-        """The labels of the columns with that of the time; of a marker file of the markers alone."""
+        """Labels of the columns including time; in a marker file only those of the markers."""
         return self.header.labels
 
     @property
     def columns(self) -> list[str]:
-        """The labels without that of the time."""
+        """Labels without that of the time."""
         return [label.text for label in (self.labels if self.is_markers else self.labels[1:])]
 
     @cached_property
@@ -71,7 +71,7 @@ class Table(CheckTarget):
         """Rows of the table with their faults, scanned on first access."""
         header = self.header
         cells = len(self.labels)
-        # Where labels are missing or too many, the first row says how many cells a row has.
+        # If labels are missing or too many, the first row determines the number of cells.
         first_row = _ROW.search(self.data, header.rows)
         if isinstance(header, MarkerHeader):
             markers = (len(first_row[0].rstrip().split(b"\t")) - 2) // 3 if first_row else 0
@@ -96,7 +96,7 @@ class Table(CheckTarget):
         time_column = int(self.is_markers)
         low = self.header.rows
         high = len(data)
-        # The rest is some rows, which are read one by one as fast.
+        # The remaining rows are few, so reading them one by one is as fast.
         while high - low > 2000:
             middle = data.find(b"\n", (low + high) // 2, high) + 1
             # Frame number and time are in the first letters of a row, which may have thousands of
@@ -130,7 +130,7 @@ class Table(CheckTarget):
 
     @cached_property
     def step(self) -> float:
-        """The usual step from one time to the next, s; 0 of fewer than two rows."""
+        """Usual step from one time to the next, s; 0 with fewer than two rows."""
         from statistics import median
 
         times = self.rows.times
@@ -164,11 +164,11 @@ class Table(CheckTarget):
     ) -> Fix | None:
         """Return the fix that replaces a text in the header or among the labels; None if the encoding is unknown.
 
-        `expected` is what stands there, or None for whatever does.
+        `expected` is the present text, or None for any text.
         """
         start = self.line_start(position.line)
         line = self.data[start : self.line_start(2, start)].rstrip(b"\r\n")
-        # The byte order mark counts for no column.
+        # The byte order mark is not counted as a column.
         if start == 0 and line.startswith(MARK):
             start, line = len(MARK), line.removeprefix(MARK)
         try:

@@ -1,7 +1,7 @@
 """File of a finished trial as check target: its measurements, for rules that compare them with limits.
 
-The linter computes without a numeric library: the numbers come from :mod:`osimlite.tools.trials`,
-which stands above.
+The linter computes without numpy: the measurements come from :mod:`osimlite.tools.trials`, which
+imports the linter.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from osimlite.lint.diagnostic import Severity
 from osimlite.lint.registry import FindingCollector, Threshold
 
 TRIAL = "trial"
-"""What rules are about that need such numbers."""
+"""Value of `about` of the rules that need such measurements."""
 
 HICKS = "Hicks et al. 2015"
 """Is my model good enough? Best practices for verification and validation of musculoskeletal models
@@ -29,7 +29,7 @@ OPENSIM = "OpenSim's best practices"
 CHECKLIST = "OpenSim's checklist"
 """For evaluating a simulation, https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337"""
 OSIMLITE = "osimlite"
-"""Where nobody has published a limit."""
+"""Source of limits that nobody has published."""
 
 GOOD = "good"
 """Verdict on a measurement within every limit."""
@@ -38,62 +38,62 @@ OKAY = "okay"
 BAD = "bad"
 """Verdict on a measurement beyond every limit."""
 VERDICTS = (GOOD, OKAY, BAD)
-"""The verdicts from best to worst."""
+"""Verdicts from best to worst."""
 
 SMALLEST_SHOWN = 0.001
-"""What is less is not shown with its digits."""
+"""Number below which measurements are shown as less than this number."""
 
 STATISTICS = {"peak": "the peak of "} | dict.fromkeys(
     ("rms", "rms-translation"), "the root mean square of "
 )
-"""What stands before the name of what was measured."""
+"""Beginnings of the description of a measurement, by its kind."""
 
 
 class Measurement(NamedTuple):
     """Measurement of a trial."""
 
-    rule: str  # name of the rule that judges it
-    kind: str  # what it is of a column of numbers: one of `KINDS`, or ""
-    of: str  # what was measured, in words
-    value: float  # in the `unit`
+    rule: str  # name of the rule that judges the measurement
+    kind: str  # kind that distinguishes measurements of one rule, such as "peak" or "rms"
+    of: str  # description of the measured quantity
+    value: float  # value in the `unit`
     unit: str  # N, N m, cm, deg, % or ""
-    scale: float = nan  # what a limit may be a part of, in the `unit`; NaN if that is not known
-    where: str = ""  # at which time, of which marker, in words
-    at: Position | None = None  # where that is in the file
-    # whether the trial continues with it; else it is worth no more than an info
+    scale: float = nan  # reference of limits in %, in the `unit`; NaN if it is unknown
+    where: str = ""  # time or marker of the measurement, in words
+    at: Position | None = None  # position of the measurement in the file
+    # Whether no later tool improves the result; findings about other results are only remarks.
     is_final: bool = True
-    side: str = ""  # what else is known, in words
+    side: str = ""  # further information for the message
 
 
 class TrialVerdict(NamedTuple):
     """Measurement with its limits and the verdict."""
 
-    code: str  # of the rule
-    name: str  # of the rule
-    of: str  # what was measured, in words
-    value: float  # in the `unit`
+    code: str  # code of the rule
+    name: str  # name of the rule
+    of: str  # description of the measured quantity
+    value: float  # value in the `unit`
     unit: str  # N, N m, cm, deg, % or ""
-    good: float  # up to which it is good
-    bad: float  # from which on it is bad
+    good: float  # largest good value
+    bad: float  # largest acceptable value
     verdict: str  # one of `VERDICTS`
-    source: str  # of the limits
-    where: str  # at which time, of which marker, in words
-    file: str  # that it was measured of
-    line: int | None  # of the file, counted from 1
+    source: str  # source of the limits
+    where: str  # time or marker of the measurement, in words
+    file: str  # path of the measured file
+    line: int | None  # line in the file, from 1
 
     @property
     def shown(self) -> str:
-        """The number with its unit."""
+        """Value with its unit."""
         return f"{_format_number(self.value)} {self.unit}".rstrip()
 
     @property
     def limits(self) -> str:
-        """Up to which it is good, and up to which it is okay."""
+        """Largest good and largest acceptable value."""
         return " / ".join(dict.fromkeys((_format_number(self.good), _format_number(self.bad))))
 
     @property
     def words(self) -> str:
-        """The measured quantity and its location."""
+        """Description of the measured quantity, with its time or marker."""
         return f"{self.of} ({self.where})" if self.where else self.of
 
 
@@ -107,10 +107,10 @@ class Trial(CheckTarget):
     """File of a trial under check.
 
     Args:
-        file: its path.
-        data: its bytes.
-        numbers: that were measured of it.
-        config: which rules run.
+        file: path of the file.
+        data: content of the file.
+        numbers: measurements of the file.
+        config: configuration of the check.
     """
 
     about: ClassVar[str] = TRIAL
@@ -137,12 +137,12 @@ class Trial(CheckTarget):
         Acceptable and bad ones are reported as well.
 
         Args:
-            report: the collector of the rule's findings.
+            report: collector of the findings of the rule.
             limits: one or two limits, settings or numbers; a setting in % is relative to the scale of
                 the measurement. Infinite ones do not count.
             source: publication or document that the limits are from.
             advice: next step, the end of the message.
-            kind: compare only measurements of this kind (key of `STATISTICS`).
+            kind: kind of the measurements to compare, see :class:`Measurement`.
         """
         (rule,) = report.rules.values()
         for number in self.numbers:

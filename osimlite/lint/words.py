@@ -20,7 +20,7 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
 
     Args:
         value: number or numbers.
-        unit: unit; empty without one.
+        unit: unit of the numbers; empty or None without one.
 
     Returns:
         The numbers with spaces between them, and the unit after them.
@@ -86,7 +86,7 @@ def pick_closest(text: str, candidates: list[str]) -> str:
     """Return the text that is most similar to another.
 
     Args:
-        text: the text.
+        text: text to compare.
         candidates: texts to choose from.
     """
     return (

@@ -1,4 +1,4 @@
-"""Attempt to build a model as a simulation does, with a report of what fails, for lint rules.
+"""Attempt to build a model as a simulation does, with a report of the failures, for lint rules.
 
 The steps are those of `osimlite simulate`: the mechanism, its forces and controllers, the default
 pose that fulfils the constraints, one evaluation of the accelerations.
@@ -48,16 +48,16 @@ def try_construction(
     """Try to build a model and to compute its accelerations.
 
     Args:
-        model: the model.
-        folder: folder of its file, to which the names of other files are relative; None for a model
-            without a file.
+        model: model to build.
+        folder: folder of the model file, to which the names of other files are relative; None for a
+            model without a file.
 
     Returns:
         The obstacles in the order of the steps, and the mechanism for further computations; None if it
         cannot be built.
     """
     with warnings.catch_warnings():
-        # Rules report what a simulation only warns of.
+        # Rules report faults of which a simulation only warns.
         warnings.simplefilter("ignore", DoubtfulWarning)
         construction = _Construction(model, folder)
         return [*construction.run()], construction.mechanism
@@ -183,7 +183,7 @@ class _Construction:
         """Evaluate the accelerations in the default pose.
 
         Yields:
-            What makes the accelerations fail.
+            Reasons why the accelerations cannot be computed.
         """
         try:
             u = mechanism.project_speeds(q, {})
@@ -240,7 +240,7 @@ class _Construction:
                 )
 
     def describe_inertia(self, system: System, state: list[float]) -> Obstacle:
-        """Return the obstacle of a mass matrix that cannot be divided by."""
+        """Return the obstacle of a singular mass matrix."""
         refusal = system.make_evaluation_error(OUTCOME.SINGULAR_MASS, 0.0, state)
         message = refusal.message.partition(";")[0]
         named = re.search(r"coordinate '([^']*)'", message)
@@ -295,7 +295,7 @@ def _is_indefinite(mechanism: Mechanism, q: Array) -> bool:
 
 
 def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bool:
-    """Return whether a mechanism has accelerations under some forces, or they cannot be told apart."""
+    """Return whether a mechanism has accelerations under some forces, or these cannot be tested."""
     try:
         system = System(mechanism, forces, code=READY_CODE)
     except OsimliteError:

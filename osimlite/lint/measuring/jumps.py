@@ -38,8 +38,8 @@ class JumpSuspect(NamedTuple):
         ends: values of the coordinate at both ends.
     """
 
-    # by how much the length changes otherwise than next to the interval, m; infinite at a
-    # conditional point
+    # Change of the length that differs from that in neighbouring intervals, m; infinite at a
+    # conditional point.
     excess: float
     usual: float  # the change next to it, m
     sweep: Sweep  # of a coordinate
@@ -55,8 +55,8 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
     by more than neighbouring intervals predict. A jump is hardly larger than that difference.
 
     Args:
-        paths: the paths of the model.
-        looked_at: sweeps of coordinates.
+        paths: paths of the model.
+        looked_at: sweeps of the coordinates.
     """
     suspects = [suspect for sweep in looked_at for suspect in _find_suspects(paths, sweep)]
     if not suspects:

@@ -47,7 +47,7 @@ MIDDLE_PART = 0.5
 """Middle part of a range in which fiber lengths are computed; at its ends most muscles reach a limit."""
 
 
-# Poses that cannot be computed give NaN, which the measurements pass over.
+# Poses that cannot be computed give NaN, which the measurements ignore.
 @np.errstate(all="ignore")
 def measure_model(
     model: Model,
@@ -59,7 +59,7 @@ def measure_model(
     """Measure the paths and muscles of a model.
 
     Args:
-        model: the model.
+        model: model to measure.
         compiles: whether to compile kernels that are in no library or cache yet; for a model with
             few surfaces that takes longer than running them as Python.
         earlier: earlier measurements when some paths differed or were missing, and those of them that
@@ -67,21 +67,21 @@ def measure_model(
         mechanism: mechanism of the model; built by default.
 
     Returns:
-        What was measured now, with what was known and is still valid.
+        The new measurements, together with earlier ones that are still valid.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
-        ModelError: something makes no sense.
+        ModelError: the model is invalid.
         SimulationError: the constraints allow no default pose, or there are no lengths in it.
         NoMachineCodeError: the model has many surfaces, and kernels run as Python only.
     """
     earlier_measures, unchanged_measures = earlier if earlier is not None else (None, None)
-    # Without machine code, models with many surfaces are measured when it is there.
+    # Without machine code, the measurement of models with many surfaces is postponed.
     if compiles and not has_machine_code():
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
     # `READY_CODE` uses machine code only if it has been compiled before.
     code = None if compiles else READY_CODE
-    # What an earlier measurement found at rest need not be measured again.
+    # Paths with valid earlier measurements need not be measured again.
     paths = Paths(
         model,
         code=code,
@@ -171,7 +171,7 @@ def _check_loop_count(mechanism: Mechanism) -> None:
 def _find_length_extremes(
     looked_at: list[Sweep], default: Array
 ) -> Iterator[tuple[tuple[float, MeasuringPose], tuple[float, MeasuringPose]]]:
-    """Yield where each path is shortest and longest: in the default pose, or in the middle of the ranges."""
+    """Yield least and largest length of each path with their poses, in the middle of the ranges."""
     poses = [MeasuringPose()]
     rows = [default[None]]
     for sweep in looked_at:
@@ -183,7 +183,7 @@ def _find_length_extremes(
         poses += [sweep.pose(value) for value in sweep.values[middle_indices]]
         rows.append(sweep.lengths[middle_indices])
     lengths = np.concatenate(rows)
-    # Where a path has no length its pose is left out, unless it has none by default either.
+    # Poses in which a path has no length are left out, unless it has none in the default pose.
     unknown = np.isnan(lengths) & ~np.isnan(default)
     ends = (
         np.argmin(np.where(unknown, np.inf, lengths), axis=0),

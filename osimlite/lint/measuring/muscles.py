@@ -36,7 +36,7 @@ class MuscleFibers(NamedTuple):
     Attributes:
         path: path of the muscle.
         kind: force type of the muscle.
-        component: the muscle.
+        component: muscle of the model.
         values: values of the law's parameters, except for the control.
     """
 
@@ -119,8 +119,8 @@ def find_fibers(
     """Yield the muscles whose laws have only numeric parameters: Thelen, Millard, De Groote, Meyer.
 
     Args:
-        model: the model.
-        mechanism: its mechanism.
+        model: model with the muscles.
+        mechanism: mechanism of the model.
         paths: paths of the requested muscles.
     """
     builder = ElementBuilder(model, mechanism, Path())
@@ -129,7 +129,7 @@ def find_fibers(
         if kind is None or not muscle.appliesForce or builder.path(muscle) not in paths:
             continue
         _, *terms = kind.terms
-        # Terms that are bundled are looked at one by one.
+        # Terms that are bundled are examined one by one.
         single_terms = (
             single_term
             for term in terms
@@ -156,8 +156,8 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
     """Compute the initial state and the equilibrium of a muscle; None without states to equilibrate.
 
     Args:
-        fibers: the muscle.
-        length: length of its path, m.
+        fibers: muscle with its law.
+        length: length of the path, m.
 
     Returns:
         Fiber lengths and tensions in both states.
@@ -179,9 +179,9 @@ def compute_reach(
     """Compute the fibers in equilibrium.
 
     Args:
-        fibers: the muscle.
-        length: length of its path, m.
-        is_active: full activation; otherwise that at rest.
+        fibers: muscle with its law.
+        length: length of the path, m.
+        is_active: whether the muscle is fully active; otherwise it has the activation at rest.
         pose: pose with this length, for messages.
 
     Returns:

@@ -33,8 +33,8 @@ class Sweep:
     """Sweep of a coordinate over its range, the others at their defaults or as near as constraints allow.
 
     Attributes:
-        paths: the paths of the model.
-        place: index of the coordinate in the mechanism.
+        paths: paths of the model.
+        place: index of the swept coordinate in the mechanism.
         poses: values of all coordinates (k, n), ascending in this one, as far as constraints allow.
         is_tied: whether a constraint moves others with the coordinate.
         lengths: lengths of all paths in the poses (k, p), m.
@@ -97,9 +97,10 @@ def sweep_coordinates(
     """Return a sweep of each coordinate that changes the length of a path.
 
     Args:
-        paths: the paths.
+        paths: paths of the model.
         start: default pose (n,).
-        required_coordinates: indices of coordinates that change the length of a path which is not among these.
+        required_coordinates: indices of coordinates that are swept in any case, because they change
+            the length of a path that is not in `paths`.
     """
     are_tied = find_tied_coordinates(paths, start)
     remaining_poses = TIED_POSES
@@ -161,7 +162,7 @@ def find_tied_coordinates(paths: Paths, start: Array) -> Array:
     """Return whether each coordinate (n,) is in the equations of a constraint.
 
     Args:
-        paths: the paths of the model.
+        paths: paths of the model.
         start: default pose (n,).
     """
     constraints = paths.mechanism.constraints

@@ -28,10 +28,10 @@ def compare_wrappings(
     """Yield the excess length of each path around surfaces over geodesics, in the default and the worst pose.
 
     Args:
-        geodesic: the paths with surfaces, along geodesics.
-        paths: all paths, as OpenSim wraps them.
+        geodesic: those paths that have surfaces, along geodesics.
+        paths: all paths, wrapped as by OpenSim.
         start: default pose (n,).
-        looked_at: sweeps of coordinates.
+        looked_at: sweeps of the coordinates.
     """
     free_sweeps = [sweep for sweep in looked_at if not sweep.is_tied]
     together = _sample_poses(start, free_sweeps)

@@ -33,8 +33,8 @@ def render(
     """Return a report as text in a format.
 
     Args:
-        report: the report.
-        name: one of `FORMATS`.
+        report: findings of a check.
+        name: name of the format, one of `FORMATS`.
         colour: whether to write terminal colours, in the formats for people.
         width: number of columns, in the full format.
         everything: whether the formats for people show every finding; otherwise one finding stands

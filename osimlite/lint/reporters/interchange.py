@@ -196,7 +196,7 @@ def _describe_result(finding: Finding, index: int) -> dict[str, Any]:
     """Return a finding as a SARIF result.
 
     Args:
-        finding: the finding.
+        finding: finding to convert.
         index: index of its rule in the list of rules.
 
     Returns:

@@ -1,6 +1,6 @@
 """Reports for people: one line per finding (concise), or the source line with a caret (full).
 
-Findings that say the same are folded: one stands for all, and the others are only counted.
+Similar findings are folded: one stands for all, and the others are only counted.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def format_summary(report: Report, colour: bool = False) -> str:
     """Return the closing line, such as ``Found 3 errors, 1 warning in 2 files``.
 
     Args:
-        report: the findings.
+        report: findings of a check.
         colour: whether to colour the counts.
     """
     counts = (
@@ -72,7 +72,7 @@ def describe_skipped(report: Report, everything: bool) -> str:
     """Return the sentence about skipped files that are not OpenSim's; empty without any.
 
     Args:
-        report: the report.
+        report: findings of a check.
         everything: whether to name the files rather than to count them.
 
     Returns:
@@ -143,8 +143,8 @@ def fold_findings(findings: Iterable[Finding], *, everything: bool = False) -> l
     """Fold similar findings under the first of them, and keep the order.
 
     Args:
-        findings: the findings.
-        everything: whether to fold none.
+        findings: findings of a check.
+        everything: whether to leave all findings unfolded.
 
     Returns:
         A fold for each finding that is shown.
@@ -189,7 +189,7 @@ def _min_fold_size(finding: Finding) -> int:
 
 
 def _fold_key(finding: Finding, *, names: bool) -> tuple[object, ...]:
-    """Return what similar findings have in common: the words of the message without numbers and, unless `names`, names."""
+    """Return the key of similar findings: the message without numbers and, unless `names`, names."""
     words = finding.message if names else _NAME_PATTERN.sub("", finding.message)
     return finding.code, finding.severity, _NUMBER_PATTERN.sub("", words)
 
@@ -245,7 +245,7 @@ def render_full(
     """Return the report as text of at most `width` columns; file positions are never broken.
 
     Args:
-        report: the report.
+        report: findings of a check.
         colour: whether to write terminal colours.
         width: number of columns.
         everything: whether to show every finding instead of folding similar ones.
@@ -278,7 +278,7 @@ def render_full(
 
 
 def _describe_fixes(report: Report) -> str:
-    """Return how many findings ``--fix`` fixes, and how many more ``--unsafe-fixes`` does."""
+    """Return a sentence with the numbers of findings that ``--fix`` and ``--unsafe-fixes`` fix."""
     safe = sum(finding.fixable for finding in report.findings)
     unsafe_count = sum(finding.fix is not None for finding in report.findings) - safe
     sentences = [f"{safe} can be fixed with --fix."] if safe else []
@@ -379,7 +379,7 @@ def _cut_line(
 ) -> tuple[str, int, int]:
     """Return the part of a long line around the caret, with dots where it is cut, and the caret's start and length."""
     cut_start = 0
-    # The caret stays in sight, about in the middle of the line.
+    # Keep the caret visible, about in the middle of the line.
     if start + length > available_width - len(_ELLIPSIS):
         cut_start = min(
             start, max(0, start + min(length, available_width // 2) - available_width // 2)

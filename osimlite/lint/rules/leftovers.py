@@ -320,7 +320,7 @@ def _describe_unreadable(source: Source, number: int, kind: str) -> str:
     """Return the content that OpenSim expects in an element, for messages; empty if it can read it.
 
     Args:
-        source: the text.
+        source: text of the document.
         number: index of the element in the text.
         kind: expected content: "text", "number" or "numbers".
     """

@@ -151,8 +151,8 @@ def list_old_references(subject: Subject, source: Source, name: str) -> list[str
     """Return the tags of elements of an old document that OpenSim refuses if nothing has the name they give.
 
     Args:
-        subject: what was read of the document.
-        source: the document.
+        subject: check target with the notes of the reader.
+        source: text of the document.
         name: a name with white space, which OpenSim takes out of the name alone.
     """
     # Almost no document has such a name, and every start would pay for the import.

@@ -338,8 +338,8 @@ def _make_form_fault(use: Use, text: str, same_name: list[str]) -> BrokenReferen
     """Return the fault of a reference that names an object in a form that OpenSim does not resolve.
 
     Args:
-        use: the reference.
-        text: its text.
+        use: reference in the model.
+        text: text of the reference.
         same_name: texts with the same last name that are valid there.
     """
     certainty = "" if len(same_name) == 1 else "several"

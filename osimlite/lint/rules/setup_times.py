@@ -229,8 +229,8 @@ def _describe_unknown_time(
     """Return what OpenSim does with a time that is not a number.
 
     Args:
-        item: a tool.
-        tags: properties of the times.
+        item: tool with the times.
+        tags: names of the properties that have the times.
         is_first: whether the first time is not a number; otherwise the last one.
 
     Returns:
