@@ -126,8 +126,8 @@ def fit(
     """Fit scale factors of bodies and positions of markers to movements of a person.
 
     The motion of the segments determines the joint centres, so trials in which all joints move are
-    the most informative. A marker that is `fixed` in the model, or in `held`, stays where the
-    scaled model has it; all others may move.
+    the most informative. A marker that is `fixed` in the model, or in `held`, keeps its
+    position in the scaled model; all others may move.
 
     Args:
         model: generic model with markers named as those of the data; it is not changed.
@@ -135,7 +135,7 @@ def fit(
             the trials.
         static: markers of the standing subject, as a file or arrays by name; None without them.
         weights: weights of markers by name; the others have weight 1, and weight 0 excludes.
-        held: markers that stay where the model has them; by default those that are `fixed`.
+        held: markers that keep their position in the model; by default those that are `fixed`.
         by_axis: whether the factors of a body may differ between its axes.
         symmetric: whether both sides of the body have the same factors.
         frames: number of frames, spread evenly over all trials.

@@ -83,9 +83,10 @@ def scale(
     Args:
         model: generic model with markers named as those of the data; it is not changed.
         static: measured markers of the standing subject: a file, or arrays by name.
-        measurements: pairs of markers, and the axes by body that the mean ratio of their distances
-            scales, by name of the measurement, as ``{"thigh": ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or
-            OpenSim's objects. Later measurements overwrite earlier ones.
+        measurements: by name of the measurement: its pairs of markers, whose mean ratio of
+            distances is the factor, and the axes that this factor scales, by body:
+            ``{"thigh": ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or OpenSim's objects. Later
+            measurements overwrite earlier ones.
         factors: one factor for each body, or one for each axis; they overwrite measurements.
         mass: mass of the subject, kg; if it is not positive, the mass follows from the factors.
         preserve_mass_distribution: whether the bodies keep their shares of the mass.

@@ -81,7 +81,7 @@ class IntegrationOptions:
         DEFAULT_ACCURACY,
         "Integrator accuracy, as in OpenSim.",
         shown="0.001",
-        more="0.001 if left out.",
+        more="The default is 0.001.",
         type=float | None,
     )
     integrator: str = define_option(
@@ -94,7 +94,7 @@ class IntegrationOptions:
     step_bounds: tuple[float, float] = define_option(
         UNBOUNDED_STEPS,
         more="shortest and longest step of 'merson' and 'euler2', s. A step of the shortest length is accepted "
-        "whatever its error.",
+        "even if its error is too large.",
     )
 
     @property
@@ -180,63 +180,63 @@ class Options(IntegrationOptions):
         None,
         "Use fixed steps (semi-implicit Euler), without error control.",
         unit="SECONDS",
-        more="They are the engine's own, s.",
+        more="The value is the size of these steps, s.",
     )
     report_interval: float = define_option(
         0.01,
         "Time between the rows of the result files.",
         unit="SECONDS",
-        more="The recorded moments are so far apart, s; the last one is the end in any case.",
+        more="In s; the end of the motion is always recorded.",
     )
     initial: Mapping[str, float | str] | str | Path | None = define_option(
         None,
-        more='values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their '
-        "default. The path of a state (``/jointset/knee/flexion/speed``, ``/forceset/stop/dissipatedEnergy``) stands "
-        "for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of "
-        "states stands for its last row.",
+        more='initial values of coordinates by name or path (rad, m, or a text such as "40deg"); the others start at '
+        "their default. Keys may also be paths of states, as in ``states.sto`` (``/jointset/knee/flexion/speed``, "
+        "``/forceset/stop/dissipatedEnergy``); locks and constraints change such values of coordinates. From a file of "
+        "states the last row is used.",
     )
     initial_speeds: Mapping[str, float | str] | None = define_option(
-        None, more="generalized speeds that do not start at their default, likewise."
+        None, more="initial generalized speeds by name or path; the others start at their default."
     )
     equilibrate: bool = define_option(
         False,
         "Start muscles in equilibrium of fibers and tendon.",
-        more="So does OpenSim's `equilibrateMuscles`; states that `initial` names stay as it says.",
+        more="As OpenSim's `equilibrateMuscles`; states that `initial` sets do not change.",
     )
     controls: Mapping[str, Any] | StoTable | str | Path | None = define_option(
         None,
-        more="what drives actuators besides the controllers of the model, as a PrescribedController more would: by "
-        "name or path a number, a function of time (s) or ``(times, values)``; or a table of such columns, or its "
-        "file. What nothing drives has a control of 0.",
+        more="controls of actuators, which are added to those of the model's controllers, like another "
+        "PrescribedController: by name or path of the actuator a number, a function of time (s) or ``(times, values)``; "
+        "or a table with these columns, or its file. An actuator without any control has the control 0.",
     )
     controller: Controller | None = define_option(
         None,
-        more="what drives actuators by what it feels, beside all else that does: :class:`osimlite.Feedback`. Steps are "
-        "those of an integrator.",
+        more="feedback from sensors, which is added to the other controls: :class:`osimlite.Feedback`. It needs an "
+        "integrator with error control, not `fixed_step`.",
     )
     resume: Trajectory | str | Path | None = define_option(
         None,
         "Continue an earlier simulation, from the folder with its results.",
         unit="FOLDER",
         type=Path | None,
-        more="Or the trajectory of one; the time goes on, too. With a controller that began a control step there, to "
-        "the last bit as if it had not ended.",
+        more="Or continue from its trajectory. The time continues, too. If the earlier simulation had a controller and "
+        "ended at a control step, the result is equal to that of an uninterrupted simulation to the last bit.",
     )
     progress: Progress | None = define_option(
         None,
-        more="called with the simulated time reached and the length of the steps there (both in s), after every step, "
-        "or after several that are quick.",
+        more="function that is called with the simulated time and the step size (both in s) after every step, or after "
+        "several quick steps.",
     )
     route: str = define_option(
         "auto",
-        more='how the accelerations are computed: by Bullet\'s "mass-matrix", which "auto" stands for, or its '
-        '"articulated-body" algorithm.',
+        more='algorithm of the engine "bullet" for accelerations: "mass-matrix" (also for "auto") or '
+        '"articulated-body".',
     )
     wrapping: str = define_option(
         "opensim",
         "Wrapping of paths: 'opensim', or 'geodesic' (along the shortest curves).",
-        more="Along a geodesic (where a side is asked for at least a stationary one), all surfaces of a path are taken "
-        "together, so that speed and moment arms are derivatives of the length.",
+        more="With 'geodesic' all surfaces of a path are solved together, so that speed and moment arms are derivatives "
+        "of the length. If a wrap prescribes a side (quadrant), the curve is a geodesic, but may not be the shortest.",
     )
     skip_unsupported: bool = define_option(
         False, "Leave out unsupported forces.", more="The summary lists them."
@@ -244,12 +244,13 @@ class Options(IntegrationOptions):
     opensim_derivatives: bool = define_option(
         False,
         "Repeat OpenSim's errors in joints that rotate about several axes.",
-        more="Two second derivatives there are wrong; see :func:`osimlite.mechanics.multibody.build_mechanism`.",
+        more="OpenSim computes two second derivatives incorrectly there; see "
+        ":func:`osimlite.mechanics.multibody.build_mechanism`.",
     )
     rolling: bool = define_option(
         False,
         "Turn on rolling constraints, which OpenSim leaves off.",
-        more="So they are until a program turns them on.",
+        more="OpenSim leaves them off until a program turns them on.",
     )
     external_loads: str | Path | None = define_option(
         None,
@@ -259,18 +260,18 @@ class Options(IntegrationOptions):
     )
     simbody_early_return: bool = define_option(
         False,
-        more="reproduce a defect of Simbody in contact forces of several surfaces: the first contact that separates "
-        "too fast to push takes the force of those after it.",
+        more="reproduce an error of Simbody in contact forces of several surfaces: after the first contact whose "
+        "surfaces separate so fast that its force would be negative, all later contacts of the force get no force.",
     )
     own_activation_times: bool = define_option(
         False,
-        more="let the activation of every DeGrooteFregly2016Muscle have its own time constants and smoothing; OpenSim "
-        "takes those of the first one for all.",
+        more="use the activation time constants and the smoothing of each DeGrooteFregly2016Muscle; OpenSim uses those "
+        "of the first muscle for all.",
     )
     folder: str | Path | None = define_option(
         None,
-        more="where the model's file is; files that the model names (of contact meshes) are looked for there. The "
-        "folder that the program runs in if left out.",
+        more="folder of the model's file, in which files are searched that the model names (contact meshes). The "
+        "default is the current folder.",
     )
     show: bool = define_option(
         False,

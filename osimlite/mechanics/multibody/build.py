@@ -56,9 +56,9 @@ def build_mechanism(
     Args:
         model: model to convert.
         opensim_derivatives: whether to reproduce two wrong second derivatives of OpenSim 4.6.
-            First, Simbody differentiates the angular velocity of a CustomJoint as if only its first
-            coordinate drove the first rotation, and only the first two the first two. Accelerations
-            are therefore wrong where one coordinate drives several rotations (for the knee of
+            First, Simbody differentiates the angular velocity of a CustomJoint as if the first
+            rotation depended on the first coordinate only, and the second rotation on the first two
+            coordinates only. Accelerations are therefore wrong where one coordinate drives several rotations (for the knee of
             Rajagopal's model by up to 1 % at usual speeds), and energy is not conserved. Second,
             OpenSim uses the gradient of a MultivariatePolynomialFunction for each column of its
             Hessian. Without this option both are correct.
