@@ -200,7 +200,7 @@ class AssigningBranch:
 
 
 def decide(code_part: str, test: Any) -> bool:
-    """Return the side of a branch in the combination that is being run.
+    """Return whether the true side of a branch is taken in the combination that is being run.
 
     Args:
         code_part: part of the code, for messages.

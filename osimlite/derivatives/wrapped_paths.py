@@ -179,7 +179,7 @@ class WrappedPaths:
             pose: values of all coordinates of the mechanism.
 
         Returns:
-            For each path its speed (m/s) for a unit speed of each of its coordinates.
+            Speed of each path (m/s) for a unit speed of each of its coordinates.
         """
         result = np.zeros((len(self.symbolic_paths), len(pose)))
         for group in self._groups:
@@ -231,7 +231,8 @@ class WrappedPaths:
             q: values (n,) of the coordinates.
 
         Returns:
-            Numbers (size,): for each path its length (m), moment arms, and speeds for unit speeds.
+            Numbers (size,): length (m), moment arms, and speeds for unit speeds of each path in
+            turn.
         """
         pose = self._default.copy()
         pose[self._order] = q

@@ -139,7 +139,7 @@ class Copies:
             arguments: arguments of the kernel before these two.
 
         Returns:
-            Its largest result.
+            Largest result of the kernel.
         """
         self.engine.program.code.make_ready((law,))
         # One iterator for all threads: each takes the next part when it is ready, so that slow

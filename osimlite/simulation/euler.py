@@ -49,9 +49,9 @@ class SemiImplicitEuler(Stepper):
             states.
         h: step, s. Only a step that would pass the limit is shortened.
         rates: qdot as a function of (q, u); by default qdot = u.
-        observe: called with time and state after each step.
+        observe: function that is called with time and state after each step.
         names: names of the entries of y in messages.
-        projected: projection onto the constraints, if there are any.
+        projected: projection of states onto the constraints; None without constraints.
     """
 
     def __init__(

@@ -161,6 +161,9 @@ def resolve_loads(
         external_loads: loads, their file, or a table; see :func:`inverse_dynamics`.
         applied_to: assignment of the table's columns, if any.
 
+    Returns:
+        Loads that are made of the table, else `external_loads` unchanged.
+
     Raises:
         SettingError: `applied_to` is set without a table.
     """

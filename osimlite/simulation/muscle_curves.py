@@ -176,7 +176,7 @@ def muscle_curves(
         activation: activation of all muscles, 0 to 1.
         wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
         folder: folder of the model's file, in which named files are searched.
-        progress: called with the number of finished poses and the total.
+        progress: function that is called with the number of finished poses and the total.
 
     Returns:
         The curves of the selected muscles.

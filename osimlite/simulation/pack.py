@@ -128,7 +128,7 @@ class Packer(LinkPacker):
         one view covers all contact forces.
 
         Returns:
-            For each element the records of its items in the work vector, as (offset, length).
+            Records of the items of each element in the work vector, as (offset, length).
         """
         groups = [element.make_records(self.places) for element in self.elements]
         self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)

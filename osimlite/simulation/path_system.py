@@ -130,8 +130,8 @@ class PathSystem(System):
             routes: the paths by the names of their owners.
 
         Returns:
-            For each owner the index and the position (3,) in ground (m) of each node, from end to
-            end.
+            Index and position (3,) in ground (m) of each node from end to end, by the name of the
+            owner.
         """
         self._evaluate_state(q, np.zeros(len(q)))
         result = {}

@@ -182,7 +182,7 @@ class Paths:
             q: values of coordinates.
 
         Returns:
-            For each owner the index and the position (3,) in ground (m) of each node.
+            Index and position (3,) in ground (m) of each node, by the path of the owner.
         """
         return self.system.locate_nodes(self.mechanism.values(q), self.routes)
 

@@ -371,7 +371,7 @@ class Simulation:
             y: initial state (y,).
             settings: settings of the integration.
             times: times of the rows, s; the first one is the start.
-            progress: called during the motion.
+            progress: function that is called during the motion.
 
         Returns:
             The recorder and the stepper after the motion, and the states (y,) at the times.

@@ -59,8 +59,8 @@ class SharedForces:
             row: index of the time.
 
         Returns:
-            Generalized forces by coordinate, the largest first; those below a tenth of it are left
-            out.
+            Phrase with the missing generalized forces of three coordinates, the largest first, and
+            the number of the others; forces up to a tenth of the largest are left out.
         """
         sizes = np.abs(self.lacking[row])
         worst = [index for index in np.argsort(-sizes) if sizes[index] > 0.1 * sizes.max()]

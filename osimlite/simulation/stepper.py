@@ -131,7 +131,7 @@ class Stepper(ABC):
 
         Args:
             times: non-decreasing times of the rows, s.
-            progress: called after every step, or after several that are fast.
+            progress: function that is called after every step, or after several that are fast.
 
         Returns:
             One state (y,) for each time, up to the time that was reached if the motion ended early.

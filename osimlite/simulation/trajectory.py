@@ -35,8 +35,9 @@ class Trajectory(Tabular):
         coordinates: names of the k coordinates, in the mechanism's order.
         values: coordinate values (n, k), rad or m.
         speeds: generalized speeds (n, k).
-        auxiliary: other integrated states (n,) by their paths in OpenSim, such as activations,
-            fiber lengths, and the energy (J) that the dampers of a BushingForce have dissipated.
+        auxiliary: columns (n,) of the other integrated states, by their paths in OpenSim:
+            activations, fiber lengths, and the energy (J) that the dampers of a BushingForce have
+            dissipated.
         paths: paths of all states in OpenSim's order: ".../value" and ".../speed" of the
             coordinates, and those of `auxiliary`.
         controller: record of a controller, one row for each of its control steps; None without one.
@@ -80,7 +81,7 @@ class Trajectory(Tabular):
 
     @property
     def model(self) -> Model | None:
-        """Copy of the simulated model if it is known; notebooks show it."""
+        """Copy of the simulated model, which notebooks show; None if the model is unknown."""
         return self._model.model if isinstance(self._model, Snapshot) else self._model
 
     @property

@@ -64,7 +64,7 @@ def _describe_function(function: FunctionType) -> tuple[Any, ...]:
     """Return everything of one function that determines what it is compiled to.
 
     Returns:
-        Its name, its text, and the values of its global names.
+        Name and text of the function, and the values of the global names in it.
     """
     # Sorted, because the order of names differs between versions of Python.
     values = [

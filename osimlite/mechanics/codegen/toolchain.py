@@ -192,7 +192,7 @@ def find_compiler() -> Compiler | None:
 
 
 def find_cross_compiler(platform: str) -> Compiler | None:
-    """Return the compiler of the variable CXX, which compiles for another platform.
+    """Return the compiler of the variable CXX for another platform, None if there is no compiler.
 
     Args:
         platform: platform tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64" or

@@ -107,8 +107,9 @@ def way_out(radii: Vector, middle: Vector, chord: Vector, deeper: float) -> Vect
         radii: half axes.
         middle: point of the line.
         chord: direction of the line.
-        deeper: if positive, return the second best local minimum, or zeros if the line is more than
-            this many times deeper there or no second minimum exists.
+        deeper: 0 or less for the global minimum; a positive number for the second best local
+            minimum, or zeros if the line is more than this many times deeper there or no second
+            minimum exists.
     """
     x, y, z = chord
     # Any axis that is not along the line gives two directions across it.

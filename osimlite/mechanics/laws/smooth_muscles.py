@@ -245,7 +245,7 @@ def degroote_rigid(inputs: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) 
     Args:
         inputs: inputs of the muscle.
         m: parameters of the muscle.
-        tendon: further parameters, without effect.
+        tendon: parameters of the tendon, without effect.
     """
     fiber_length, velocity = rigid_fibers(inputs, m)
     return m.strength * degroote_active(fiber_length, m.scale) * degroote_factor(velocity)

@@ -88,7 +88,7 @@ def _measure_excess(number: float) -> float:
 
 
 def _list_numbers(component: Component) -> Iterator[tuple[str, float]]:
-    """List the numbers of a component, and of its parts that are not components."""
+    """Yield the numbers of a component, and of its parts that are not components."""
     for name, info in type(component).model_fields.items():
         field_value: Any = getattr(component, name)
         # Some defaults are infinite, and correct.

@@ -252,9 +252,9 @@ def _make_unit_interval_matrices(half_order: int) -> tuple[Array, Array]:
     The polynomial is determined by its derivatives up to order m - 1 at 0, and then at 1.
 
     Returns:
-        Its coefficients from the constant up (2m, 2m), and half the second derivatives of the
-        integral of its squared m-th derivative (2m, 2m). All entries are fractions of whole
-        numbers.
+        Coefficients of the polynomial from the constant up (2m, 2m), and half the second
+        derivatives of the integral of the squared m-th derivative (2m, 2m). All entries are
+        fractions of whole numbers.
     """
     size = 2 * half_order
     denominator = math.factorial(half_order - 1)

@@ -247,11 +247,11 @@ class PairContact:
 
         Args:
             records: output records of the pairs after an evaluation.
-            origins: origin of each body in ground, m; ground's origin is the last.
+            origins: origin of each body in ground, m; the last one is that of ground.
 
         Returns:
-            For each surface the force (N) on its body and the torque (N m) about the body's origin,
-            in ground. Surfaces on one body have the same load.
+            Force (N) on the body of each surface, and torque (N m) about the body's origin, in
+            ground. Surfaces on one body have the same load.
         """
         loads: dict[int, list[float]] = {}
         for pair, record in zip(self.pairs, records, strict=False):

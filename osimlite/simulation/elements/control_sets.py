@@ -46,13 +46,13 @@ class ControlCurves:
         """Read a ControlSet, or a table (``.sto``), which is interpolated linearly.
 
         Args:
-            path: the file.
+            path: path of the file.
 
         Returns:
-            Its controls.
+            Controls in the file.
 
         Raises:
-            DocumentError: the file is neither.
+            DocumentError: the file is neither a ControlSet nor a table.
             ModelError: a control has no nodes, or their times go back.
         """
         curves: dict[str, SmoothFunction] = {}

@@ -117,8 +117,8 @@ class ModelControls:
         builder: builder of the model's elements.
 
     Attributes:
-        controls: the functions of time.
-        reflexes: by the paths of muscles with reflexes, the control at the maximum lengthening speed.
+        controls: functions of time of each control.
+        reflexes: control at the maximum lengthening speed of each muscle with a reflex, by path.
 
     Raises:
         ModelError: a controller has no meaning, or its file does not fit the model.

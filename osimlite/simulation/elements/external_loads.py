@@ -62,9 +62,9 @@ def build_external_loads(
 
     Args:
         table: a .mot, .sto or .c3d file, in the axes of ground.
-        applied_to: by the names of bodies, for each load the starts of the labels of its force,
-            point and moment; the last one or two may be omitted. Without a point the force acts at
-            the origin of the body.
+        applied_to: names of the bodies on which the loads act; for each body and load the starts of
+            the labels of force, point and moment. The last one or two may be omitted. Without a
+            point the force acts at the origin of the body.
 
     Returns:
         A document with one ExternalForce for each load.

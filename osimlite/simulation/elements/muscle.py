@@ -100,7 +100,7 @@ def check_muscle(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
     Args:
         builder: builder of the model's elements.
         force: the muscle.
-        numbers: further properties of its class.
+        numbers: further properties of the muscle's class.
 
     Raises:
         ModelError: a property has no meaning; the message names it.

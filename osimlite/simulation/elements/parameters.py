@@ -104,7 +104,7 @@ class Number(Parameter):
 
     Attributes:
         name: name of the property.
-        accepts: returns whether a number is accepted.
+        accepts: function that returns whether a number is accepted.
         needs: message about other numbers, after "the <name> of '<path>' ".
     """
 

@@ -79,13 +79,14 @@ class ProbeType:
 
     Attributes:
         component: class of the probes.
-        read: returns the inputs of a probe; raises an UnsupportedError if it cannot be computed.
-        law: returns the quantity of one subject.
+        read: function that returns the inputs of a probe; it raises an UnsupportedError if osimlite
+            cannot compute the probe.
+        law: function that returns the quantity of one subject.
         reads: inputs of the law from a subject: recorded quantities, or "actuation", "speed" and
             "control".
         numbers: type of the last argument of the law, a named tuple.
-        measure: computes the results instead of a law, from the probe, the system after an
-            evaluation of its forces, and the time (s) and state of the evaluation.
+        measure: function that computes the results instead of a law, from the probe, the system
+            after an evaluation of its forces, and the time (s) and state of the evaluation.
         has_curve: whether the law takes a curve.
     """
 
@@ -280,7 +281,7 @@ def _locate_inputs(
     subject: ProbeSubject,
     elements: Mapping[str, ForceElement],
 ) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
-    """Return where the inputs of a law are recorded.
+    """Return the positions in the records at which the inputs of a law are found.
 
     Args:
         probe_type: declaration of the probe's class.
@@ -290,8 +291,8 @@ def _locate_inputs(
         elements: forces of the model by path.
 
     Returns:
-        For each input the path of the element with the record and the offset there, and the
-        subject's numbers.
+        Path of the element whose record has the input and offset in this record, for each input;
+        and the numbers of the subject.
 
     Raises:
         UnsupportedError: the actuator is not computed, or does not record an input.

@@ -29,7 +29,7 @@ class Registry:
             that begins with a dot is relative to this package.
 
     Attributes:
-        modules: by the name of a class, the module that declares it.
+        modules: module that declares each class, by the name of the class.
     """
 
     def __init__(self, modules: Mapping[str, str]) -> None:

@@ -93,7 +93,7 @@ class KernelEngine(System):
             y: state (y,).
             settings: settings of the integration: error control, or fixed steps of semi-implicit
                 Euler.
-            observe: called with time and state after each step.
+            observe: function that is called with time and state after each step.
         """
         if settings.fixed_step is not None:
             # Speeds of ball joints are angular velocities, from which the kernels compute the rates

@@ -58,12 +58,12 @@ class ControlledSteps(Stepper):
         t: initial time, s.
         y: initial state.
         options: accuracy, integrator and other options of the integration.
-        observe: called with time and state after each step. For the steps of a table it is called
-            only when a result needs them.
+        observe: function that is called with time and state after each step. For the steps of a
+            table it is called only when a result needs them.
         held: controller of the run.
 
     Attributes:
-        attempted: attempted steps so far; `taken` counts the accepted ones.
+        attempted: number of attempted steps so far; `taken` counts the accepted ones.
 
     Raises:
         SettingError: an option has no meaning.
@@ -204,7 +204,7 @@ class ControlledSteps(Stepper):
         """Take steps until the last report.
 
         Args:
-            batch: the batch.
+            batch: batch of this run.
             steps: number of steps in the first call.
 
         Yields:
@@ -227,11 +227,11 @@ class ControlledSteps(Stepper):
         """Take some steps in one call of the kernels.
 
         Args:
-            batch: the batch.
+            batch: batch of this run.
             steps: largest number of steps.
 
         Returns:
-            How the call ended, see :mod:`osimlite.mechanics.kernels.record`.
+            Reason why the call ended, one of :class:`osimlite.mechanics.kernels.record.ENDING`.
 
         Raises:
             IntegrationError: no step is small enough.

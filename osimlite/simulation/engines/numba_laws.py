@@ -41,7 +41,7 @@ def compile_law(name: str) -> int:
         name: name of the kernel.
 
     Returns:
-        Its address.
+        Address of the kernel.
 
     Raises:
         CompilationError: the kernel needs dual numbers, or numba cannot compile it.

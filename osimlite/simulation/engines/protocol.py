@@ -146,7 +146,7 @@ class Engine(Protocol):
             t: time, s.
             y: state (y,).
             settings: settings of the integration.
-            observe: called with time and state after each step.
+            observe: function that is called with time and state after each step.
         """
 
     def set_controls(self, controls: Controls) -> None:

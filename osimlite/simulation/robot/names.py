@@ -99,7 +99,7 @@ def joint_names(mechanism: Mechanism) -> list[str]:
         mechanism: the mechanism.
 
     Returns:
-        For each coordinate its name; its path with dots where coordinates share a name.
+        Name of each coordinate; its path with dots where coordinates share a name.
     """
     return distinct(mechanism.coordinate_names, lambda name: xml_name(to_dotted_name(name)))
 

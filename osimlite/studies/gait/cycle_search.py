@@ -351,6 +351,9 @@ class CycleSearch:
         """Find the most similar touch-downs of a walk, one step or one stride apart.
 
         They are a stride apart if the legs differ.
+
+        Returns:
+            Candidate at the first of these touch-downs; None for a walk without a clean step.
         """
         if len(walk.steps) < 2:
             return None

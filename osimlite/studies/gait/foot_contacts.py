@@ -31,10 +31,10 @@ class FootContacts:
 
     @property
     def foot_of(self) -> dict[str, int]:
-        """Index of its foot for each contact of a foot.
+        """Index of the foot to which each contact belongs.
 
         Returns:
-            Per name of a contact the index of the foot.
+            Index of the foot, by the name of the contact.
         """
         return {contact: number for number, foot in enumerate(self.feet) for contact in foot}
 

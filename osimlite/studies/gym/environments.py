@@ -164,7 +164,7 @@ def _resolve_task(
 
 
 def _check_render_mode(mode: str | None) -> str | None:
-    """Return a mode of rendering that is supported, or raise an error of Gymnasium."""
+    """Return the mode of rendering (None for none); raise an error of Gymnasium for an unknown one."""
     if mode not in (None, "rgb_array"):
         raise gymnasium.error.UnsupportedMode(f"pictures come as 'rgb_array', not as '{mode}'")
     return mode

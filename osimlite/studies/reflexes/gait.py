@@ -70,7 +70,7 @@ class GaitMeasures(NamedTuple):
         """Return the measures as lines of text.
 
         Returns:
-            Per label a text with units, in the order of a report.
+            Text with units of each measure by label, in the order of a report.
         """
         names = ("mass centre", self.centre), ("pelvis", self.pelvis)
         height_texts = (

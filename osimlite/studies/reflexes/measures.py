@@ -100,11 +100,11 @@ class Measure(ABC):
 
     Attributes:
         name: name in the table of results.
-        weight: factor of the result.
+        weight: factor of the measure in the total score.
         start: time from which the measure is active (s).
         stop: time until which it is active (s).
-        report: further quantities by name (w,): of efforts the power per mass ("power", W/kg) and
-            the cost of transport ("transport", J/(kg m)).
+        report: further quantities of each candidate (w,), by name: power per mass ("power", W/kg)
+            and cost of transport ("transport", J/(kg m)) of efforts.
         terms: weighted results of the measure and of its parts by name (w,).
         minimize: whether the measure is to be minimized; the attribute of the class is the default.
     """

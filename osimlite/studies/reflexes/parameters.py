@@ -165,7 +165,7 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
     """Read a .par file.
 
     Returns:
-        Per name of a parameter the best value, the mean and the standard deviation.
+        Best value, mean and standard deviation of each parameter, by name.
 
     Raises:
         MissingFileError: there is no such file.

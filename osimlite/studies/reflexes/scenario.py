@@ -458,8 +458,8 @@ def read_initial_parameters(
         folder: folder of the scenario.
 
     Returns:
-        Per parameter the best value, the mean (the best value with `use_best_as_mean`) and the
-        standard deviation times `std_factor`.
+        Best value, mean (the best value with `use_best_as_mean`) and standard deviation times
+        `std_factor` of each parameter, by name.
     """
     result: dict[str, tuple[float, float, float]] = {}
     for _, init in optimizer.select_all("init"):

@@ -67,7 +67,7 @@ def search_parameters(
         seed: seed of the random numbers, so that a search can be repeated; by default that of the
             scenario.
         resume: whether to continue from the `best.par` in the folder.
-        report: called with the state after each generation.
+        report: function that is called with the state of the search after each generation.
 
     Returns:
         Best value of each parameter, by name.

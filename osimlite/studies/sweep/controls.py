@@ -189,7 +189,7 @@ def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedCont
 
     Args:
         model: model with the actuators.
-        controls: by the name or path of an actuator a number, or `(times, values)` with times in s.
+        controls: number, or `(times, values)` with times in s, for each actuator by name or path.
 
     Raises:
         SettingError: an actuator is unknown, or a control is something else.

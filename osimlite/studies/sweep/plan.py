@@ -123,7 +123,7 @@ class Plan(IntegrationOptions):
 
     @property
     def interval(self) -> float | None:
-        """Interval (s) at which states are saved, as requested or as expressions need it."""
+        """Interval (s) at which states are saved, as requested or for expressions; None for none."""
         return self.report_interval or (
             REPORT_INTERVAL if any(map(is_expression, self.measures)) else None
         )

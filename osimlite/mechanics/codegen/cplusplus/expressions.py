@@ -124,7 +124,7 @@ class ExpressionWriter:
 
         Args:
             nodes: the operands.
-            write: returns the text of an operand.
+            write: function that returns the text of an operand.
 
         Returns:
             Texts in the order of the operands; earlier ones are names of variables where the order

@@ -50,13 +50,13 @@ class Specialisation(Kernel):
 
     Attributes:
         variables: types of arguments and local variables by name.
-        result: type of its result.
+        result: type of the result of the function.
         effects: effects of a call on memory, as bits of READS and WRITES.
 
     Args:
-        function: the function.
-        arguments: types of its arguments.
-        specialise: returns the specialisation of a function that this one calls.
+        function: function to specialise.
+        arguments: types of the arguments of the function.
+        specialise: function that returns the specialisation of a function that this one calls.
     """
 
     def __init__(
@@ -417,7 +417,7 @@ class Specialisation(Kernel):
             node: the expression.
 
         Returns:
-            Its value; None if it is computed at run time, or is no integer.
+            Value of the expression; None if it is computed at run time, or is no integer.
         """
         match node:
             case ast.Constant(value=int() as value):

@@ -34,7 +34,7 @@ class Reader(Protocol):
     """Interface of the inference for the rules."""
 
     def constant_index(self, node: ast.expr) -> int | None:
-        """Return the value of an integer constant."""
+        """Return the value of an integer constant, None for any other expression."""
 
 
 Nodes = Sequence[ast.expr]

@@ -111,7 +111,7 @@ def write_number(value: bool | int | float) -> str:
 
 
 def right_of(node: ast.AST) -> ast.expr | None:
-    """Return the right operand of an operation or of an augmented assignment."""
+    """Return the right operand of an operation or an augmented assignment, None for other nodes."""
     match node:
         case ast.BinOp(right=operand) | ast.AugAssign(value=operand):
             return operand

@@ -222,7 +222,7 @@ class BulletEngine(KernelEngine):
             y: state (y,).
             settings: settings of the integration; Bullet itself takes fixed steps if its joints are
                 coordinates.
-            observe: called with time and state after each step.
+            observe: function that is called with time and state after each step.
         """
         window = self.window
         if window is not None:
@@ -280,7 +280,8 @@ class BulletStepper(SemiImplicitEuler):
         t: initial time, s.
         y: initial state.
         h: step, s; the last one may be shorter.
-        observe: called with time and state after each step; the loads belong to that state.
+        observe: function that is called with time and state after each step; the loads belong to
+            that state.
     """
 
     def __init__(
