@@ -30,9 +30,16 @@ import osimlite
 from _corpus import CORPUS, unpacked
 from _pair import Pair, pair, pair_commands
 from osimlite.simulation import Simulation
-from simulate import ACCURACIES, MODEL, THEIRS, TO, run_opensim, run_ours
-from validate import THEIRS as INITIALIZED
-from validate import initialized, whole_process
+from simulate import (
+    ACCURACIES,
+    MODEL,
+    OPENSIM_SCRIPT,
+    TO,
+    prepare_opensim_runs,
+    prepare_osimlite_runs,
+)
+from validate import OPENSIM_SCRIPT as INITIALIZED
+from validate import build_command, initialize_in_opensim
 
 REAL = {"Rajagopal2016": "m0954", "gait2392": "m0013", "gait10dof18musc": "m0005"}
 """The models by name, and what stands for them in the corpus."""
@@ -62,7 +69,7 @@ def measured(rounds: int, folder: Path, place: Path) -> Iterator[Aimed]:
     yield from motions(rounds)
     for name, file in files.items():
         aim = 1.0 if name == "walker" else 0.6
-        ours, theirs = partial(osimlite.validate, file), partial(initialized, file)
+        ours, theirs = partial(osimlite.validate, file), partial(initialize_in_opensim, file)
         yield Aimed(pair(f"validate({name})", ours=ours, theirs=theirs, rounds=rounds), aim)
     small = [
         file
@@ -85,15 +92,19 @@ def measured(rounds: int, folder: Path, place: Path) -> Iterator[Aimed]:
     yield Aimed(Pair(f"read {len(small)} small files", *whole), 1.2)
     for name, file in files.items():
         opened = [sys.executable, "-c", INITIALIZED.format(model=str(file))]
-        checked = whole_process("validate", "--no-cache", str(file))
+        checked = build_command("validate", "--no-cache", str(file))
         yield Aimed(
             pair_commands(
                 f"osimlite validate {name}, first", ours=checked, theirs=opened, rounds=few
             ),
             0.8,
         )
-    walked = [sys.executable, "-c", THEIRS.format(model=str(MODEL), to=TO, accuracy=ACCURACY)]
-    simulated = whole_process(
+    walked = [
+        sys.executable,
+        "-c",
+        OPENSIM_SCRIPT.format(model=str(MODEL), to=TO, accuracy=ACCURACY),
+    ]
+    simulated = build_command(
         "simulate", str(MODEL), "--to", f"{TO:g}", "-o", str(place / "results")
     )
     yield Aimed(
@@ -107,7 +118,7 @@ def measured(rounds: int, folder: Path, place: Path) -> Iterator[Aimed]:
         # Beside a Python that does nothing, which tells how quick the machine is.
         alone = pair_commands(
             f"osimlite {name}",
-            ours=whole_process(*words),
+            ours=build_command(*words),
             theirs=[sys.executable, "-c", NOTHING],
             rounds=rounds,
         )
@@ -131,10 +142,10 @@ def motions(rounds: int) -> Iterator[Aimed]:
                 partial(osimlite.simulate, model, to=TO, engine="compiled"),
                 1 / 12,
             ),
-            ("motion of the walker, compiled", run_ours(ready, ACCURACY), 1 / 30),
+            ("motion of the walker, compiled", prepare_osimlite_runs(ready, ACCURACY), 1 / 30),
         ]
         for name, ours, aim in works:
-            run = run_opensim(theirs, ACCURACY, rounds + 1)
+            run = prepare_opensim_runs(theirs, ACCURACY, rounds + 1)
             yield Aimed(
                 pair(name, ours=ours, theirs=run, rounds=rounds, clock=time.process_time), aim
             )

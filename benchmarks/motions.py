@@ -39,7 +39,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.registry import FORCE_TYPES
-from simulate import run_opensim, run_ours
+from simulate import prepare_opensim_runs, prepare_osimlite_runs
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
 REAL = {
@@ -69,8 +69,8 @@ def main() -> None:
                     console.print(f"{name}: {error}", highlight=False)
                     continue
                 with simulation:
-                    ours = run_ours(simulation, ACCURACY, TO)
-                    theirs = run_opensim(theirs_model, ACCURACY, ROUNDS + 2, TO)
+                    ours = prepare_osimlite_runs(simulation, ACCURACY, TO)
+                    theirs = prepare_opensim_runs(theirs_model, ACCURACY, ROUNDS + 2, TO)
                     places = [info.name for info in simulation.mechanism.coordinates]
                     names = [coordinate.getName() for coordinate in theirs_model.getCoordinateSet()]
                     mine = dict(zip(places, ours(), strict=True))

@@ -37,7 +37,7 @@ from osimlite.io.tables.storage import write_sto
 from osimlite.io.tables.writers import write_trc
 from osimlite.mechanics.multibody.spatial import quaternion_of, rotation_xyz
 from osimlite.simulation.recorded_motion import RecordedMotion
-from validate import whole_process
+from validate import build_command
 
 REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"
 NOISE = 0.01
@@ -310,7 +310,7 @@ def throughput(case: Case, trials: int, place: Path) -> str:
             if file.is_file():
                 (folder / file.name).hardlink_to(file)
     start = time.perf_counter()
-    _run([*whole_process("run"), str(place / "*" / case.setup.name), "--workers", "2"])
+    _run([*build_command("run"), str(place / "*" / case.setup.name), "--workers", "2"])
     seconds = time.perf_counter() - start
     return f"{trials} trials of {case.name}: {seconds:.1f} s, {trials * case.frames() / seconds:.0f} frames per second"
 
@@ -337,7 +337,7 @@ def main() -> None:
         ]
         whole = pair_commands(
             f"{smallest.name}, whole process",
-            ours=whole_process("run", "setup.xml"),
+            ours=build_command("run", "setup.xml"),
             theirs=command,
             rounds=rounds,
         )
