@@ -16,7 +16,7 @@ class OptionSpec(NamedTuple):
     Attributes:
         name: keyword of the library; on the command line with - for _, unless `spelled` is given.
         type: type of the value.
-        help: one sentence.
+        help: sentence for the help of the command.
         default: value if the option is absent; None if `shown` says what the library then takes.
         unit: placeholder of the value in the help, in capitals, as SECONDS.
         shown: default in words, where `default` does not say it.
@@ -38,7 +38,7 @@ class OptionDescription(NamedTuple):
     """Description of an attribute of an options record.
 
     Attributes:
-        help: one sentence for the command line; an option without it exists in the library only.
+        help: sentence for the help of the command; an option without it exists in the library only.
         more: text for the library, after `help` or instead of it.
         unit: placeholder of the value in the help.
         shown: default in words.

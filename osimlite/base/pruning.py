@@ -63,9 +63,9 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
     Links are neither followed nor removed.
 
     Args:
-        folder: the user's cache folder.
-        now: seconds since the epoch.
-        max_bytes: largest size of all entries together.
+        folder: cache folder of the user.
+        now: present time, in seconds since the epoch.
+        max_bytes: largest size of all entries together, bytes.
 
     Returns:
         Number of entries that were removed.

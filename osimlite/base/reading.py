@@ -50,7 +50,7 @@ def make_missing_error(path: str | Path, *, may_be_folder: bool = False) -> Miss
     """Return the error for a missing path: a missing folder if the path ends like one, else a file.
 
     Args:
-        path: the missing path.
+        path: path that does not exist.
         may_be_folder: whether a path without suffix means a folder.
     """
     path_text = str(path)
@@ -111,7 +111,8 @@ def describe_content(beginning: bytes) -> str | None:
     """Return the type of a text in words by its beginning; None if it is no result of a tool.
 
     Args:
-        beginning: the first bytes, with the head of a table or the first element of a document.
+        beginning: first bytes of a file, with the head of a table or the first element of a
+            document.
     """
     if b"\0" in beginning:
         return None

@@ -58,8 +58,8 @@ class ResultWriter:
         """Return the writer for the results of a document.
 
         Args:
-            document: the file that names the results.
-            output: the folder that the user named for all of them; None if the document decides.
+            document: path of the file that names the results.
+            output: folder that the user named for all results; None if the document decides.
             overwrite: whether any regular file or link may be replaced.
             outside: whether files may be written outside of the trees of the project and the
                 current folder.
@@ -140,7 +140,7 @@ class ResultWriter:
 
         Args:
             path: path in the document.
-            lines: the text in parts.
+            lines: parts of the text, with line ends.
 
         Yields:
             Stream of the complete temporary file, which is closed already.

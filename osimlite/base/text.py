@@ -234,7 +234,7 @@ def add_article(noun: str) -> str:
     """Return a noun with its indefinite article: ``"a Body"``, ``"an Ellipsoid"``.
 
     Args:
-        noun: the noun, for example the name of a class; also in brackets, as in ``"<Body>"``.
+        noun: singular noun, for example the name of a class; also in brackets, as in ``"<Body>"``.
     """
     return f"{'an' if noun.lstrip('<').startswith(_VOWELS) else 'a'} {noun}"
 

@@ -357,8 +357,8 @@ def replace_with(path: Path, target: Path) -> None:
     """Replace a file by another one.
 
     Args:
-        path: the new file, which loses its name.
-        target: the file to replace.
+        path: new file, which is moved to `target`.
+        target: file to replace.
 
     Raises:
         OSError, OsimliteError: the file cannot be replaced.

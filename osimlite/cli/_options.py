@@ -309,7 +309,7 @@ def parse_named_words(
 
     Args:
         assignments: words of the command line.
-        option: the option, for messages.
+        option: name of the option, for messages.
         form: expected form, for messages.
 
     Returns:
@@ -355,7 +355,7 @@ def parse_named_numbers(assignments: Iterable[str] | None, option: str) -> dict[
 
     Args:
         assignments: words of the command line.
-        option: the option, for messages.
+        option: name of the option, for messages.
 
     Returns:
         Numbers by name.
@@ -385,7 +385,7 @@ def parse_quantities(
     Args:
         assignments: words of the command line.
         mechanism: mechanism with the coordinates.
-        option: the option, for messages.
+        option: name of the option, for messages.
         states: paths of other states that may be named.
 
     Returns:

@@ -50,7 +50,8 @@ def inverse_kinematics(
 
     Args:
         model: model with markers named as the measured ones, and frames named as the sensors.
-        markers: a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where a
+        markers: path of a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where
+            a
             marker was not seen.
         orientations: a .sto file of quaternions, or arrays by name: quaternions (t, 4), scalar
             first, or rotation matrices (t, 3, 3) from the axes of a sensor to ground; NaN where one

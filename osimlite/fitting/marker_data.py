@@ -30,7 +30,7 @@ class MarkerData(Measurements):
         """Return markers from a file, or from arrays (t, 3) or (3,) by name, m.
 
         Args:
-            source: a .trc, .c3d or .sto file, arrays by name, or MarkerData.
+            source: path of a .trc, .c3d or .sto file, arrays by name, or MarkerData.
             times: times of the frames of arrays, s; by default 0, 1, 2 ...
 
         Raises:

@@ -301,7 +301,7 @@ def _find_allowed_interval(
     """Return the interval around a value in which a coupled coordinate is in its range.
 
     Args:
-        coupler: the coupler, of one argument.
+        coupler: coupler with one independent coordinate.
         start: value of the argument around which to search.
         bounds: bounds of the argument.
         lower: lower bound of the coupled coordinate.

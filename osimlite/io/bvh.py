@@ -61,7 +61,7 @@ class BvhMotion:
     """Skeleton and motion of a BVH file.
 
     Attributes:
-        joints: the joints, each after its parent.
+        joints: joints of the skeleton, each after its parent.
         frame_time: time between two frames, s.
         values: numbers of all channels (frames, channels), joint by joint.
         file: path of the file; None if it was not read.

@@ -41,7 +41,7 @@ def validate(
     """Check a model, a setup, a table, or all files of a folder against every rule.
 
     Args:
-        model: a Model, the path of a file or a folder, or a Source. Findings have a line and a column
+        model: Model, path of a file or a folder, or Source. Findings have a line and a column
             only if there is a text.
         select: codes, prefixes of codes, or names of the rules to run; all by default.
         ignore: codes, prefixes of codes, or names of the rules to leave out.

@@ -43,11 +43,11 @@ class Stage(StrEnum):
 
 
 class Obstacle(NamedTuple):
-    """A reason why a model cannot be computed, or is computed differently from the file."""
+    """Reason why a model cannot be computed, or is computed differently from the file."""
 
     stage: Stage
     path: str  # absolute path of the component at fault, empty if it is not known
-    message: str  # what is wrong, without the next step
+    message: str  # description of the obstacle, without the next step
 
 
 SIMPLE_CLASSES = frozenset(

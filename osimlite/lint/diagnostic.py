@@ -143,7 +143,7 @@ class MissingPackageNote(NamedTuple):
     """Note on a file for which some rules did not run, because numeric packages are missing."""
 
     file: str
-    code: str  # with which the codes of the first of these rules begin
+    code: str  # beginning of the codes of the first of these rules
     message: str
 
 

@@ -144,10 +144,10 @@ class Rule:
     than a version, which OpenSim treats differently. `fixes` is the kind of its fixes. `about` is
     the type of subject: ``model``, ``table``, ``document`` (a setup, or a part of one),
     ``measures`` (of the model's paths and muscles), ``construction`` (obstacles to the computation
-    of a model), or ``trial`` (measurements of a finished trial). `consequences` lists the possible consequences
-    of its errors in OpenSim: a single one holds for all errors; of several, each finding names its
-    own. A rule that distinguishes faults is a `group`: there is a rule for each `fault`, all with
-    the same `check`.
+    of a model), or ``trial`` (measurements of a finished trial). `consequences` lists the possible
+    consequences of its errors in OpenSim: a single one holds for all errors; of several, each
+    finding names its own. A rule that distinguishes faults is a `group`: there is a rule for each
+    `fault`, all with the same `check`.
     """
 
     code: str

@@ -318,7 +318,7 @@ class Object(BaseModel, metaclass=ObjectType):
 
         Args:
             name: name of the property in Python.
-            value: the value; not an object.
+            value: value of the property; not an object.
         """
         note_change(self._model, numbers_only=name in get_numeric_names(type(self)))
         self.__dict__[name] = value

@@ -38,7 +38,7 @@ class TransformAxis(Object):
         several coordinates OpenSim rejects the model.
 
         Args:
-            spec: the property ``function``.
+            spec: declaration of the property ``function``.
             values: other properties of the axis.
         """
         if len(values.get("coordinates", ())) == 1:

@@ -53,7 +53,7 @@ def add_properties(cls: type[Object], docstring: str) -> str:
     """Return a docstring with a section on the properties of the class, for ``help()``.
 
     Args:
-        cls: the class.
+        cls: class that is described.
         docstring: docstring of the class.
     """
     rows = [

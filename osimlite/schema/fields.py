@@ -151,7 +151,7 @@ class Reference(FieldType):
     Attributes:
         rule: rule of :mod:`osimlite.schema.resolution` that resolves the text.
         target: OpenSim class that the named component must have.
-        shape: one name, an optional one, or a list.
+        shape: whether the property has one name, an optional one, or a list.
         required: whether OpenSim rejects an empty property.
         legacy: whether the property belongs to OpenSim's first property system.
         words: words that are accepted besides names.

@@ -20,11 +20,11 @@ class Layout:
     Attributes:
         comments: comments before the object.
         before: comments and unknown elements before each property, by tag; None for the end.
-        raw: by field, a text that could be read only in part, with the value that was read. It is
-            written back as long as the value is unchanged.
+        raw: texts that could be read only in part, with the values that were read, by field. A text
+            is written back as long as its value is unchanged.
         attributes: unknown attributes.
         after: remarks after the last member of a list.
-        version: version of a whole document.
+        version: version of the document, for the object at its top.
         file: path of the document.
         prolog: comments before the root element.
         epilog: comments after the root element.

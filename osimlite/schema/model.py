@@ -121,7 +121,7 @@ class Model(ModelComponent):
         """Yield the components in OpenSim's order, parents first, starting with the model.
 
         Args:
-            cls: only components of this class and of classes derived from it.
+            cls: class to which the result is restricted, with classes derived from it.
 
         Returns:
             An iterator over the components of the present tree.

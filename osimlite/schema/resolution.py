@@ -30,10 +30,10 @@ class Resolution(NamedTuple):
     """Result of resolving a reference.
 
     Attributes:
-        target: the component; None on failure.
+        target: named component; None on failure.
         failure: reason: nothing at the path, a component of another class, an empty text, or a text
             that is not a path.
-        found: the component of another class.
+        found: component of another class to which the text leads.
     """
 
     target: Component | None

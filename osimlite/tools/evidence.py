@@ -28,18 +28,18 @@ MIN_PHASE_S = 0.1
 class Evidence:
     """Motion of a run, and the measurements behind it."""
 
-    model: Model  # the model
+    model: Model  # model that moves
     file: Path  # file of the model
     times: Array  # times (t,), s
     coordinates: Sequence[str]  # names of the n coordinates
     values: Array  # values of the coordinates (t, n), rad and m
-    turning: Sequence[bool]  # which coordinates are angles
+    turning: Sequence[bool]  # whether each coordinate is an angle (n,)
     markers: Sequence[str] = ()  # names of the m fitted markers
     measured: Array | None = None  # measured positions (t, m, 3), m; NaN if unseen
     places: Array | None = None  # positions in the model (t, m, 3), m
     loads: Path | None = None  # file of measured loads
     sensors: Sequence[str] = ()  # names of the k fitted sensors
-    # rotation angles of the sensors from their measurements (t, k), rad; NaN if not measured
+    # Rotation angles of the sensors from their measurements (t, k), rad; NaN if not measured.
     angles: Array | None = None
     # Of a motion that is driven by muscles and contacts: generalized speeds (t, n), other states
     # by path, and controls, NaN where unknown.

@@ -44,18 +44,18 @@ MIN_TIMES = 6
 class Motion:
     """States of a model over time."""
 
-    model: Model  # the model
-    simulation: Simulation  # computes forces and accelerations
+    model: Model  # model that moves
+    simulation: Simulation  # simulation that computes forces and accelerations
     times: Array  # times (t,), s
     states: Array  # states (t, y), in the order of the simulation's engine
     # Start and ends of all steps, if the motion was integrated.
     steps: Sequence[Moment] = ()
-    # Returns the complete measured motion; this motion is a part of it.
+    # Function that returns the complete measured motion, of which this motion is a part.
     record: Callable[[], SpeedRecord] | None = None
-    # By path of each muscle without an equilibrium at some times: mask of these times (t,), at
-    # which its states are NaN.
+    # Masks of the times (t,) at which a muscle has no equilibrium and its states are NaN, by path
+    # of the muscle.
     unbalanced: Mapping[str, BoolArray] = field(default_factory=dict)
-    # Simulates another version of the model; required if some muscles are unbalanced.
+    # Function that simulates another version of the model; required if muscles are unbalanced.
     simulate: Callable[[Model], Simulation] | None = None
     left_out: frozenset[str] = frozenset()  # paths of muscles that are off
 
@@ -135,7 +135,7 @@ class Motion:
         """Return a part of the motion with a model in which some muscles are switched off.
 
         Args:
-            part_motion: the motion at some times.
+            part_motion: motion at some of the times.
             muscles: paths of the muscles.
         """
         assert self.simulate is not None
@@ -367,8 +367,8 @@ class Motion:
 class AnalysisTables:
     """Writer of the tables of one analysis."""
 
-    job: Job  # the setup
-    outcome: Outcome  # collects the tables
+    job: Job  # setup of the tool
+    outcome: Outcome  # outcome to which the tables are added
     name: str  # name of the analysis
     times: Array  # times of all rows (t,), s
     note: str = ""  # note in the header about missing numbers
@@ -413,7 +413,7 @@ class AnalysisTables:
 
         Args:
             suffix: end of the file's name.
-            columns: a label for each value.
+            columns: labels of the values, one for each.
             rows: values (t, m); a value may take several columns.
             value_type: type of the values, for example ``"Vec3"``.
         """

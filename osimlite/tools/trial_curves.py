@@ -42,8 +42,8 @@ class TrialOutcomes(NamedTuple):
     """Outcomes of the setups of one trial."""
 
     name: str  # name of the trial
-    outcomes: Sequence[Outcome]  # outcomes of its setups
-    setups: Sequence[Path] = ()  # the setups, in the same order
+    outcomes: Sequence[Outcome]  # outcomes of the setups
+    setups: Sequence[Path] = ()  # paths of the setups, in the order of `outcomes`
 
     @property
     def evidence(self) -> Evidence | None:
@@ -214,7 +214,7 @@ def read_muscle_states(trial: TrialOutcomes) -> dict[str, Array]:
     """Return the activations of muscles that a tool has computed, at the times of the trial's motion.
 
     Args:
-        trial: a trial with a motion.
+        trial: outcomes of a trial with a motion.
 
     Returns:
         Activations by state labels; none if the motion has states itself.

@@ -74,7 +74,7 @@ class SubjectFolder:
     """Conversion of a subject.
 
     Args:
-        path: the .b3d file.
+        path: path of the .b3d file.
         name: name of the subject; that of the file by default.
         processing_pass: type of the pass to write the trials of; None for dynamics, or else the
             last one.

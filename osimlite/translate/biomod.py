@@ -52,14 +52,14 @@ MUSCLE_TYPE = "hillthelen"
 
 @dataclass(frozen=True)
 class BioMod:
-    """A model for biorbd.
+    """Model in the format of biorbd.
 
     Attributes:
         name: name of the files without suffix.
-        text: the .bioMod file.
-        coordinates: JSON text that says how coordinates give the degrees of freedom.
+        text: text of the .bioMod file.
+        coordinates: JSON text with the degrees of freedom as functions of the coordinates.
         fidelity: record of what was translated, approximated or left out.
-        robot: the links and joints of the segments.
+        robot: robot form of the model, whose links and joints are the segments.
     """
 
     name: str
@@ -182,7 +182,7 @@ def _format_segment(
         name: name of the segment.
         parent: name of the segment that carries it.
         origin: frame of the segment in that of the parent (4, 4), before the motion.
-        joint: the joint that moves it; None if it does not move.
+        joint: joint that moves the segment; None if it does not move.
         axis_letter: axis of the motion.
         robot: robot form of the model.
     """

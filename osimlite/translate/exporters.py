@@ -36,17 +36,17 @@ class Exporter:
     sentence about it.
     """
 
-    # Of the format in `osimlite translate --to`, or of the option of `osimlite view` that names
-    # the file.
+    # Name of the format in `osimlite translate --to`, or of the option of `osimlite view` for the
+    # file.
     name: str
     command: str  # "translate" or "view"; "convert" if only `osimlite convert` writes it
-    help: str  # what is written
+    help: str  # description of the written files
     write: Callable[..., Any]
     choices: tuple[OptionSpec, ...] = ()  # options that this format has
     is_default: bool = False  # whether the command writes it if no format is named
     title: str = ""  # name of the format in words; `name` in capitals if empty
-    suffix: str = ""  # of the main file, by which `osimlite convert` finds the format
-    carries: str = ""  # what is carried over
+    suffix: str = ""  # suffix of the main file, by which `osimlite convert` finds the format
+    carries: str = ""  # description of the content that is carried over
     takes_motion: bool = False  # whether the function takes the keyword argument `motion`
 
 

@@ -62,11 +62,11 @@ class Importer:
     :class:`Imported`.
     """
 
-    name: str  # of the format in `osimlite convert --from`
+    name: str  # name of the format in `osimlite convert --from`
     title: str  # name of the format in words
-    suffixes: tuple[str, ...]  # in lower case
+    suffixes: tuple[str, ...]  # suffixes of files in lower case
     target: str  # OSIM, MARKERS or PROJECT
-    carries: str  # what is carried over
+    carries: str  # description of the content that is carried over
     read: Callable[..., Imported]
     # One of these texts occurs in the first BEGINNING_BYTES; empty if the suffix is enough.
     marks: tuple[bytes, ...] = ()

@@ -83,10 +83,10 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
     Names, coordinates, ranges and units stay. Muscles, which Nimble does not move, stay too.
 
     Args:
-        model: the model, which is changed.
+        model: model to change in place.
 
     Returns:
-        The differences, with what was done about each.
+        The differences, with the change of the model for each.
 
     Raises:
         UnsupportedError: Nimble cannot read the model, so that it has no motion there.
@@ -257,7 +257,7 @@ def _orthogonalize(
     """Return the three axes of rotation that Nimble uses.
 
     Args:
-        joint: the joint, for messages.
+        joint: joint of the axes, for messages.
         vectors: axes of the file.
         may_tilt: whether Nimble accepts axes that are not the coordinate axes.
 

@@ -73,7 +73,7 @@ def animate(
     Args:
         model: model that moves.
         trajectory: motion of the model.
-        path: the file to write.
+        path: file to write.
         fps: frames per second of the film; a GIF shows at most 50.
         speed: seconds of motion per second of film, 1 for real time.
         plane: plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along -Y.

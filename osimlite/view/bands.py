@@ -27,7 +27,7 @@ class Band(NamedTuple):
     percent: Array  # points of the gait cycle (n,), %
     mean: Array  # mean (n,)
     deviation: Array  # standard deviation (n,)
-    source: str = ""  # where the numbers come from, shown below the panels
+    source: str = ""  # source of the numbers, shown below the panels
 
 
 def read_bands(path: str | Path) -> dict[str, Band]:
@@ -38,7 +38,7 @@ def read_bands(path: str | Path) -> dict[str, Band]:
     source of the numbers, which is otherwise the name of the file.
 
     Args:
-        path: the file.
+        path: path of the CSV file.
 
     Returns:
         Bands by the title of their panel.

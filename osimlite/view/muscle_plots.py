@@ -49,7 +49,7 @@ def plot_muscles(
         mechanism: mechanism of the model.
         folder: folder to write into; it is made if it does not exist.
         other: curves of the same muscles in the same poses of another model, drawn thin.
-        regions: for each muscle by name, the bodies between which it runs.
+        regions: bodies between which each muscle runs, by name of the muscle.
 
     Returns:
         The PNG files: ``moment_arm_knee_angle_r.png``, ``tendon_force.png``, and further pages as

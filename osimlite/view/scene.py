@@ -42,7 +42,7 @@ class Item:
     """Surface in one colour, fixed to a body."""
 
     path: str  # absolute path of the component it shows
-    layer: Layer  # what it belongs to
+    layer: Layer  # layer with which it is shown or hidden
     body: int  # index of the body that carries it, -1 for ground
     surface: int  # index of the surface in the scene
     matrix: Array  # (4, 4) from the surface to the body's frame, m; it may scale and mirror
@@ -63,7 +63,7 @@ class Line:
     """Polyline: the path of a muscle, a spring, or a stick that shows a body without geometry."""
 
     path: str  # absolute path of the component it shows
-    layer: Layer  # what it belongs to
+    layer: Layer  # layer with which it is shown or hidden
     # Two or more corners that are fixed to bodies, or a path that computes its corners.
     course: tuple[LinePoint, ...] | TraceablePath
     color: Color  # red, green, blue, 0 to 1

@@ -243,7 +243,7 @@ def build_tube(line: Line, corners: Array) -> tuple[Surface, NDArray[np.bool_]]:
     """Build the surface of a line of a scene.
 
     Args:
-        line: the line, with radius, fibers and tendon.
+        line: line of a scene, with radius, fibers and tendon.
         corners: corners of the line in ground (k, 3), m; at least one.
 
     Returns:

@@ -33,9 +33,9 @@ class Target(NamedTuple):
 
     Attributes:
         file: path of the file that defines it.
-        item: the object; None for a file, or a column of a table.
+        item: object that is named; None for a file, or a column of a table.
         path: path of the object in its model.
-        number: index of its element; of an object without an element, that of the nearest owner.
+        number: index of the element of the object; without one, that of the nearest owner.
         at: position in a file that is not a document, for example of a column label.
     """
 

@@ -32,7 +32,7 @@ def list_completions(
     """Return the completions at an offset.
 
     Args:
-        analysis: the text as it is, usually half-typed.
+        analysis: analysis of the present text, which is usually half-typed.
         last_readable: last version of the text that could be read, which provides the names; None if
             there was none.
         offset: character offset of the cursor.
@@ -93,10 +93,10 @@ def _complete_names(
     """Yield the names of the components, files or columns to which a reference may refer.
 
     Args:
-        analysis: the text as it is, in which the completion is inserted.
+        analysis: analysis of the present text, in which the completion is inserted.
         last_readable: last version of the text that could be read, which provides the names.
-        cursor: the cursor in the text.
-        reference: type of the reference, which says what it may refer to.
+        cursor: position of the cursor in the text.
+        reference: type of the reference, which determines its possible targets.
         object_element: element of the object that has the reference; None if it is not known.
     """
     # Half-typed text often cannot be read; without an earlier version no name is known.
@@ -117,8 +117,8 @@ def _complete_tags(
     """Yield the tags that may be inside an element: properties of an object, objects of a property.
 
     Args:
-        analysis: the text as it is.
-        cursor: the cursor in the text.
+        analysis: analysis of the present text.
+        cursor: position of the cursor in the text.
         enclosing: element around the cursor; None outside all, where nothing is offered.
         bracket: "<" if the completion has to insert it, "" if it is typed already.
     """

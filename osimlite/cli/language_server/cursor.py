@@ -34,7 +34,7 @@ class Element(NamedTuple):
     name: str  # attribute `name`
     # class of the object; None for a property or an unknown tag
     cls: type[Object] | None
-    spec: FieldSpec | None  # the property, or the one that holds the object; None if unknown
+    spec: FieldSpec | None  # property of the element or of its object; None if unknown
 
 
 class Cursor(NamedTuple):
@@ -46,7 +46,7 @@ class Cursor(NamedTuple):
     # offset of the start of the word: a tag, an attribute value or a word of text
     start: int
     end: int  # offset after the word
-    word: str  # the word; of a tag only its name
+    word: str  # word at the offset; of a tag only its name
     attribute: str = ""  # name of the attribute whose value is at the cursor
     element: Element | None = None  # element of the tag or attribute at the cursor
 
@@ -62,10 +62,10 @@ class Cursor(NamedTuple):
 
 
 def find_cursor(text: str, offset: int) -> Cursor:
-    """Return what is at an offset of a text.
+    """Return the kind of text, the word and the elements at an offset.
 
     Args:
-        text: the complete text.
+        text: complete text of the document.
         offset: character offset of the cursor.
     """
     stack: list[Element] = []

@@ -41,7 +41,7 @@ class WireField(NamedTuple):
         number: number of the field.
         wire_type: type of the encoding in Protocol Buffers (0 varint, 1 eight bytes, 2 with length,
             5 four bytes).
-        value: an integer of a varint, or the bytes of the value.
+        value: integer of a varint, or bytes of another value.
         offset: offset of the value in the message.
     """
 

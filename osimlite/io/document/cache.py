@@ -111,7 +111,7 @@ def keep_object(path: str, top: Object, notes: Iterable[Note]) -> None:
     """Store the object of a document that was read elsewhere, so that it is not read again.
 
     Args:
-        path: the file, which is well-formed.
+        path: path of the file, which must be well-formed.
         top: object of the document, as `read_document` returns it.
         notes: notes of the reader.
     """

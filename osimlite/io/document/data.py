@@ -424,7 +424,7 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
     Args:
         text: YAML text.
         file: path of the file, for messages.
-        with_lines: return PyYAML's nodes, which know their lines, instead of data.
+        with_lines: whether to return PyYAML's nodes, which know their lines, instead of data.
 
     Raises:
         DocumentError: the text is not YAML; with line and column in the file.

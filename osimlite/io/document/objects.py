@@ -121,7 +121,7 @@ class ObjectReader:
         count: index of the next element in document order.
         notes: notes about content that OpenSim ignores.
         defaults: objects of the document's ``<defaults>`` block, by class.
-        read_include: reads the object of a file that a ``file`` attribute names.
+        read_include: function that reads the object of a file that a ``file`` attribute names.
         home: link to the model that the objects will belong to.
     """
 

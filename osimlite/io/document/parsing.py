@@ -52,7 +52,7 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
 
     Args:
         source: text of the document.
-        recover: continue after syntax errors; the tree is then a guess.
+        recover: whether to continue after syntax errors; the tree is then a guess.
 
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
@@ -123,7 +123,7 @@ def read_version(source: Source, root: etree._Element) -> int:
     """Return the version of a document.
 
     Args:
-        source: the text, for positions in errors.
+        source: text of the document, for positions in errors.
         root: root element.
 
     Raises:

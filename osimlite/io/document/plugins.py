@@ -483,7 +483,7 @@ class _Declarations:
 
         Args:
             value: value from the file.
-            known_keys: the keys; None for any.
+            known_keys: keys that are allowed; None for any.
             description: name of the value in messages.
             words: words of the file that lead to it, for the line of an error.
 

@@ -180,7 +180,8 @@ def read_document(
     Args:
         source: text of the document.
         expected_class: class of the object at the top, or one of its bases.
-        to_check: also find text between elements and attributes without meaning, for the linter.
+        to_check: whether to find text between elements and attributes without meaning, for the
+            linter.
 
     Raises:
         DocumentError: the text is not an OpenSim document, or has an object of another class; with
@@ -216,7 +217,7 @@ def read_tree(
     """Convert an element tree to a document.
 
     Args:
-        source: the text of the tree.
+        source: text from which the tree was parsed.
         root: root element.
         version: version of the document.
         expected_class: class of the object at the top, or one of its bases.

@@ -256,7 +256,7 @@ class Source:
 
         Args:
             number: index of the element.
-            word: the word; the complete text by default.
+            word: word in the text of the element; by default the complete text.
             nth: index of the occurrence of the word, from 0.
         """
         span = self.spans[number]

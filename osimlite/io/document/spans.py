@@ -70,7 +70,8 @@ def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
 
     Args:
         text: text of a document.
-        as_opensim: end instructions at the first ``>`` as OpenSim does, and not at ``?>`` as in XML.
+        as_opensim: whether instructions end at the first ``>`` as in OpenSim, and not at ``?>`` as
+            in XML.
     """
     offset = 0
     while (match := _MARKUP.search(text, offset)) is not None:
@@ -131,8 +132,8 @@ def find_spans(text: str, *, as_opensim: bool = False) -> list[Span]:
     An element without a closing tag is treated as empty; a closing tag without an element is ignored.
 
     Args:
-        text: the text.
-        as_opensim: end instructions at the first ``>``.
+        text: text of a document.
+        as_opensim: whether instructions end at the first ``>``.
     """
     tags: list[str] = []
     starts: list[int] = []
@@ -184,8 +185,8 @@ class PlainSpans(Sequence[Span]):
     A single position in a long text then does not need the spans of all elements.
 
     Args:
-        text: the text.
-        elements: number of its elements, from the parser.
+        text: text of a document.
+        elements: number of elements in the text, from the parser.
     """
 
     def __init__(self, text: str, elements: int) -> None:

@@ -21,8 +21,8 @@ class Survey:
     """Result of reading a text that may be damaged.
 
     Attributes:
-        source: the text.
-        document: the document; None if nothing is readable.
+        source: text of the document.
+        document: document as far as it was read; None if nothing is readable.
         faults: errors that the reader would raise.
         sure_until: line before which a text with syntax errors was certainly understood.
     """
@@ -37,7 +37,7 @@ def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Su
     """Read as much of a text as possible; errors of the text are part of the result.
 
     Args:
-        source: the text.
+        source: text of the document.
         expected_class: class of the object, or one of its bases.
     """
     try:

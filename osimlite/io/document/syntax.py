@@ -77,10 +77,10 @@ def locate_error(source: Source, line: int, column: int, message: str) -> Positi
     """Return the position in the text at which the parser stopped.
 
     Args:
-        source: the text.
+        source: text of the document.
         line: line of the parser's message.
         column: column of the parser's message, which is after a wrong closing tag.
-        message: the parser's message.
+        message: message of the parser.
     """
     lines = source.lines
     line = min(max(line, 1), len(lines))

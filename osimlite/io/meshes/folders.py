@@ -22,7 +22,7 @@ class OutsideError(OsimliteError):
 class MeshFolders:
     """Folders in which the mesh files of a model are searched."""
 
-    beside: Path | None = None  # the folder of the model's file; None if it has none
+    beside: Path | None = None  # folder of the model file; None for a model without one
     # Folders that the user names; those in the environment variable follow them.
     named: Sequence[str | Path] = ()
 

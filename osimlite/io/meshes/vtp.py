@@ -304,7 +304,7 @@ class _File:
         """Return the content of a block of bytes after its header, decompressed.
 
         Args:
-            stream: the header and the block.
+            stream: bytes of the header and the block.
             weight: bytes in memory for each byte of the content.
         """
         width = self.header.itemsize

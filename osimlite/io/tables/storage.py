@@ -240,7 +240,7 @@ def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array)
         name: name of the result, for the message.
         columns: labels of the columns.
         times: times of the rows (t,), s.
-        rows: the numbers (t, k).
+        rows: rows of numbers (t, k).
 
     Raises:
         SimulationError: a value is NaN or infinite; with its column and time.

@@ -41,11 +41,11 @@ class JumpSuspect(NamedTuple):
     # Change of the length that differs from that in neighbouring intervals, m; infinite at a
     # conditional point.
     excess: float
-    usual: float  # the change next to it, m
-    sweep: Sweep  # of a coordinate
-    path: int  # number of the path
-    pose: int  # number of the pose before the interval
-    ends: tuple[float, float]  # of the interval
+    usual: float  # change that neighbouring intervals predict, m
+    sweep: Sweep  # sweep of a coordinate
+    path: int  # index of the path
+    pose: int  # index of the pose before the interval
+    ends: tuple[float, float]  # values of the coordinate at both ends
 
 
 def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:

@@ -456,7 +456,7 @@ def _find_force_or_controller(subject: Subject, part: Object) -> Force | Control
 
     Args:
         subject: model under check.
-        part: the function; a force or controller is returned itself.
+        part: function of the model; a force or controller is returned itself.
 
     Returns:
         The nearest force or controller above the part. None for functions of coordinates,

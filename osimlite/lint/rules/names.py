@@ -153,7 +153,7 @@ def list_old_references(subject: Subject, source: Source, name: str) -> list[str
     Args:
         subject: check target with the notes of the reader.
         source: text of the document.
-        name: a name with white space, which OpenSim takes out of the name alone.
+        name: name with white space, which OpenSim removes from the name but not from references.
     """
     # Almost no document has such a name, and every start would pay for the import.
     from osimlite.io.document.upgrade.version_3_structure import NAME_LIST_TAGS, TEXT_TAGS

@@ -152,7 +152,7 @@ def measure_inverse_dynamics(tool: TrialTool, *, is_final: bool) -> Numbers:
     """Yield the residuals of inverse dynamics.
 
     Args:
-        tool: an InverseDynamicsTool.
+        tool: setup of the class InverseDynamicsTool.
         is_final: whether no later tool reduces these residuals.
     """
     file = tool.find_result(tool.setup.output_gen_force_file)
@@ -181,7 +181,7 @@ def measure_reserves(
         tool: tool with the reserve actuators.
         file: table of actuator forces.
         actuators: roles of the actuators.
-        tools: all tools of the trial.
+        tools: setups of all tools of the trial.
     """
     table = tool.folder.read_table(file)
     columns = {
@@ -270,7 +270,7 @@ def _find_joint_moments(
     Args:
         tool: tool whose motion it is.
         table: table whose times the moments must cover.
-        tools: all tools of the trial.
+        tools: setups of all tools of the trial.
 
     Returns:
         Moments (t,) by coordinate, N m.

@@ -273,7 +273,7 @@ def _plan_tracking(
 
     Args:
         tool: setup whose results are measured.
-        tools: all tools of the trial.
+        tools: setups of all tools of the trial.
         claimed: set to which the measured files are added.
     """
     folder = tool.folder
@@ -328,7 +328,7 @@ def _plan_static_optimization(
 
     Args:
         tool: setup whose results are measured.
-        tools: all tools of the trial.
+        tools: setups of all tools of the trial.
         claimed: set to which the measured files are added.
     """
     for analysis in tool.setup.analysis_set.objects:

@@ -96,8 +96,9 @@ class Follower(NamedTuple):
     """Dependence of a joint on another one, on several, or on time.
 
     Attributes:
-        leader: name of the joint that it follows; None for a constant.
-        polynomial: coefficients of its value as a function of the leader's, constant first.
+        leader: name of the joint that is followed; None for a constant.
+        polynomial: coefficients of the value of the joint as a function of the leader's, constant
+            first.
         function: exact function where the polynomial is fitted or holds the joint; only the driver
             uses it.
         arguments: names of the joints that the function depends on, if there are several.
@@ -174,7 +175,7 @@ class MjcfDraft:
             it, by name of the link.
         leads: joint of a coordinate by the index of the coordinate; a locked coordinate has none.
         followers: dependence of joints that equalities move, by name.
-        helpers: those of them that move nothing, but which others follow.
+        helpers: names of the joints among `followers` that move nothing, but that others follow.
         tendons: tendons of paths by the absolute path of their owners.
         activations: initial activations of actuators by name.
         starts: values (rad or m) in the default pose of joints that passes have added to those of

@@ -74,8 +74,8 @@ class Curves(NamedTuple):
         force: force at this length, fully active and at rest (N).
         lmin: normalized length below which there is no active force.
         lmax: normalized length above which there is no active force.
-        end: the passive force is linear from halfway between 1 and this normalized length.
-        fpmax: twice the passive force there over `force`.
+        end: normalized length; the passive force is linear from halfway between 1 and this length.
+        fpmax: twice the ratio of the passive force at that halfway length to `force`.
         shift: normalized length minus 1 at which the passive force begins.
     """
 

@@ -56,7 +56,7 @@ def add_contacts(draft: ConversionDraft) -> None:
     is recorded.
 
     Args:
-        draft: the conversion; the elements are added to its model.
+        draft: OpenSim model under construction, to which the elements are added.
     """
     if draft.options.contact == "none":
         _record_left_out(draft)

@@ -134,7 +134,7 @@ def from_mjcf(
     MuJoCo itself compiles the file, so that it needs the extra ``mujoco``.
 
     Args:
-        path: the file (.xml); included files and meshes are found by MuJoCo.
+        path: path of the file (.xml); included files and meshes are found by MuJoCo.
         written_for: version of MuJoCo that the file was written for, 3 (or older) or 4. It decides
             what a side site of a tendon means. It is required only where the meanings differ.
         muscle_class: ``"millard"`` makes rigid-tendon Millard muscles with fitted curves and activation

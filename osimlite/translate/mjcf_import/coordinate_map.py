@@ -15,12 +15,12 @@ from osimlite.translate.mjcf_import.joints import BALL, FREE
 
 
 class JointRecord(NamedTuple):
-    """A joint of MuJoCo."""
+    """Joint of MuJoCo."""
 
     kind: int  # mjtJoint
-    address: int  # of its first number in qpos
+    address: int  # offset of the first number of the joint in qpos
     rest: Array  # orientation (3, 3) of the body in the file, for a free joint
-    names: tuple[str, ...]  # of its coordinates
+    names: tuple[str, ...]  # names of the coordinates of the joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,8 @@ class CoordinateMap:
 
     Attributes:
         joints: MuJoCo's joints in their order.
-        rotors: name of the coordinate that each rotor follows, by the name of its own coordinate.
+        rotors: name of the coordinate that each rotor follows, by the name of the rotor's
+            coordinate.
     """
 
     joints: tuple[JointRecord, ...]

@@ -57,14 +57,14 @@ class ConversionDraft:
     Attributes:
         source: compiled MJCF file.
         options: options of the user.
-        model: the OpenSim model.
+        model: OpenSim model.
         fidelity: account of the conversion.
-        world: the frame that stands for MuJoCo's world: ground, or a frame turned in ground.
-        frames: the frame of each body of MuJoCo, world first.
+        world: frame that stands for MuJoCo's world: ground, or a frame turned in ground.
+        frames: frame of each body of MuJoCo, world first.
         coordinates: names of the coordinates of each joint of MuJoCo: one for a hinge or a slide,
             three for a ball, six (rotations, then translations) for a free joint.
         rotors: coordinate that each rotor follows, by the name of the rotor's coordinate.
-        made: the coordinates by name.
+        made: coordinates of the model by name.
         files: files to write beside the model, by name.
         meshes: file of each mesh that is written.
         wrapping_geoms: geoms that a tendon wraps around.

@@ -102,8 +102,8 @@ def find_hint(
 
     Args:
         draft: OpenSim model under construction.
-        segment: the segment, with a geom.
-        pose: the default pose.
+        segment: segment of a tendon that has a geom.
+        pose: default pose of MuJoCo's model.
         version: version of MuJoCo whose rules hold.
 
     Returns:
@@ -166,7 +166,7 @@ def make_geodesic_path(
         draft: OpenSim model under construction.
         frames: frames of the bodies.
         obstacles: surfaces that paths run over.
-        segments: the segments of a tendon with one branch.
+        segments: segments of a tendon with one branch.
         hints: point near the contact of each segment, in the frame of its geom (3,), m; None for a
             straight segment.
     """

@@ -100,8 +100,8 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
     Args:
         draft: OpenSim model under construction.
         body: index of the body.
-        frame: the OpenSim body, already in the model.
-        parent: the frame of the parent body.
+        frame: OpenSim body of `body`, already in the model.
+        parent: frame of the parent body.
     """
     model = draft.mj
     groups = group_joints(draft, body)

@@ -26,7 +26,7 @@ class Bench:
     """A copy of the mechanism under construction that carries candidate paths.
 
     Args:
-        draft: the conversion; its bodies and joints are complete.
+        draft: OpenSim model under construction, with complete bodies and joints.
     """
 
     def __init__(self, draft: ConversionDraft) -> None:

@@ -134,7 +134,7 @@ def make_geometry_path(
         draft: OpenSim model under construction.
         frames: frames of the bodies.
         surfaces: surfaces that paths wrap around.
-        segments: the segments of a tendon with one branch.
+        segments: segments of a tendon with one branch.
         quadrants: part of its surface around which each segment wraps: ``"all"`` for either side,
             ``"+x"`` for the side of the side site, None for no wrapping.
     """

@@ -47,7 +47,7 @@ Z_TO_Y = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 
 class _Part(NamedTuple):
     shape: Geometry
-    position: Array  # in the frame of the geom, m
+    position: Array  # position in the frame of the geom, m
     rotation: Array
 
 

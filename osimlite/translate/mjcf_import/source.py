@@ -83,7 +83,7 @@ def load_mjcf(path: Path) -> MjcfSource:
     process.
 
     Args:
-        path: the file (.xml).
+        path: path of the file (.xml).
 
     Raises:
         MissingDependency: MuJoCo is not installed.

@@ -31,19 +31,19 @@ CYLINDER = 5
 
 
 class TendonSegment(NamedTuple):
-    """The part of a tendon between two sites."""
+    """Part of a tendon between two sites."""
 
-    first: int  # site
-    second: int  # site
-    geom: int = -1  # what it may bend around
-    side: int = -1  # side site of the geom
-    divisor: float = 1.0  # of the branch of a pulley
+    first: int  # index of the first site
+    second: int  # index of the second site
+    geom: int = -1  # geom around which the segment may bend; -1 for none
+    side: int = -1  # side site of the geom; -1 for none
+    divisor: float = 1.0  # divisor of the branch of a pulley
 
 
 class Tendon(NamedTuple):
-    """A tendon of the compiled model."""
+    """Tendon of the compiled model."""
 
-    number: int  # in the compiled model
+    number: int  # index in the compiled model
     segments: tuple[TendonSegment, ...]
     joints: tuple[tuple[int, float], ...]  # joints and coefficients of a fixed tendon
     has_pulley: bool

@@ -262,7 +262,7 @@ class _Selection:
 
         Args:
             row: index of the tendon.
-            joints: the independent hinges and slides that the length depends on, one or more.
+            joints: independent hinges and slides that the length depends on, one or more.
 
         Returns:
             The path, and its errors in the check poses, m.

@@ -66,7 +66,7 @@ class UpgradeError(Exception):
     """Error for content that no step can carry over to the current format.
 
     Attributes:
-        message: one plain sentence.
+        message: sentence about the content.
         number: index of the element in the old document.
     """
 
@@ -409,7 +409,7 @@ def parse_reals(text: str | None, count: int) -> list[float] | None:
     """Return the numbers in a text; None unless there are exactly `count` readable numbers.
 
     Args:
-        text: the text; None for none.
+        text: text of an element; None for none.
         count: required number of values.
     """
     words = split_words(text or "")
