@@ -204,6 +204,19 @@ def test_a_model_made_in_python_shows_its_components():
     assert render(report).startswith("/markerset/asis: error OSIM301 unresolved-reference\n")
 
 
+def test_bounds_of_a_domain_have_few_digits():
+    """The largest pennation angle is half pi, which a message need not print with 17 digits."""
+    from osimlite import Model, Thelen2003Muscle
+
+    model = Model(name="m")
+    muscle = Thelen2003Muscle(name="calf", pennation_angle_at_optimal=90.0)
+    muscle.geometry_path.add_point(model.ground, (0.0, 0.0, 0.0), name="a")
+    muscle.geometry_path.add_point(model.ground, (0.0, 0.5, 0.0), name="b")
+    model.add(muscle)
+    (finding,) = validate(model, select="OSIM206").findings
+    assert "is 90 rad, expected 0 to 1.5708: OpenSim rejects" in finding.message
+
+
 def _finding(
     number: int, message: str, severity: Severity = Severity.ERROR, file: str = "m.osim"
 ) -> Finding:
