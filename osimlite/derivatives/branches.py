@@ -244,7 +244,7 @@ def record_failure(test: Any) -> bool:
 
 
 def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Return what a function returns, merged over all combinations of its branches.
+    """Return the result of a function, merged over all combinations of its branches.
 
     Writes into vectors are merged in the same way. The combinations are the leaves of a binary
     tree: the first run takes the true side of every branch, and each false side is explored from
@@ -252,7 +252,7 @@ def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: A
 
     Args:
         code_part: part of the code, for messages and identity.
-        function: function.
+        function: function whose branches depend on symbols.
         *arguments: arguments of the function.
 
     Returns:

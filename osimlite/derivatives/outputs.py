@@ -43,7 +43,7 @@ AXES = "xyz"
 def locate_stations(
     mechanism: Mechanism, packed: PackedModel
 ) -> list[tuple[str, int, tuple[float, ...]]]:
-    """Return where all stations of a model are.
+    """Return the links of all stations of a model, and their positions in the links.
 
     Args:
         mechanism: mechanism of the model.
@@ -60,7 +60,7 @@ def locate_stations(
 
 
 def locate_frames(mechanism: Mechanism, packed: PackedModel) -> dict[str, tuple[int, list[float]]]:
-    """Return where all frames of a model are.
+    """Return the links of all frames of a model, and the frames in the links.
 
     Args:
         mechanism: mechanism of the model.

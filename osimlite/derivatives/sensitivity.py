@@ -336,7 +336,7 @@ class _SensitivityRun:
             y: state in the order of the simulation.
 
         Raises:
-            SettingError: they differ.
+            SettingError: the rates differ.
         """
         expected_rates = np.array(self._engine.compute_derivative(t, y))[self._places]
         state = np.asarray(y)[self._places]

@@ -298,7 +298,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         return node
 
     def visit_If(self, node: ast.If) -> Any:
-        """Return what replaces a branch: a test of a failure, a decision, or a loop over its sides."""
+        """Return the replacement of a branch: test of a failure, decision, or loop over its sides."""
         code_part = self._number_part(node)
         is_failure = self._is_failure(node)
         exits_early = any(map(_exits_block, (*node.body, *node.orelse)))

@@ -121,7 +121,7 @@ class Paths:
         )
 
     def rewrap_paths(self, model: Model, wrapping: str, code: Code | None = None) -> Paths:
-        """Return those paths that have wrap surfaces, with another wrapping; the mechanism is shared.
+        """Return the paths with wrap surfaces, with another wrapping; the mechanism is shared.
 
         Args:
             model: the model of the paths.

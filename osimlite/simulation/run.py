@@ -563,7 +563,7 @@ def _require_finite_start(mechanism: Mechanism) -> None:
     """Check that default values, default speeds and the mass matrix are finite numbers.
 
     Raises:
-        SimulationError: one of them is not.
+        SimulationError: a number is infinite or NaN.
     """
     for quantity in ("value", "speed"):
         for info in mechanism.coordinates:

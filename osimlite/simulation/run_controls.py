@@ -258,7 +258,7 @@ def _interpolate_linearly(
 
 
 def find_constant_offsets(engine: Any, driven: Controls) -> Ints:
-    """Return where the last function of each control is in the numbers of a model.
+    """Return the offset of the last function of each control in the numbers of a model.
 
     That function must be a constant, whose only number is its value.
 

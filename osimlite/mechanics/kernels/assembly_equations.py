@@ -142,7 +142,7 @@ def evaluate_equations(a: Assembly, q: Floats) -> float:
 
 
 def count_equations(a: Assembly) -> int:
-    """Return how many equations bind positions."""
+    """Return the number of equations that constrain positions."""
     return a.model[a.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS]
 
 

@@ -93,7 +93,7 @@ PULLS = 8
 def start_on_surface(
     p: Floats, first: Vector, second: Vector, bending: float, about: Vector, work: Floats
 ) -> Start:
-    """Find where a straight segment between two points begins to bend around a surface.
+    """Find the start at which a segment between two points begins to bend around a surface.
 
     Args:
         p: numbers of the wrap.

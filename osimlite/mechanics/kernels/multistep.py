@@ -161,7 +161,7 @@ def try_multistep(
 ) -> int:
     """Try one step from y0, which is followed by its derivative, to y1.
 
-    Write its derivative after y1.
+    The derivative at the end is written after y1.
 
     Args:
         model: integers of the model.

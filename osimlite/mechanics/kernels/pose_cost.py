@@ -42,7 +42,7 @@ from osimlite.mechanics.laws.vectors import (
 def evaluate_cost(m: Fit, y: Floats) -> float:
     """Return the cost of a pose.
 
-    Compute its gradient and both parts of its Hessian by all free coordinates.
+    Its gradient and both parts of its Hessian by all free coordinates are computed, too.
 
     Args:
         m: inputs and workspace of the fit.

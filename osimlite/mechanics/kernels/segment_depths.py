@@ -74,7 +74,7 @@ def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
 
 
 def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
-    """Return how near a segment comes to the middle of a surface, squared.
+    """Return the squared distance of a segment from the middle of a surface.
 
     It is the distance from the axis of a cylinder or the ring of a torus (m²), or from the centre of a
     sphere or an ellipsoid in units of the radii.

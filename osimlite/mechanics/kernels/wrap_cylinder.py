@@ -353,7 +353,7 @@ def smooth_heights(
 def edge_constants(
     end: Vector, tangent: Vector, next_point: Vector
 ) -> tuple[float, float, float, float]:
-    """Compute what stays constant as a tangent point slides along its edge.
+    """Compute the constants of the motion of a tangent point along its edge.
 
     Args:
         end: end of the segment.

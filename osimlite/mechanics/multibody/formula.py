@@ -98,7 +98,7 @@ class Formula:
             where: path and property of the formula, for messages.
 
         Raises:
-            UnknownVariableError: it needs an unknown variable.
+            UnknownVariableError: the formula needs an unknown variable.
             ModelError: the text is no formula.
         """
         main, *definitions = re.sub(r"\s", "", text).split(";")

@@ -337,7 +337,7 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
     loads = vectors.T @ values
 
     def criterion(logarithm: float) -> float:
-        """Return what the smoothing minimizes, at the logarithm of the smoothing."""
+        """Return the objective of the smoothing at its logarithm."""
         residual_factors = 1.0 - 1.0 / (1.0 + math.exp(logarithm) * roughness)
         trace = float(residual_factors.sum()) / n
         error = float(np.sum((residual_factors * loads) ** 2)) / n

@@ -426,7 +426,7 @@ def read_surface(
 
     Raises:
         ModelError: a radius of an ellipsoid is not positive.
-        UnsupportedError: it is not a half space, sphere or ellipsoid, or is not fixed to a body.
+        UnsupportedError: the geometry is of another class, or not fixed to a body.
     """
     # Classes are compared by name, so that a model without contact does not import them.
     if not any(
@@ -464,7 +464,7 @@ def read_surface(
 
 
 def find_frame(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, int, Array]:
-    """Return where a contact geometry is fixed.
+    """Return the frame and the body to which a contact geometry is fixed.
 
     Args:
         builder: builder of the elements.
@@ -474,7 +474,7 @@ def find_frame(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str,
         Name of its frame, the frame's body, and the geometry's axes and origin (4, 4) in the body.
 
     Raises:
-        UnsupportedError: it is not fixed to a body.
+        UnsupportedError: the geometry is not fixed to a body.
     """
     frame = builder.tree.target(geometry, "socket_frame", geometry.socket_frame)
     if not isinstance(frame, PhysicalFrame):

@@ -187,8 +187,9 @@ class ForceType:
             force: force component of the model.
 
         Raises:
-            UnsupportedError: osimlite cannot compute a part of it.
-            ModelError: it names something that does not exist, or a parameter has no meaning.
+            UnsupportedError: osimlite cannot compute a part of the component.
+            ModelError: the component names something that does not exist, or a parameter has no
+                meaning.
         """
         path = builder.path(force)
         if self.check is not None:
@@ -451,7 +452,7 @@ class ForceOff(Silent, DeclaredForce):
     form = OFF
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return its records; none if its states rest."""
+        """Return the records of the force; none if its states do not change."""
         return super().make_records(places) if self.force_type.states_change_when_off else []
 
 

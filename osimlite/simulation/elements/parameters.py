@@ -117,7 +117,7 @@ class Number(Parameter):
         """Return the number.
 
         Raises:
-            ModelError: it is not finite or not accepted.
+            ModelError: the number is not finite, or not accepted.
         """
         value = float(getattr(force, self.name))
         builder.check_finite(force, (value,))

@@ -198,5 +198,5 @@ def _digest_translator() -> str:
 
 @cache
 def _describe_machine() -> tuple[str, ...]:
-    """Return what machine code depends on: operating system, architecture, processor features."""
+    """Return the operating system, the architecture and the features of the processor."""
     return sys.platform, machine_name(), *sorted(processor_features())

@@ -27,7 +27,7 @@ KERNEL = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64
 
 
 def describe_version() -> str:
-    """Return what runs the kernels, for summaries."""
+    """Return the source of the kernels in a few words, for summaries."""
     return machine_code.describe_source()
 
 

@@ -55,7 +55,7 @@ def get_address(name: str) -> int:
     """Return the address of a law, after compiling it if necessary.
 
     Raises:
-        CompilationError: it cannot be compiled here.
+        CompilationError: the law cannot be compiled here.
     """
     prepare_laws([name])
     return _addresses[name]
@@ -158,7 +158,7 @@ def _has_numba() -> bool:
 
 
 def describe_source() -> str:
-    """Return what runs the kernels in a few words, for summaries."""
+    """Return the source of the kernels in a few words, for summaries."""
     library = kernel_library.load_library() if is_allowed(LIBRARY) else None
     if library is not None:
         return f"compiled library ({library.table['target']})"

@@ -262,7 +262,7 @@ class Composition(f.SmoothFunction):
 
 
 def find_coordinate_drivers(robot: Robot) -> dict[int, CouplingDriver]:
-    """Find what determines the coordinates that do not move freely.
+    """Find the drivers of the coordinates that do not move freely.
 
     A lock makes a coordinate constant, and a coupler of one coordinate makes it a function of that
     one. Couplers of several coordinates are not followed, and couplers in a circle leave the first
@@ -306,7 +306,7 @@ def find_coordinate_drivers(robot: Robot) -> dict[int, CouplingDriver]:
 def find_joint_driver(
     joint: RobotJoint, drivers: dict[int, CouplingDriver]
 ) -> CouplingDriver | None:
-    """Return what determines the value of a moving joint.
+    """Return the driver of the value of a moving joint.
 
     Args:
         joint: the joint.

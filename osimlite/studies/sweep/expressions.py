@@ -168,7 +168,7 @@ class ExpressionMeasure:
 
 
 def _measure_depth(tree: ast.AST) -> int:
-    """Return how many levels of expressions nest in each other."""
+    """Return the number of levels of nested expressions."""
     depth = 0
     level = [tree]
     while level:

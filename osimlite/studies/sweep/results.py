@@ -153,7 +153,7 @@ def refuse_other_settings(
         settings: settings of the present run.
 
     Raises:
-        SettingError: they differ.
+        SettingError: the settings differ.
     """
     if differences := describe_differences(old_settings, settings):
         raise SettingError(

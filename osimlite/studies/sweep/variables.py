@@ -192,7 +192,7 @@ class Variable:
         return self.low == self.high
 
     def settings(self) -> dict[str, Any]:
-        """Return what defines the variable, as data for JSON.
+        """Return the definition of the variable, as data for JSON.
 
         Returns:
             Name, bounds, and count and "log" if they are set.
@@ -232,7 +232,7 @@ def resolve_variables(
     parameters: Mapping[str, Any] = MappingProxyType({}),
     gains: Sequence[Gain] = (),
 ) -> tuple[Variable, ...]:
-    """Find what names mean, and read their ranges.
+    """Find the targets that names stand for, and read their ranges.
 
     Args:
         ranges: range by name.
@@ -301,7 +301,7 @@ def _resolve_target(
     parameters: Mapping[str, Any],
     gains: Sequence[Gain],
 ) -> tuple[Target, str] | None:
-    """Return what a name means and its unit, or None if it has no meaning.
+    """Return the target that a name stands for and its unit, or None if there is none.
 
     The first match counts, in the order of the table above: coordinate, parameter of the function,
     parameter of the controller, control, property, slope.

@@ -16,14 +16,16 @@ class Path(Protocol):
     """Path in terms of the mechanism.
 
     Attributes:
-        coupled: whether its moment arm about a coordinate includes coordinates that are coupled to
+        coupled: whether a moment arm about a coordinate includes coordinates that are coupled to
             it.
     """
 
     coupled: bool
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return its records; the last is the path itself, see :mod:`osimlite.mechanics.kernels.paths`.
+        """Return the records of the path; the last one is the path itself.
+
+        See :mod:`osimlite.mechanics.kernels.paths`.
 
         Args:
             places: placement of the bodies in the links of the tree.

@@ -32,7 +32,7 @@ NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 def compute_sphere_depth(
     model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats
 ) -> tuple[float, float, Vector]:
-    """Compute how deep a sphere is in a half space.
+    """Compute the depth of a sphere in a half space.
 
     Args:
         model: integers of the model.

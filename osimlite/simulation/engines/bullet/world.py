@@ -267,7 +267,7 @@ def write_robot(robot: Robot) -> str:
 
 
 def compute_inertia_excess(link: RobotLink) -> float:
-    """Return what to add to the moments of inertia so that Bullet accepts them.
+    """Return the number to add to the moments of inertia so that Bullet accepts them.
 
     Bullet replaces moments by zero that violate the triangle inequality or are negative.
 

@@ -69,19 +69,19 @@ class Node:
     def pack(
         self, places: Places, of: int, first: int, path: str, piece: int
     ) -> tuple[list[int], list[float]]:
-        """Return its integers and numbers.
+        """Return the integers and numbers of the node.
 
         No line pulls between two consecutive nodes of the same piece.
 
         Args:
             places: placement of the bodies in the links of the tree.
             of: index of the degree of freedom, or number of the surface, that the node belongs to.
-            first: offset of its numbers.
+            first: offset of the numbers of the node.
             path: owner of the path, for messages.
             piece: piece of the node.
 
         Returns:
-            Integers and numbers of the geometry.
+            Integers and numbers of the node.
         """
         # The frame of the point in its link.
         link, frame = places.placement(self.body)

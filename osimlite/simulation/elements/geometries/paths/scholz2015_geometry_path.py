@@ -55,7 +55,7 @@ class CablePoint:
     """Point of a cable.
 
     Attributes:
-        body: index of its body.
+        body: index of the body with the point.
         runs: station in the body that the cable runs through, m.
         pulls: station in the body at which the force acts, m.
     """
@@ -68,13 +68,13 @@ class CablePoint:
     is_obstacle: ClassVar[bool] = False
 
     def pack(self, places: Places) -> tuple[int, list[float]]:
-        """Return its link and numbers.
+        """Return the link of the point and its numbers.
 
         Args:
             places: placement of the bodies in the links of the tree.
 
         Returns:
-            The link, and the stations of the cable and of its force in it.
+            Index of the link, and the stations of the cable and of its force in the link, m.
         """
         link, runs = places.station(self.body, self.runs.tolist())
         _, pulls = places.station(self.body, self.pulls.tolist())
@@ -86,7 +86,7 @@ class CableObstacle:
     """Surface that a cable may touch.
 
     Attributes:
-        body: index of its body.
+        body: index of the body with the obstacle.
         frame: placement (4, 4) of the surface in the body.
         surface: numbers of the surface.
         begin: initial guess of the contact with the cable.
@@ -101,13 +101,13 @@ class CableObstacle:
     is_obstacle: ClassVar[bool] = True
 
     def pack(self, places: Places) -> tuple[int, list[float]]:
-        """Return its link and numbers.
+        """Return the link of the obstacle and its numbers.
 
         Args:
             places: placement of the bodies in the links of the tree.
 
         Returns:
-            The link, and placement, initial contact and shape of the surface.
+            Index of the link, and placement, initial contact and shape of the surface.
         """
         link, placed = places.placement(self.body)
         frame = placed @ self.frame
