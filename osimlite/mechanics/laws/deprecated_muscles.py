@@ -128,9 +128,10 @@ def schutte_velocity(
 ) -> float:
     """Return the fiber velocity v, in optimal fiber lengths per time scale, from the force balance.
 
-    The balance is active f(v) + damping v = borne, with Hill's curves f = 0.15 (1 + v) / (0.15 - v)
-    for shortening and f = (1.4 v + s) / (v + s), s = 0.13 0.15 / 1.15, for lengthening. Each gives
-    a quadratic equation in v. Faster than v = -1 the fibers bear no active force.
+    The balance is i f(v) + damping v = velocity_force with the isometric force i = activation active
+    and Hill's curves f = 0.15 (1 + v) / (0.15 - v) for shortening and f = (1.4 v + s) / (v + s), s =
+    0.13 0.15 / 1.15, for lengthening. Each gives a quadratic equation in v. Faster than v = -1 the
+    fibers bear no active force.
 
     Args:
         activation: activation.
@@ -157,7 +158,8 @@ def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
     """Return the tendon force: an exponential toe and a line, plus 0.001 (1 + strain).
 
     With the strain e1 at a force of 1 and the end e0 = 0.609 e1 of the toe, the toe is (exp(3 e / e0)
-    - 1) / (exp(3) - 1) / 3 for e > 0, and the line 1/3 + 1.712 (e - e0) / e1.
+    - 1) / (exp(3) - 1) / 3 for e > 0, and the line 1/3 + 1.712 (e - e0) / e1. As in OpenSim, 1/3 is
+    rounded to 0.333333.
 
     Args:
         strain: strain of the tendon.
@@ -330,9 +332,9 @@ def next_length(
         previous_length: fiber length of the previous guess (m).
         error: tendon force less fiber force (N).
         error_before: the same for the previous guess (N).
-        fibers: fiber force at the present activation.
-        fully: fiber force, fully activated.
-        tendon: tendon force.
+        fibers: normalized fiber force at the present activation.
+        fully: normalized fiber force at full activation.
+        tendon: normalized tendon force.
         m: parameters of the muscle.
     """
     # A change of sign brackets the equilibrium: regula falsi. Without it, take a damped Newton

@@ -8,8 +8,8 @@ so that its sign does not change. The mass m accelerates the fibers of length l 
 
 l'' = (ft - (a fl fv + fp) cos(phi) + fs) F cos(phi) / m + l phi'^2
 
-where a is the activation, fl, fv and fp are the factors by length and velocity and the passive
-force, ft is the tendon force and fs the force against steep fibers.
+where a is the activation, fl and fv are the factors by length and velocity, fp is the passive force
+with the linear damping of the fibers, ft the tendon force and fs the force against steep fibers.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class MuscleDynamics(NamedTuple):
     cos: float  # cosine of the pennation angle
     by_length: float  # normalized active force at full activation and zero velocity
     by_velocity: float  # factor of the active force by velocity
-    passive: float  # force of the fibers without the active force, N
+    passive: float  # passive force of the fibers without their linear damping, N
     tension: float  # tendon force, N
     acceleration: float  # second derivative of the fiber length, m/s^2
     slope: float  # derivative of `acceleration` by the fiber length at constant speeds, 1/s^2

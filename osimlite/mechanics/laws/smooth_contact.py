@@ -161,13 +161,13 @@ def station_contact_force(
     With h = 0.7 tanh((y - l0) / 0.7), s = (k - k0) / 2 and v = (k + k0) / (k - k0), the elastic force
     is s (v (y0 - h) - e (log cosh((y0 + d) / e) - log cosh((h + d) / e))), where k0 = 0.1 N/m, y0 =
     0.01 m, d = e = 0.001 m. It is multiplied by 1 - c vy. The friction is (ud tanh(w / vl) + uv w)
-    times the normal force, where w is the slip velocity.
+    w / (w + w0) times the normal force, where w is the slip velocity and w0 = 1e-4 m/s.
 
     Args:
         y: height of the station (m).
         vx: velocity of the station in ground along x (m/s).
-        vy: velocity along y (m/s).
-        vz: velocity along z (m/s).
+        vy: velocity of the station in ground along y (m/s).
+        vz: velocity of the station in ground along z (m/s).
         k: stiffness, not k0 (N/m).
         c: dissipation (s/m).
         l0: height at which the spring rests (m).
