@@ -9,6 +9,7 @@ from pathlib import Path
 
 from osimlite.base.files import get_relative_path
 from osimlite.base.progress import report_stage
+from osimlite.base.records import replace
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import add_article, format_count, join_words
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
@@ -127,7 +128,7 @@ def run(
     if check:
         report_stage("checking the setup")
         files_elsewhere: dict[str, None] = {}
-        report = merge_reports(_check_documents(str(file), files_elsewhere))
+        report = _shorten_paths(merge_reports(_check_documents(str(file), files_elsewhere)))
         # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
@@ -264,6 +265,18 @@ def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[R
         yield checked(subject, measure=False)
         # Depth first: files that a document names come before those of the next document.
         waiting.extendleft(reversed(document_paths))
+
+
+def _shorten_paths(report: Report) -> Report:
+    """Return a report without "./" before names of files in the current folder."""
+    prefix = f"{os.curdir}{os.sep}"
+    findings = [
+        replace(finding, file=finding.file.removeprefix(prefix)) if finding.file else finding
+        for finding in report.findings
+    ]
+    return Report(
+        findings, {file.removeprefix(prefix): text for file, text in report.texts.items()}
+    )
 
 
 def _find_config(file: str) -> Config:

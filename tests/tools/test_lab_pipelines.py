@@ -148,6 +148,15 @@ def test_a_window_of_no_length_is_refused(tmp_path: Path) -> None:
     assert "cmc.xml: cmc_time_window is 0 s, expected more than 0" in done.err
 
 
+def test_files_beside_a_setup_are_named_as_the_setup_is(tmp_path: Path) -> None:
+    """Without ./ before them, which the name of the setup does not have either."""
+    folder = copy_lab("ground", tmp_path)
+    change(folder / "loads.xml", ("ground_force_v", "ground_forc_v"))
+    done = run("run", "id.xml", "-o", "out", folder=folder)
+    text = " ".join((done.out + done.err).split())
+    assert " loads.xml:" in f" {text}" and "./" not in text
+
+
 def test_an_unknown_force_to_exclude_does_not_end_a_run(tmp_path: Path) -> None:
     """OpenSim excludes nothing for such a name, and continues."""
     folder = copy_lab("ground", tmp_path)
