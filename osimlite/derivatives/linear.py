@@ -83,8 +83,8 @@ def linearize(
         model: model; or its tangents (:func:`osimlite.tangents`) or functions
             (:func:`osimlite.casadi`), made once for many states.
         state: values by the names of states, the others as in the model; or all (x,) in their
-            order.
-        controls: values by the paths of actuators, the others 0; or all (u,).
+            order; None for the state of the model.
+        controls: values by the paths of actuators, the others 0; or all (u,); None for zeros.
         outputs: outputs in the order of y: groups of `TangentModel.output_names` (``mass_center``),
             or entries of groups (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
         time: time, s.

@@ -198,8 +198,8 @@ class TangentModel(DifferentiableModel):
             dx: directions of the state (x, m).
             du: directions of the controls (u, m); 0 if None.
             dp: directions of the parameters (p, m); 0 if None.
-            after_evaluation: function that is called after each evaluation, with the slice of its directions
-                and their columns in a row of dual numbers.
+            after_evaluation: function that is called after each evaluation, with the slice of its
+                directions and their columns in a row of dual numbers; None for none.
 
         Returns:
             Rates (x,), and their derivatives (x, m); NaN where the rates do not exist.

@@ -138,7 +138,7 @@ def run_ipopt(
     Args:
         program: nonlinear program.
         guess: initial variables (n,); those outside their bounds are moved onto them.
-        report: function that is called with the progress after each iteration.
+        report: function that is called with the progress after each iteration; None for none.
         is_warm_start: whether the guess is nearly a solution, so that Ipopt must not move it off its bounds.
 
     Returns:

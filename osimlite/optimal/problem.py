@@ -64,10 +64,13 @@ class Problem(StudyContext):
 
     Args:
         study: study.
-        file: file of the study, for messages and for the files that it names.
+        file: file of the study, for messages and for the files that it names; None for a study that
+            was not read from a file.
         folder: folder of the files that a study without a file names; the current folder if None.
-        tables: tables by goal name that replace the files of the goals' references.
-        motion: prescribed motion, as if the model had a PositionMotion.
+        tables: tables by goal name that replace the files of the goals' references; None to read
+            these files.
+        motion: prescribed motion, as if the model had a PositionMotion; None for that of the model,
+            if any.
         scaled: column of the reference that each scale factor multiplies, by the factor's name.
 
     Attributes:

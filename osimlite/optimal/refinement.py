@@ -119,7 +119,7 @@ def solve_with_refinement(
         program: nonlinear program on the first mesh.
         guess: initial variables.
         refinement: settings.
-        tell: function that is called with the progress after each iteration.
+        tell: function that is called with the progress after each iteration; None for none.
 
     Returns:
         Program on the last mesh, its solution, and the searches on all meshes.

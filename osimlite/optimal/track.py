@@ -43,7 +43,8 @@ def build_track_problem(
         file: setup file of the settings; None for settings that were not read from a file.
         folder: folder of the files that the settings name, for settings without a file; the current
             folder if None.
-        more: function that changes the study before the problem is built: goals, bounds, solver.
+        more: function that changes the study before the problem is built: goals, bounds, solver;
+            None for no change.
         scaled: column of a table for each scale factor of a goal, see :func:`osimlite.moco.solve`.
 
     Returns:
@@ -140,8 +141,9 @@ def solve_track(
     Args:
         tool: settings.
         folder: folder of the files that the settings name; the current folder if None.
-        more: function that changes the study before it is solved: goals, bounds, solver.
-        tell: function that is called with the progress after each iteration.
+        more: function that changes the study before it is solved: goals, bounds, solver; None for
+            no change.
+        tell: function that is called with the progress after each iteration; None for none.
         refine: accuracy or settings of mesh refinement, see :func:`osimlite.moco.solve`.
         scaled: column of a table for each scale factor of a goal, see :func:`osimlite.moco.solve`.
 

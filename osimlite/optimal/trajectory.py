@@ -57,7 +57,7 @@ class MocoTrajectory:
         Args:
             layout: layout of the variables.
             w: variables (n,).
-            header: entries of the header.
+            header: further entries of the file's header; None for none.
         """
         times = w[0] + layout.problem.grid.fractions * (w[1] - w[0])
         columns: dict[str, Array] = {}

@@ -214,7 +214,8 @@ class KernelController:
             engine: engine of one of the models, driven by `controls`.
             controls: controls with the constants of :meth:`add_constants`.
             to: end of a single run, s; 0 for runs that are not recorded.
-            earlier_record: record of the earlier run that a single run continues.
+            earlier_record: record of the earlier run that a single run continues; None if there is
+                none.
             other_controllers: controllers of the models of further runs.
         """
         return ControllerRuns((self, *other_controllers), engine, controls, to, earlier_record)

@@ -67,7 +67,7 @@ def kinematics(
         model: model whose coordinates the motion has.
         motion: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,)
             in rad and m by the names or paths of coordinates.
-        times: times of arrays (t,), s.
+        times: times (t,) of a motion that consists of arrays, s; not used for other motions.
         assemble: whether each pose is first moved to the nearest one that fulfils the constraints.
         lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.
         start: first time, s.
@@ -109,11 +109,11 @@ def inverse_dynamics(
         model: model on which the forces act.
         motion: the motion, see :func:`kinematics`.
         external_loads: measured loads or their file; with `applied_to` a table (.mot, .sto, .c3d)
-            in the axes of ground.
-        times: times of arrays (t,), s.
+            in the axes of ground; None for none.
+        times: times (t,) of a motion that consists of arrays, s; not used for other motions.
         applied_to: names of the bodies on which a table of loads acts; for each body and load the
             beginnings of the labels of force, point and moment, such as ``{"calcn_r": [("f1_",
-            "p1_", "m1_")]}``.
+            "p1_", "m1_")]}``. None for loads that name their bodies.
         exclude: forces that are ignored: names of forces or groups, "All", "Actuators" or
             "Muscles".
         lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.

@@ -175,8 +175,10 @@ def muscle_curves(
         muscles: names or paths; all if empty.
         activation: activation of all muscles, 0 to 1.
         wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
-        folder: folder of the model's file, in which named files are searched.
-        progress: function that is called with the number of finished poses and the total.
+        folder: folder of the model's file, in which named files are searched; the current folder if
+            None.
+        progress: function that is called with the number of finished poses and the total; None for
+            none.
 
     Returns:
         The curves of the selected muscles.

@@ -134,8 +134,8 @@ def static_optimization(
     Args:
         model: model, whose actuators act within their min_control and max_control.
         motion: the motion, see :func:`kinematics`.
-        external_loads: measured loads, see :func:`inverse_dynamics`.
-        times: times of arrays (t,), s.
+        external_loads: measured loads, see :func:`inverse_dynamics`; None for none.
+        times: times (t,) of a motion that consists of arrays, s; not used for other motions.
         applied_to: assignment of the columns of loads, see :func:`inverse_dynamics`.
         forces: additional forces such as reserve actuators: files of ForceSets, or forces.
         replace_forces: whether `forces` replace the forces of the model.

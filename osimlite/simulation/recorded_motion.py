@@ -130,7 +130,7 @@ class RecordedMotion(Movement):
             source: a .mot or .sto file; a motion, such as a fitted one or a trajectory, which may
                 be of another model; or arrays (t,) in rad and m by the names or paths of
                 coordinates.
-            times: times of arrays (t,), s.
+            times: times (t,) of a motion that consists of arrays, s; not used for other motions.
 
         Returns:
             The motion of this mechanism.
@@ -423,7 +423,7 @@ class RecordedMotion(Movement):
 
         Args:
             forces: forces on the mechanism, such as springs, contacts and measured loads; their
-                states have initial values.
+                states have initial values. None for gravity alone.
 
         Returns:
             A column (N or N·m) for each coordinate, in the order of OpenSim's tool.

@@ -371,7 +371,8 @@ class Simulation:
             y: initial state (y,).
             settings: settings of the integration.
             times: times of the rows, s; the first one is the start.
-            progress: function that is called during the motion.
+            progress: function that is called with simulated time and step length (s); None for
+                none.
 
         Returns:
             The recorder and the stepper after the motion, and the states (y,) at the times.

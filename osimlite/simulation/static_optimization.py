@@ -56,8 +56,8 @@ class StaticOptimization:
         exponent: p, greater than 1.
         muscles: force of a muscle at an activation of 1, one of `MUSCLES`.
         wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
-        external_loads: measured loads or their file.
-        folder: folder of the model's file.
+        external_loads: measured loads or their file; None for none.
+        folder: folder of the model's file; the current folder if None.
         early_return: whether Simbody's defect in contacts of several surfaces is reproduced.
         underactuated: whether there may be fewer actuators than coordinates to accelerate, as for
             tools that need not balance every coordinate.

@@ -131,7 +131,8 @@ class Stepper(ABC):
 
         Args:
             times: non-decreasing times of the rows, s.
-            progress: function that is called after every step, or after several that are fast.
+            progress: function that is called with simulated time and step length (s) after every
+                step, or after several that are fast; None for none.
 
         Returns:
             One state (y,) for each time, up to the time that was reached if the motion ended early.

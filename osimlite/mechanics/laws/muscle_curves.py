@@ -101,8 +101,8 @@ def force_velocity(
         eccentric_end: slope at the maximum lengthening velocity.
         eccentric_near: slope near the maximum lengthening velocity.
         eccentric_limit: factor at the maximum lengthening velocity.
-        concentric_curviness: curviness for shortening.
-        eccentric_curviness: curviness for lengthening.
+        concentric_curviness: curviness of the sections for shortening, 0 to 1.
+        eccentric_curviness: curviness of the sections for lengthening, 0 to 1.
         inverse: whether to return the velocity over the factor.
 
     Raises:
@@ -167,9 +167,9 @@ def fiber_force_length(
     Args:
         zero: strain at zero force.
         one: strain at the maximum isometric force.
-        low: stiffness at low force.
-        stiffness: stiffness at the maximum isometric force.
-        curviness: curviness.
+        low: slope at low force; None for the default.
+        stiffness: slope at the maximum isometric force; None for the default.
+        curviness: curviness of the sections, 0 to 1; None for the default.
 
     Raises:
         ValueError: there is no such curve.
@@ -208,9 +208,9 @@ def tendon_force_length(
 
     Args:
         one: strain at the maximum isometric force.
-        stiffness: slope at this strain.
-        toe: force at the end of the toe region.
-        curviness: curviness.
+        stiffness: slope at the maximum isometric force; None for the default.
+        toe: force at the end of the toe region; None for the default.
+        curviness: curviness of the sections, 0 to 1; None for the default.
 
     Raises:
         ValueError: there is no such curve.
@@ -245,8 +245,8 @@ def fiber_compressive_force_length(
 
     Args:
         zero: fiber length at zero force.
-        stiffness: stiffness at zero length.
-        curviness: curviness.
+        stiffness: slope at zero length; None for the default.
+        curviness: curviness of the section, 0 to 1; None for the default.
 
     Raises:
         ValueError: there is no such curve.
@@ -271,8 +271,8 @@ def fiber_compressive_force_cos_pennation(
 
     Args:
         angle: pennation angle at zero force (degrees).
-        stiffness: stiffness at a right angle.
-        curviness: curviness.
+        stiffness: slope at a right angle; None for the default.
+        curviness: curviness of the section, 0 to 1; None for the default.
 
     Raises:
         ValueError: there is no such curve.

@@ -374,9 +374,9 @@ class Mechanism(MechanismStructure):
             u: generalized speeds, which must fulfil them, too (that of a locked coordinate is
                 zero).
             generalized_forces: forces conjugate to the generalized speeds (N, N m); zero for
-                omitted names.
+                omitted names; None for none.
             body_wrenches: wrenches at the origins of bodies or frames, along the axes of ground, by
-                name.
+                name; None for none.
             time: time of prescribed coordinates (s).
 
         Raises:
@@ -400,7 +400,7 @@ class Mechanism(MechanismStructure):
             u: generalized speeds.
             udot: derivatives of the speeds.
             body_wrenches: wrenches at the origins of bodies or frames, along the axes of ground, by
-                name.
+                name; None for none.
         """
         state = self.at(q, u)
         missing = dynamics.missing_forces(

@@ -108,7 +108,7 @@ def make_node_curve(
     Args:
         control: the control, which says whether there are steps and extrapolation.
         nodes: the nodes in the order of time.
-        file: file of the control, for messages.
+        file: file of the control, for messages; None if unknown.
 
     Returns:
         The function of time (s).

@@ -64,7 +64,8 @@ def force_elements(
         own_activation_times: whether each DeGrooteFregly2016Muscle uses its own activation times;
             OpenSim's defect shares those of one muscle.
         wrapping: method of wrapping, see :class:`osimlite.simulation.Options`.
-        external_loads: measured loads or their file; their elements follow the forces of the model.
+        external_loads: measured loads or their file; their elements follow the forces of the model;
+            None for none.
         folder: folder of the model's file and of the files that it names; the working directory if
             None.
         rigid_tendons: whether the tension of each muscle is its control times the force of fully

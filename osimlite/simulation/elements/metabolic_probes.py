@@ -43,7 +43,7 @@ def read_metabolic_probe(
         probe: probe component of the model.
         numbers: function that returns the numbers of the law from the parameters of a muscle, the
             muscle, and its mass (kg).
-        curve: curve that the law takes.
+        curve: curve that the law takes; None if it takes none.
 
     Returns:
         The reading with OpenSim's labels.

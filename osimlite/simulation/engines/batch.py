@@ -37,13 +37,15 @@ class BatchWorkspace:
         options: options; watches are given as `kinds` and `levels`.
         start: start time, s.
         next_step: first step that is tried, s; that of the options if None.
-        vectors: numbers of the model, one row for all runs or one for each.
+        vectors: numbers of the model, one row for all runs or one for each; None for those of the
+            engine.
         kinds: kinds of the watches (k, 3).
         levels: levels of the watches (k, 7).
         most_logged: largest number of steps in the log, which all runs share.
         start_holds: whether the initial states fulfil the constraints; otherwise the runs start
             from the nearest states that do.
-        held: controllers of the runs, which write into the numbers of each run.
+        held: controllers of the runs, which write into the numbers of each run; None without
+            controllers.
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).

@@ -60,7 +60,7 @@ class ControlledSteps(Stepper):
         options: accuracy, integrator and other options of the integration.
         observe: function that is called with time and state after each step. For the steps of a
             table it is called only when a result needs them.
-        held: controller of the run.
+        held: controller of the run; None without a controller.
 
     Attributes:
         attempted: number of attempted steps so far; `taken` counts the accepted ones.

@@ -50,8 +50,9 @@ def build_robot(
             Without it, the body's link has its frame at the joint, which saves a link, and
             `Link.bodies` locates the body.
         at: coordinate values at which locked coordinates are fixed; by default their defaults.
-        visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame.
-        collisions: contact shapes of the bodies, in the same form.
+        visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame;
+            None for none.
+        collisions: contact shapes of the bodies, in the same form; None for none.
 
     Returns:
         The robot.

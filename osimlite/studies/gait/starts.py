@@ -215,7 +215,7 @@ def _compute_contact_centres(
         states: states (W, y).
         numbers: parameters of packed models of the same structure, one row per model; by
             default those of the engine.
-        rows: row of `numbers` for each state.
+        rows: row of `numbers` for each state; None for the first row.
     """
     # Centre and normal of the surface below come first, then the centre of the sphere.
     return engine.locate_contacts(states, numbers, rows)[..., 6:]

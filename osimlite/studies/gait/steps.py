@@ -179,7 +179,7 @@ def extract_walks(
         states: initial states of the runs (W, y).
         runs: runs with the watches of `make_fall_watches`, and possibly others.
         footing: contacts of the feet.
-        numbers: numbers of the models, as for `run_many`.
+        numbers: numbers of the models, see `run_many`; None for those of the engine.
         event_capacity: number of events for which the runs had memory; a walk with as many ends as "too many
             events".
 

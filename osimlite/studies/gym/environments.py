@@ -177,11 +177,11 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
     named by `labels`. Actions are the controls of the actuators, named by `controls`.
 
     Args:
-        task: task, or a function that returns it.
-        model: model, or file of a model, in place of a task.
+        task: task, or a function that returns it; None with a `model`.
+        model: model, or file of a model, in place of a task; None with a `task`.
         reward: function of the observations before and after a step
-            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,); for `model`
-            only.
+            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,). A `model`
+            needs it; it replaces the reward of a `task`.
         render_mode: "rgb_array" or None.
         options: further attributes of :class:`osimlite.studies.gym.tasks.Task`.
 
@@ -264,11 +264,11 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
     Args:
         num_envs: number of copies w.
-        task: task, or a function that returns it.
-        model: model, or file of a model, in place of a task.
+        task: task, or a function that returns it; None with a `model`.
+        model: model, or file of a model, in place of a task; None with a `task`.
         reward: function of the observations before and after a step
-            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,); for `model`
-            only.
+            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,). A `model`
+            needs it; it replaces the reward of a `task`.
         render_mode: "rgb_array" or None.
         options: further attributes of :class:`osimlite.studies.gym.tasks.Task`.
 

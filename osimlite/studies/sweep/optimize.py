@@ -149,7 +149,8 @@ def optimize(
         resume: whether to continue an interrupted search, or a finished one with a larger budget.
         force: whether to overwrite the results of another search in the folder.
         workers: number of threads or processes; by default one per core.
-        cluster: address of a Dask scheduler whose workers run the evaluations.
+        cluster: address of a Dask scheduler whose workers run the evaluations; None for workers on
+            this machine.
         progress: callback during the search.
 
     Raises:

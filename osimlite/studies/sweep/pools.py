@@ -23,7 +23,8 @@ def make_pool(
     Args:
         plan: plan to run.
         workers: number of threads or processes; by default one per core.
-        cluster: address of a Dask scheduler, such as `tcp://127.0.0.1:8786`.
+        cluster: address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; None for workers on
+            this machine.
 
     Raises:
         SettingError: the settings exclude each other.

@@ -113,7 +113,7 @@ def choose_samples(
         variables: variables.
         sampler: one of `SAMPLERS`. The default is a grid if every variable has a number of values
             and there is no `count`, else Sobol.
-        count: number of samples; of a grid it follows from the ranges.
+        count: number of samples; None for a grid, whose ranges determine it.
         seed: seed of random samples.
 
     Raises:

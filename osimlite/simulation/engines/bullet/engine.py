@@ -82,7 +82,7 @@ class BulletEngine(KernelEngine):
         forces: forces on it besides gravity.
         route: "mass-matrix" (also "auto") or "articulated-body".
         show: whether Bullet's window opens.
-        visuals: shapes of the bodies.
+        visuals: shapes of the bodies; None for none.
 
     Raises:
         UnsupportedError: the joints or constraints do not allow the requested route.
