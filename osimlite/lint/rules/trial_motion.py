@@ -90,8 +90,9 @@ def report_scale_marker_error(trial: Trial, report: FindingCollector) -> None:
     """A scaled model does not fit the static trial.
 
     Runs the setup of the ScaleTool, which puts the scaled model into the static pose, and compares
-    its markers with the measured ones, before the markers are moved. Accepts 1 cm for the root mean
-    square, and 2 cm for the largest error of markers on bones. The limits are those of OpenSim's checklist for evaluating a
+    its markers with the measured ones, before the markers are moved. Only markers with more than a
+    tenth of the largest weight count. Accepts 1 cm for the root mean square, and 2 cm for the
+    largest error of markers on bones. The limits are those of OpenSim's checklist for evaluating a
     simulation
     (https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
 
