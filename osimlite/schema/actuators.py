@@ -49,7 +49,7 @@ class PointActuator(ScalarActuator):
     body: MaybeBodyName = None
     """Name of the body that is pushed."""
     point: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the force acts."""
+    """Point at which the force acts."""
     point_is_global: Flag = False
     """Whether `point` is in ground rather than in the body."""
     direction: Annotated[Vec3, vec3()] = (1.0, 0.0, 0.0)
@@ -68,26 +68,26 @@ class PointToPointActuator(ScalarActuator):
     bodyA: MaybeBodyName = None
     """Name of the first body, which a positive force pushes away from B."""
     bodyB: MaybeBodyName = None
-    """Name of the second body, which is pushed the other way."""
+    """Name of the second body, which is pushed in the opposite direction."""
     points_are_global: Flag = False
     """Whether both points are in ground rather than in their bodies."""
     pointA: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the force acts on body A."""
+    """Point of body A at which the force acts."""
     pointB: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the force acts on body B."""
+    """Point of body B at which the force acts."""
     optimal_force: Annotated[float, real("N")] = 1.0
     """Force at a control of 1."""
 
 
 class TorqueActuator(ScalarActuator):
-    """Turns body A about an axis, and body B the other way."""
+    """Applies a torque about an axis to body A, and the opposite torque to body B."""
 
     facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
 
     bodyA: MaybeFrameName = None
-    """The frame that a positive torque turns about the axis."""
+    """Frame that a positive torque turns about the axis."""
     bodyB: MaybeFrameName = None
-    """The frame that is turned the other way; left out, there is none."""
+    """Frame that gets the opposite torque; left out, there is none."""
     torque_is_global: Flag = True
     """Whether `axis` is along the axes of ground rather than of A."""
     axis: Annotated[Vec3, vec3()] = (0.0, 0.0, 1.0)
@@ -104,7 +104,7 @@ class BodyActuator(Actuator):
     socket_body: BodySocket = ""
     """The body that is pushed."""
     point: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the force acts; the torque has no place."""
+    """Point at which the force acts; the torque has no point of application."""
     point_is_global: Flag = False
     """Whether `point` is in ground rather than in the body."""
     spatial_force_is_global: Flag = True

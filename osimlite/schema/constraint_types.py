@@ -21,9 +21,9 @@ class ConstantDistanceConstraint(Constraint):
     socket_body_2: PhysicalFrameSocket = ""
     """The frame of the second point."""
     location_body_1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the first point is, in its frame."""
+    """Position of the first point in its frame."""
     location_body_2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the second point is, in its frame."""
+    """Position of the second point in its frame."""
     # OpenSim has no default and rejects a constraint without a distance.
     constant_distance: Annotated[float, real("m", "> 0")] = math.nan
     """Distance that the points keep."""
@@ -52,9 +52,9 @@ class PointConstraint(Constraint):
     socket_body_2: PhysicalFrameSocket = ""
     """The frame of the second point."""
     location_body_1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the first point is, in its frame."""
+    """Position of the first point in its frame."""
     location_body_2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the second point is, in its frame."""
+    """Position of the second point in its frame."""
 
 
 class PointOnLineConstraint(Constraint):

@@ -15,7 +15,7 @@ class ContactGeometry(ModelComponent, abstract=True):
     socket_frame: PhysicalFrameSocket = ""
     """The frame that the surface is fixed in."""
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the middle of the surface is, in that frame."""
+    """Position of the middle of the surface in that frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Body-fixed X-Y-Z angles of the surface in that frame."""
     appearance: Unnamed[Appearance] = make_default(
@@ -23,7 +23,7 @@ class ContactGeometry(ModelComponent, abstract=True):
         color=(0.0, 1.0, 1.0),
         surface_properties=lambda: SurfaceProperties.build({"representation": 2}, set()),
     )
-    """How the surface is drawn."""
+    """Appearance of the surface in viewers."""
 
 
 class ContactGeometrySet(ModelComponentSet):

@@ -88,15 +88,15 @@ class SmoothSphereHalfSpaceForce(Force):
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
     """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
     constant_contact_force: Annotated[float, real("N", ">= 0")] = 1e-5
-    """A small number under the roots of depth and slip, which keeps derivatives from vanishing."""
+    """Small number under the roots of depth and slip, which keeps derivatives from vanishing."""
     hertz_smoothing: Annotated[float, real(domain="> 0")] = 300.0
-    """How sharply the force sets in where the surfaces meet; higher is sharper."""
+    """Sharpness of the onset of the force where the surfaces meet; higher is sharper."""
     hunt_crossley_smoothing: Annotated[float, real(domain="> 0")] = 50.0
-    """How sharply the force ends where surfaces part too fast to push; higher is sharper."""
+    """Sharpness of the end of the force where surfaces part too fast to push; higher is sharper."""
     force_visualization_radius: Annotated[float, real("m", ">= 0")] = 0.01
     """Radius of the cylinder that shows the force."""
     force_visualization_scale_factor: Annotated[float | None, maybe()] = None
-    """Force that is drawn one metre long; left out, the weight of the model."""
+    """Force that viewers draw one metre long; left out, the weight of the model."""
 
 
 class ExponentialContactForce(Force):
@@ -123,7 +123,7 @@ class ExponentialContactForce(Force):
     max_normal_force: Annotated[float, real("N", "> 0")] = 100000.0
     """Normal force above which it grows no further."""
     friction_elasticity: Annotated[float, real("N/m", "> 0")] = 20000.0
-    """Stiffness of the spring that holds the station to its anchor in the plane."""
+    """Stiffness of the spring between the station and its anchor in the plane."""
     friction_viscosity: Annotated[float, real("N*s/m", ">= 0")] = 282.842712474619
     """Damping of the slip, beside the spring and while sliding."""
     settle_velocity: Annotated[float, real("m/s", "> 0")] = 0.01

@@ -10,7 +10,7 @@ from osimlite.schema.references import FileName
 
 # It has no bottom: a sphere deep inside is still pushed out at the front.
 class ContactHalfSpace(ContactGeometry):
-    """Everything with x > 0 of its own frame; the outward normal is the negative X axis."""
+    """Half space x > 0 of its own frame; the outward normal is the negative X axis."""
 
 
 class ContactSphere(ContactGeometry):

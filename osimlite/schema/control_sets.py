@@ -40,7 +40,7 @@ class ControlLinearNode(Object):
     """A point of a control curve."""
 
     t: Annotated[float, real(legacy=True)] = 0.0
-    """When the control has the value, in seconds."""
+    """Time at which the control has the value, in seconds."""
     value: LegacyNumber = 0.0
     """Value of the control at that time."""
 
@@ -49,17 +49,17 @@ class ControlLinear(Control):
     """Straight lines between nodes, or steps."""
 
     use_steps: LegacyFlag = False
-    """Whether each value holds from after the time of the node before it up to its own."""
+    """Whether each value applies from after the time of the previous node up to its own time."""
     x_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
     """The nodes of the control."""
     min_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
     """The nodes of the least value that tools choose."""
     max_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
-    """The nodes of the greatest value that tools choose."""
+    """Nodes of the greatest value that tools choose."""
     kp: LegacyNumber = 100.0
-    """How strongly CMC's smoothing follows the value."""
+    """Gain with which CMC's smoothing follows the value."""
     kv: LegacyNumber = 20.0
-    """How strongly CMC's smoothing damps changes."""
+    """Gain with which CMC's smoothing damps changes."""
 
 
 class ControlSet(Set):

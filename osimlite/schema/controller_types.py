@@ -18,7 +18,7 @@ class PrescribedController(Controller):
     controls_file: MaybeFileName = None
     """File of a column for each actuator, labelled with its name or path."""
     interpolation_method: Annotated[int | None, Value("int", "optional")] = None
-    """What runs between the rows of the file: 0 steps, 1 lines (if left out), 3 cubic, 5 quintic splines."""
+    """Interpolation between rows: 0 steps, 1 lines (if left out), 3 cubic, 5 quintic splines."""
 
 
 class TrackingController(Controller, abstract=True):

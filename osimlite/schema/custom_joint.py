@@ -81,4 +81,4 @@ class CustomJoint(Joint):
     facts = Facts(scales={"spatial_transform": "socket_parent_frame"})
 
     spatial_transform: Unnamed[SpatialTransform] = make_default(SpatialTransform)
-    """How the coordinates make the rotations and translations of the joint."""
+    """Rotations and translations of the joint as functions of the coordinates."""

@@ -33,4 +33,4 @@ class ToyReflexController(Controller):
     """Drives muscles in proportion to how fast they lengthen."""
 
     gain: Number = 1.0
-    """Control where a muscle lengthens at its greatest contraction velocity."""
+    """Control of a muscle that lengthens at its maximum contraction velocity."""

@@ -14,7 +14,7 @@ from osimlite.schema.sets import ModelComponentSet, ObjectGroup, Set
 
 
 class Force(ModelComponent, abstract=True):
-    """Anything that pushes bodies or coordinates."""
+    """Base class of everything that pushes bodies or coordinates."""
 
     facts = Facts(outputs="potential_energy")
 

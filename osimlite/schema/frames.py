@@ -33,7 +33,7 @@ class Frame(ModelComponent, abstract=True):
     )
 
     frame_geometry: Single[FrameGeometry] = make_default(FrameGeometry, name="frame_geometry")
-    """How the frame's own axes are drawn, where a viewer shows frames."""
+    """Appearance of the frame's axes in viewers that show frames."""
     attached_geometry: Many[Geometry] = make_empty_list()
     """Shapes drawn along the axes of this frame; they move with it and do nothing to the motion."""
 
@@ -72,7 +72,7 @@ class Body(PhysicalFrame):
     mass: Annotated[float, real("kg", ">= 0")] = math.nan
     """Mass of the whole body; OpenSim does not simulate a body without one."""
     mass_center: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the mass centre is, in the frame of the body."""
+    """Position of the mass centre in the frame of the body."""
     # About the mass centre, unlike Simbody's MassProperties, which has it about the origin. OpenSim
     # 4.6 accepts any six numbers, even those that no body can have.
     inertia: Annotated[Vec6, Value("double", "Vec6", "kg*m^2")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ class PhysicalOffsetFrame(PhysicalFrame):
     socket_parent: PhysicalFrameSocket = ""
     """The frame that this one is fixed in."""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the origin of this frame is, in the parent frame."""
+    """Position of the origin of this frame in the parent frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Body-fixed X-Y-Z angles that turn the axes of the parent frame into those of this one."""
 
@@ -105,7 +105,7 @@ class StationDefinedFrame(PhysicalFrame):
     socket_point_c: StationSocket = ""
     """Corner c of the triangle, not on the line through a and b."""
     socket_origin_point: StationSocket = ""
-    """Where the origin of the frame is; it may be one of the corners."""
+    """Origin of the frame; it may be one of the corners."""
     ab_axis: Annotated[str, word(*_AXES)] = "+x"
     """Axis of the frame that points from a to b; with a minus sign, from b to a."""
     ab_x_ac_axis: Annotated[str, word(*_AXES)] = "+y"
@@ -113,12 +113,12 @@ class StationDefinedFrame(PhysicalFrame):
 
 
 class TwoFrameLinker(ModelComponent, abstract=True):
-    """What joins two frames."""
+    """Connection of two frames."""
 
     socket_frame1: PhysicalFrameSocket = ""
-    """The frame in which the place and the turning of the second one are measured."""
+    """Frame in which the position and the rotation of the second one are measured."""
     socket_frame2: PhysicalFrameSocket = ""
-    """The frame whose place and turning in the first one count."""
+    """Frame whose position and rotation in the first one count."""
     frames: Many[PhysicalFrame] = make_empty_list()
     """Offset frames that belong to this component, so that its sockets can name places on bodies."""
 

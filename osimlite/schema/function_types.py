@@ -18,7 +18,7 @@ class PolynomialFunction(Function):
     """A polynomial of one variable."""
 
     coefficients: Vector = (1.0,)
-    """From the highest power down to the constant."""
+    """Coefficients from the highest power down to the constant."""
 
 
 class MultivariatePolynomialFunction(Function):

@@ -28,7 +28,7 @@ class Function(Object, abstract=True):
 
 
 class Constant(Function):
-    """The same value everywhere."""
+    """Function with the same value everywhere."""
 
     value: Annotated[float, real(legacy=True)] = 0.0
     """The value at every argument."""

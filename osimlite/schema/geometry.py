@@ -8,7 +8,7 @@ from osimlite.schema.references import FileName, FrameSocket, TransformInput
 
 
 class SurfaceProperties(Object):
-    """How a surface is drawn."""
+    """Appearance of a surface in viewers."""
 
     representation: Annotated[int, Value("int", choices=(-1, 0, 1, 2, 3))] = 3
     """0 is not drawn, 1 points, 2 wireframe, 3 filled, -1 as the viewer likes."""
@@ -61,7 +61,7 @@ class Mesh(Geometry):
 
 
 class ModelDisplayHints(Object):
-    """What a viewer should show of a model."""
+    """Kinds of components of a model that a viewer should show."""
 
     show_wrap_geometry: Flag = True
     """Whether surfaces that paths wrap around are drawn."""
@@ -91,4 +91,4 @@ class ModelVisualPreferences(Object):
     """Preferences of a viewer for this model."""
 
     model_display_hints: Unnamed[ModelDisplayHints] = make_default(ModelDisplayHints)
-    """Which kinds of components a viewer draws."""
+    """Kinds of components that a viewer draws."""

@@ -23,7 +23,7 @@ class Arrow(Geometry):
     start_point: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
     """The end without the tip."""
     direction: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
-    """Where the tip points; the length of this vector does not matter."""
+    """Direction from the base to the tip; the length of this vector does not matter."""
     length: Annotated[float, real(domain=">= 0")] = 1.0
     """Distance of the tip from the start."""
 
@@ -66,7 +66,7 @@ class Cone(AnalyticGeometry):
     origin: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
     """Middle of the base, in the frame."""
     direction: Annotated[Vec3, vec3()] = (0.0, 1.0, 0.0)
-    """From the base to the tip; the length of this vector does not matter."""
+    """Direction from the base to the tip; the length of this vector does not matter."""
     base_radius: Annotated[float, real(domain=">= 0")] = 0.5
     """Radius at the base."""
     height: Annotated[float, real(domain=">= 0")] = 1.0

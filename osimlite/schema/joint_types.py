@@ -64,7 +64,7 @@ class EllipsoidJoint(Joint):
     radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
     """Half axes of the ellipsoid along the axes of the parent frame."""
     appearance: Unnamed[Appearance] = make_default(Appearance)
-    """How the ellipsoid is drawn."""
+    """Appearance of the ellipsoid in viewers."""
 
 
 class ScapulothoracicJoint(Joint):

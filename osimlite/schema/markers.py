@@ -24,7 +24,7 @@ class Station(Point):
     socket_parent_frame: PhysicalFrameSocket = ""
     """The frame that the point is fixed in."""
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the point is, in its parent frame."""
+    """Position of the point in its parent frame."""
 
 
 class Marker(Station):

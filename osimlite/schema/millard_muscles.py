@@ -184,7 +184,7 @@ class Millard2012AccelerationMuscle(Muscle):
             MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
         )
     )
-    """How activation follows the control."""
+    """Dynamics by which the activation follows the control."""
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = make_default(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
     )

@@ -42,7 +42,7 @@ class Model(ModelComponent):
     is_root: ClassVar[bool] = True
 
     assembly_accuracy: Annotated[float, real(domain="> 0")] = 1e-9
-    """How well assembly at the start of a simulation must satisfy constraints; it fails where it cannot."""
+    """Accuracy of constraints at the start of a simulation, which fails if it is not reached."""
     ground: Single[Ground] = make_default(
         Ground,
         name="ground",
@@ -52,9 +52,9 @@ class Model(ModelComponent):
     gravity: Annotated[Vec3, vec3("m/s^2")] = (0.0, -9.80665, 0.0)
     """Acceleration of free fall, along the axes of ground."""
     credits: Text = "Frank Anderson, Peter Loan, Ayman Habib, Ajay Seth, Michael Sherman"
-    """Who made the model, as text for readers."""
+    """Authors of the model, as text for readers."""
     publications: Text = "List of publications related to model..."
-    """What to cite, as text for readers."""
+    """Publications to cite, as text for readers."""
     length_units: Text = "meters"
     """Unit of all lengths, in a word; tools convert marker data to it, the mechanics assume metres."""
     force_units: Text = "N"
@@ -65,11 +65,11 @@ class Model(ModelComponent):
     joint_set: Unnamed[JointSet] = make_default(JointSet, name="jointset")
     """The joints: every body is the child of one, or has a free joint to ground made for it."""
     controller_set: Unnamed[ControllerSet] = make_default(ControllerSet, name="controllerset")
-    """What sets the controls of actuators."""
+    """Controllers, which set the controls of actuators."""
     constraint_set: Unnamed[ConstraintSet] = make_default(ConstraintSet, name="constraintset")
     """Conditions on positions beyond the joints, which close loops and couple coordinates."""
     force_set: Unnamed[ForceSet] = make_default(ForceSet, name="forceset")
-    """Everything that pushes or pulls but gravity: forces, contact, actuators, muscles."""
+    """All forces except gravity: forces, contact, actuators, muscles."""
     marker_set: Unnamed[MarkerSet] = make_default(MarkerSet, name="markerset")
     """Points that motion capture sees."""
     contact_geometry_set: Unnamed[ContactGeometrySet] = make_default(
@@ -83,7 +83,7 @@ class Model(ModelComponent):
     model_visual_preferences: Unnamed[ModelVisualPreferences] = make_default(
         ModelVisualPreferences, name="modelvisualpreferences"
     )
-    """What a viewer should show of the model."""
+    """Preferences for the display of the model in viewers."""
 
     _repr_html_ = make_notebook_repr("model")
 

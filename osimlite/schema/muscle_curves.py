@@ -50,7 +50,7 @@ class FiberForceLengthCurve(Function):
     stiffness_at_one_norm_force: Annotated[float | None, maybe(domain="> 0")] = None
     """Slope at a force of 1; to be given with the stiffness at low force, or not at all."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
-    """How round the bend is; to be given with the two stiffnesses, or not at all."""
+    """Roundness of the bend; to be given with the two stiffnesses, or not at all."""
 
 
 class ForceVelocityCurve(Function):
@@ -68,21 +68,21 @@ class ForceVelocityCurve(Function):
     )
 
     concentric_slope_at_vmax: Annotated[float, real(domain=">= 0")] = 0.0
-    """Slope at the greatest shortening velocity, -1, where the force is 0."""
+    """Slope at the maximum shortening velocity, -1, where the force is 0."""
     concentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.25
-    """Slope just before the greatest shortening velocity."""
+    """Slope just before the maximum shortening velocity."""
     isometric_slope: Annotated[float, real(domain="> 0")] = 5.0
     """Slope at velocity 0, where the force is 1."""
     eccentric_slope_at_vmax: Annotated[float, real(domain=">= 0")] = 0.0
-    """Slope at the greatest lengthening velocity, 1."""
+    """Slope at the maximum lengthening velocity, 1."""
     eccentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.15
-    """Slope just before the greatest lengthening velocity."""
+    """Slope just before the maximum lengthening velocity."""
     max_eccentric_velocity_force_multiplier: Annotated[float, real(domain="> 1")] = 1.4
-    """Force at the greatest lengthening velocity, 1."""
+    """Force at the maximum lengthening velocity, 1."""
     concentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.6
-    """How round the bend of the shortening side is."""
+    """Roundness of the bend of the shortening side."""
     eccentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.9
-    """How round the bend of the lengthening side is."""
+    """Roundness of the bend of the lengthening side."""
 
 
 # Muscles of OpenSim set both end slopes of their inverse curve to half of the slopes near them,
@@ -91,21 +91,21 @@ class ForceVelocityInverseCurve(Function):
     """Fiber velocity over force multiplier: the inverse of a ForceVelocityCurve with the same numbers."""
 
     concentric_slope_at_vmax: Annotated[float, real(domain="> 0")] = 0.1
-    """Slope of the force at the greatest shortening velocity, -1; not 0, or there is no inverse."""
+    """Slope of the force at the maximum shortening velocity, -1; not 0, or there is no inverse."""
     concentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.25
-    """Slope of the force just before the greatest shortening velocity."""
+    """Slope of the force just before the maximum shortening velocity."""
     isometric_slope: Annotated[float, real(domain="> 0")] = 5.0
     """Slope of the force at velocity 0, where it is 1."""
     eccentric_slope_at_vmax: Annotated[float, real(domain="> 0")] = 0.1
-    """Slope of the force at the greatest lengthening velocity, 1; not 0, or there is no inverse."""
+    """Slope of the force at the maximum lengthening velocity, 1; not 0, or there is no inverse."""
     eccentric_slope_near_vmax: Annotated[float, real(domain=">= 0")] = 0.15
-    """Slope of the force just before the greatest lengthening velocity."""
+    """Slope of the force just before the maximum lengthening velocity."""
     max_eccentric_velocity_force_multiplier: Annotated[float, real(domain="> 1")] = 1.4
-    """Force at the greatest lengthening velocity, 1."""
+    """Force at the maximum lengthening velocity, 1."""
     concentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.6
-    """How round the bend of the shortening side is."""
+    """Roundness of the bend of the shortening side."""
     eccentric_curviness: Annotated[float, real(domain="0 to 1")] = 0.9
-    """How round the bend of the lengthening side is."""
+    """Roundness of the bend of the lengthening side."""
 
 
 class TendonForceLengthCurve(Function):
@@ -123,7 +123,7 @@ class TendonForceLengthCurve(Function):
     norm_force_at_toe_end: Annotated[float | None, maybe(domain="> 0")] = None
     """Force where the toe ends and the straight part begins, of `max_isometric_force`."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
-    """How round the toe is; to be given with the two above, or not at all."""
+    """Roundness of the toe region; to be given with the two above, or not at all."""
 
 
 class FiberCompressiveForceLengthCurve(Function):
@@ -134,7 +134,7 @@ class FiberCompressiveForceLengthCurve(Function):
     stiffness_at_zero_length: Annotated[float | None, maybe()] = None
     """Slope at length 0, negative; to be given with the curviness, or not at all."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
-    """How round the bend is; to be given with the stiffness, or not at all."""
+    """Roundness of the bend; to be given with the stiffness, or not at all."""
 
 
 class FiberCompressiveForceCosPennationCurve(Function):
@@ -145,4 +145,4 @@ class FiberCompressiveForceCosPennationCurve(Function):
     stiffness_at_perpendicular: Annotated[float | None, maybe()] = None
     """Slope over the cosine at 90 deg, negative; to be given with the curviness, or not at all."""
     curviness: Annotated[float | None, maybe(domain="0 to 1")] = None
-    """How round the bend is; to be given with the stiffness, or not at all."""
+    """Roundness of the bend; to be given with the stiffness, or not at all."""

@@ -78,7 +78,7 @@ class PathActuator(ScalarActuator):
 
 
 class Muscle(PathActuator, abstract=True):
-    """What every muscle has: its strength, its lengths, and what of it may be left out of the computation."""
+    """Base class of muscles: strength, lengths, and options of the computation."""
 
     facts = Facts(
         outputs="activation active_fiber_force active_fiber_force_along_tendon active_force_length_multiplier "
@@ -109,7 +109,7 @@ class Muscle(PathActuator, abstract=True):
     max_isometric_force: Annotated[float, real("N", "> 0")] = 1000.0
     """Force of fully active fibers at optimal length and rest; all forces are measured by it."""
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
-    """Fiber length at which the active force is greatest; all fiber lengths are measured by it."""
+    """Fiber length at which the active force is largest; the unit of normalized fiber lengths."""
     tendon_slack_length: Annotated[float, real("m", "> 0")] = 0.2
     """Length up to which the tendon is slack; all tendon lengths are measured by it."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0

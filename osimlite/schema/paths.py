@@ -54,7 +54,7 @@ class PathPoint(AbstractPathPoint):
     internal = (("station", Station),)
 
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the point is, in its parent frame."""
+    """Position of the point in its parent frame."""
 
 
 class ConditionalPathPoint(PathPoint):
@@ -69,7 +69,7 @@ class ConditionalPathPoint(PathPoint):
 
 
 class MovingPathPoint(AbstractPathPoint):
-    """A point whose place in its frame follows a coordinate; the three sockets must name the same one."""
+    """Point whose position follows a coordinate; the three sockets must name the same one."""
 
     facts = Facts(
         outputs="acceleration:Vec3 location:Vec3 velocity:Vec3",
@@ -100,7 +100,7 @@ class PathPointSet(Set):
 
 
 class PathWrapPoint(AbstractPathPoint, abstract=True):
-    """Where a path touches a wrap surface; OpenSim computes it, and no file holds one."""
+    """Point at which a path touches a wrap surface; OpenSim computes it, and no file has one."""
 
 
 class PathWrap(ModelComponent):
@@ -114,7 +114,7 @@ class PathWrap(ModelComponent):
     """Name of the surface; the physical frames of the model are searched for it."""
     # The methods differ in the plane in which the path crosses the ellipsoid, and in its length.
     method: Annotated[str, word("hybrid", "midpoint", "axial", "Unassigned")] = "hybrid"
-    """How the wrap over an ellipsoid is found; other surfaces do not ask."""
+    """Method for the wrap over an ellipsoid; it does not matter for other surfaces."""
     range: Annotated[tuple[int, int], Value("int", "list", least=2, most=2)] = (-1, -1)
     """First and last point, counted from 1, between which the path may wrap; below 1 there is no such limit."""
 
@@ -132,7 +132,7 @@ class AbstractGeometryPath(ModelComponent, abstract=True):
     facts = Facts(outputs="length lengthening_speed")
 
     appearance: Unnamed[Appearance] = make_default(Appearance, color=(0.5, 0.5, 0.5))
-    """How the path is drawn."""
+    """Appearance of the path in viewers."""
 
 
 class GeometryPath(AbstractGeometryPath):
@@ -191,6 +191,6 @@ class FunctionBasedPath(AbstractGeometryPath):
     length_function: Optional[Function] = None
     """Length of the path (m) as a function of the coordinates."""
     moment_arm_functions: Many[Function] = make_empty_list()
-    """A moment arm for each coordinate; left out, they are the derivatives of the length times -1."""
+    """Moment arm for each coordinate; left out, the derivative of the length times -1."""
     lengthening_speed_function: Optional[Function] = None
     """Speed as a function of all values, then all speeds; left out, it follows from the length."""

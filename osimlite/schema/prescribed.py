@@ -50,13 +50,13 @@ class ExternalForce(ForceProducer):
     # OpenSim takes the three columns whose labels begin so in the order of the file, whatever
     # letter follows; another number of columns is an error.
     force_identifier: MaybeColumnName = None
-    """What the labels of the three columns of the force begin with; left out, there is no force."""
+    """Beginning of the labels of the three force columns; left out, there is no force."""
     # Without it OpenSim applies the force at the origin of the body, silently. Moments are then
     # wrong by the force times the distance to the point.
     point_identifier: MaybeColumnName = None
-    """What the labels of the three columns of the point begin with; left out, the origin of the frame."""
+    """Beginning of the labels of the three point columns; left out, the origin of the frame."""
     torque_identifier: MaybeColumnName = None
-    """What the labels of the three columns of the torque begin with; left out, there is no torque."""
+    """Beginning of the labels of the three torque columns; left out, there is no torque."""
     # OpenSim replaces it by the `datafile` of the loads, so that the name in the file has no effect
     # there.
     data_source_name: MaybeColumnName = None

@@ -29,7 +29,7 @@ _NAME_OF_MUSCLE = Reference("muscle-name", "Muscle")
 
 
 class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
-    """What the probe must know about one muscle, whose name the object bears."""
+    """Parameters of the probe for the muscle of the same name."""
 
     name_reference = _NAME_OF_MUSCLE
 
@@ -51,7 +51,7 @@ class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
     objects: LegacyMany[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter] = (
         make_empty_list()
     )
-    """What the probe must know of each muscle; muscles that are not here use no energy."""
+    """Parameters of each muscle; muscles that are not here use no energy."""
 
 
 class Umberger2010MuscleMetabolicsProbe(Probe):
@@ -90,7 +90,7 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
 
 
 class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
-    """What the probe must know about one muscle, whose name the object bears."""
+    """Parameters of the probe for the muscle of the same name."""
 
     name_reference = _NAME_OF_MUSCLE
 
@@ -120,7 +120,7 @@ class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
     objects: LegacyMany[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter] = (
         make_empty_list()
     )
-    """What the probe must know of each muscle; muscles that are not here use no energy."""
+    """Parameters of each muscle; muscles that are not here use no energy."""
 
 
 class Bhargava2004MuscleMetabolicsProbe(Probe):
@@ -168,7 +168,7 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
 
 
 class Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(Component):
-    """What the metabolics component must know about one muscle."""
+    """Parameters of the metabolics component for one muscle."""
 
     socket_muscle: MuscleSocket = ""
     """The muscle that the numbers are about."""
@@ -225,11 +225,11 @@ class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
     ] = "tanh"
     """Shape of the transitions: hyperbolic tangent, or the function of Huber."""
     velocity_smoothing: Annotated[float | None, maybe(domain="> 0")] = 10.0
-    """How sharply shortening turns into lengthening; higher is sharper."""
+    """Sharpness of the transition from shortening to lengthening; higher is sharper."""
     power_smoothing: Annotated[float | None, maybe(domain="> 0")] = 10.0
-    """How sharply negative power is kept out; higher is sharper."""
+    """Sharpness of the exclusion of negative power; higher is sharper."""
     heat_rate_smoothing: Annotated[float | None, maybe(domain="> 0")] = 10.0
-    """How sharply heat is kept above 1 W/kg; higher is sharper."""
+    """Sharpness of the lower limit of heat, 1 W/kg; higher is sharper."""
 
 
 class ActuatorForceProbe(Probe):

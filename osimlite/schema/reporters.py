@@ -67,7 +67,7 @@ class TableSource(Component, abstract=True):
     filename: FileName = ""
     """File of the table, relative to the folder that OpenSim runs in, not to the model."""
     tablename: ColumnName = ""
-    """Which table it is, where a file has several, such as `markers` or `forces` of a C3D file."""
+    """Name of the table in a file with several, such as `markers` or `forces` of a C3D file."""
 
 
 class TableSource__double_(TableSource):

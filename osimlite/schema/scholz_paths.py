@@ -17,7 +17,7 @@ class Scholz2015GeometryPathPoint(Scholz2015GeometryPathElement):
     """A point that the path runs through."""
 
     path_point: Unnamed[PathPoint] = make_default(PathPoint)
-    """The point, in a frame of its own choice."""
+    """Point of the path in any frame."""
 
 
 class Scholz2015GeometryPathObstacle(Scholz2015GeometryPathElement):

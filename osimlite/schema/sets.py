@@ -17,11 +17,11 @@ class ObjectGroup(Object):
     """A named selection of the members of the set it belongs to."""
 
     members: SetMemberNames = ()
-    """Names of the members that the selection holds."""
+    """Names of the members of the selection."""
 
 
 class Set(Object, abstract=True):
-    """Objects of one kind, each with a name of its own."""
+    """Objects of one kind, each with its own name."""
 
     objects: LegacyMany[Member] = make_empty_list()
     """The members."""
@@ -44,7 +44,7 @@ class Constraint(ModelComponent, abstract=True):
     """A condition that the motion keeps."""
 
     isEnforced: Flag = True
-    """Whether the constraint holds during a simulation."""
+    """Whether the constraint is active during a simulation."""
 
 
 class ConstraintSet(ModelComponentSet):
@@ -72,7 +72,7 @@ class ControllerSet(ModelComponentSet):
 
 
 class Probe(ModelComponent, abstract=True):
-    """Something measured along a simulation, possibly integrated or differentiated, times `gain`."""
+    """Quantity along a simulation, possibly integrated or differentiated, times `gain`."""
 
     facts = Facts(outputs="probe_outputs:Vector")
 
@@ -81,10 +81,10 @@ class Probe(ModelComponent, abstract=True):
     probe_operation: Annotated[
         str, word("value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs")
     ] = "value"
-    """What is reported of the quantity: itself, its integral, its rate, or its extreme so far."""
+    """Operation on the quantity: its value, integral, rate, or extreme so far."""
     # OpenSim replaces a wrong number of values by zeros, with an error in its log only.
     initial_conditions_for_integration: Annotated[Reals, reals()] = ()
-    """Where the integrals start, one number for each quantity of the probe."""
+    """Initial values of the integrals, one number for each quantity of the probe."""
     gain: Number = 1.0
     """Factor of what is reported."""
 

@@ -60,7 +60,7 @@ class DeGrooteFregly2016Muscle(Muscle):
     tendon_compliance_dynamics_mode: Annotated[str, word("explicit", "implicit")] = "explicit"
     """Form of the equilibrium of fiber and tendon; implicit is for direct collocation only."""
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
-    """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
+    """Sharpness of the transition from rise to fall; about 10 keeps the time constants true."""
 
     def find_contradictions(self) -> Iterator[Contradiction]:
         """Yield `optimal_force` if it is set: OpenSim accepts only `max_isometric_force`."""
@@ -92,6 +92,6 @@ class MeyerFregly2016Muscle(Muscle):
     ignore_passive_fiber_force: Flag = False
     """Whether passive fibers bear no force."""
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
-    """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
+    """Sharpness of the transition from rise to fall; about 10 keeps the time constants true."""
 
     find_contradictions = DeGrooteFregly2016Muscle.find_contradictions

@@ -16,7 +16,7 @@ class PiecewiseConstantFunction(Function):
     x: LegacyReals = ()
     """Arguments at which the value changes, in ascending order."""
     y: LegacyReals = ()
-    """Value from each x up to the next; the first holds before too, the last after."""
+    """Value from each x up to the next; the first also applies before its x, the last after it."""
 
 
 class PiecewiseLinearFunction(Function):
@@ -36,7 +36,7 @@ class SimmSpline(Function):
     x: LegacyReals = ()
     """Arguments of the points, in ascending order; two make a line."""
     y: LegacyReals = ()
-    """Values at the points; beyond the ends it goes on as a line with the slope there."""
+    """Values at the points; beyond the ends the function is a line with the slope there."""
 
 
 # In the lists OpenSim accepts commas and one pair of brackets, but neither nan nor inf: they belong
@@ -55,7 +55,7 @@ class GCVSpline(Function):
     weights: LegacyReals = ()
     """A number for each point; OpenSim's fit lets all points count the same."""
     coefficients: LegacyReals = ()
-    """What the fit gave when the spline was written; OpenSim computes it anew from the points."""
+    """Coefficients of the fit; OpenSim computes them anew from the points."""
 
 
 class GCVSplineSet(FunctionSet):

@@ -25,9 +25,9 @@ class PointToPointSpring(Force):
     socket_body2: PhysicalFrameSocket = ""
     """The frame of the second end."""
     point1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the first end is, in its frame."""
+    """Position of the first end in its frame."""
     point2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the second end is, in its frame."""
+    """Position of the second end in its frame."""
     stiffness: Annotated[float, real("N/m", ">= 0")] = 1.0
     """Force per change of the distance; a spring that is too short pushes."""
     rest_length: Annotated[float, real("m", ">= 0")] = 0.0
@@ -69,9 +69,9 @@ class ExpressionBasedPointToPointForce(ForceProducer):
     body2: MaybeFrameName = None
     """The frame of the second point."""
     point1: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the first point is, in its frame."""
+    """Position of the first point in its frame."""
     point2: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the second point is, in its frame."""
+    """Position of the second point in its frame."""
     expression: Text = "0.0"
     """Formula of the force in `d` and `ddot`; positive pulls the points together."""
 
@@ -134,7 +134,7 @@ class ExpressionBasedBushingForce(TwoFrameLinker, ForceProducer):
 
 
 class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
-    """A bushing whose every moment and force is a function of its own deviation; damping stays linear."""
+    """Bushing whose moments and forces are functions of one deviation each, with linear damping."""
 
     m_x_theta_x_function: Optional[Function] = make_default(Constant)
     """Moment against the first angle, as a function of it (rad)."""
@@ -179,7 +179,7 @@ class CoordinateLinearStopForce(Force):
 
 
 class ExponentialCoordinateLimitForce(ForceProducer):
-    """What ligaments do to a coordinate near its limits: an exponential at either, felt before it is reached."""
+    """Exponential force of ligaments near both limits of a coordinate, which begins before them."""
 
     since: ClassVar[str] = "4.6.1"
 

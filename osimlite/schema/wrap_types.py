@@ -56,7 +56,7 @@ class WrapTorus(WrapObject):
     )
 
     inner_radius: Annotated[float, real("m", "> 0")] = 0.01
-    """Radius of the tube itself; must be less than the outer one."""
+    """Radius of the tube; it must be less than the outer one."""
     outer_radius: Annotated[float, real("m", "> 0")] = 0.05
     """Radius of the circle in the middle of the tube."""
 

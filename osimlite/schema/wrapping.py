@@ -19,13 +19,13 @@ class WrapObject(ModelComponent, abstract=True):
     xyz_body_rotation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Body-fixed X-Y-Z angles of the surface in the frame that owns it."""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """Where the middle of the surface is, in the frame that owns it."""
+    """Position of the middle of the surface in the frame that owns it."""
     quadrant: Annotated[
         str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")
     ] = "Unassigned"
     """Keeps paths to the half where this coordinate of the surface has this sign; `all` leaves both."""
     appearance: Unnamed[Appearance] = make_default(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
-    """How the surface is drawn."""
+    """Appearance of the surface in viewers."""
 
 
 class WrapObjectSet(ModelComponentSet):

@@ -55,11 +55,11 @@ class MocoGoal(Object, abstract=True):
     enabled: Flag = True
     """Whether the goal counts."""
     weight: Number = 1.0
-    """How much a cost counts beside others."""
+    """Weight of a cost relative to others."""
     mode: Annotated[
         str | None, Value("string", "optional", choices=("cost", "endpoint_constraint"))
     ] = None
-    """Whether it is a cost or a constraint; left out, what is usual for the goal."""
+    """Whether it is a cost or a constraint; left out, the default of the goal."""
     moco_constraint_info: Unnamed[MocoConstraintInfo] = make_default(MocoConstraintInfo)
     """Bounds of the values if it is a constraint."""
     scale_factors: Many[MocoScaleFactor] = make_empty_list()
@@ -77,10 +77,10 @@ class MocoFinalTimeGoal(MocoGoal):
 
 
 class MocoAverageSpeedGoal(MocoGoal):
-    """How far the average speed of the center of mass is from a given one."""
+    """Deviation of the average speed of the center of mass from a desired one."""
 
     desired_average_speed: Annotated[float, real("m/s")] = 0.0
-    """The speed that is wanted."""
+    """Desired average speed."""
 
 
 class MocoInitialActivationGoal(MocoGoal):
@@ -135,14 +135,14 @@ class MocoExpressionBasedParameterGoal(MocoGoal):
 
 
 class MocoPeriodicityGoalPair(Object):
-    """Two variables, the first at the start and the second at the end, that are to be equal."""
+    """Two variables whose values at the start (first) and at the end (second) must be equal."""
 
     initial_variable: Variable = ""
     """Path of the state or control at the start."""
     final_variable: Variable = ""
-    """Path of the state or control at the end; left out, the same."""
+    """Path of the state or control at the end; left out, that at the start."""
     negate: Flag = False
-    """Whether the one is to be the negative of the other."""
+    """Whether one value must be the negative of the other."""
 
 
 class MocoPeriodicityGoal(MocoGoal):
@@ -155,12 +155,12 @@ class MocoPeriodicityGoal(MocoGoal):
 
 
 class MocoMarkerFinalGoal(MocoGoal):
-    """How far a point is from a given place at the end."""
+    """Distance of a point from a target position at the end of the motion."""
 
     point_name: Annotated[Named, Reference("model-path", "Point")] = ""
     """Path of the point."""
     reference_location: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
-    """Where the point is wanted, in ground."""
+    """Target position of the point in ground."""
 
 
 class MocoJointReactionGoal(MocoGoal):
@@ -169,11 +169,11 @@ class MocoJointReactionGoal(MocoGoal):
     joint_path: Annotated[Named, Reference("model-path", "Joint")] = ""
     """Path of the joint."""
     loads_frame: Annotated[str, word("parent", "child")] = "parent"
-    """Which of its two frames the load acts on."""
+    """Frame of the joint on which the load acts: parent or child."""
     expressed_in_frame_path: Annotated[Named, Reference("model-path", "Frame", required=False)] = ""
-    """The frame along whose axes the load counts; left out, that of `loads_frame`."""
+    """Frame along whose axes the load is expressed; left out, that of `loads_frame`."""
     reaction_measures: Annotated[tuple[str, ...], Value("string", "list", choices=MEASURES)] = ()
-    """Components that count, such as force-x or moment-z; left out, all six."""
+    """Components of the load in the cost, such as force-x or moment-z; left out, all six."""
     reaction_weights: Single[MocoWeightSet] = make_default(MocoWeightSet, name="reaction_weights")
     """Weights by components."""
 
@@ -186,11 +186,11 @@ class MocoOutputBase(MocoGoal, abstract=True):
     second_output_path: SecondOutputPath = ""
     """Another output, which `operation` joins to the first."""
     operation: Operation = ""
-    """How the two are joined."""
+    """Operation that combines the two outputs."""
     exponent: Integer = 1
     """The power that the result is raised to."""
     output_index: Integer = -1
-    """Which component of an output of several numbers counts; -1 for its length."""
+    """Index of the component of an output of several numbers; -1 for its length."""
 
 
 class MocoOutputGoal(MocoOutputBase):
@@ -215,7 +215,7 @@ class MocoStepTimeAsymmetryGoalGroup(Object):
 
 
 class MocoStepTimeAsymmetryGoal(MocoGoal):
-    """How far the asymmetry of step times is from a given one."""
+    """Deviation of the asymmetry of step times from a desired one."""
 
     left_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = make_default(
         MocoStepTimeAsymmetryGoalGroup, name="left_contact_group"
@@ -232,24 +232,24 @@ class MocoStepTimeAsymmetryGoal(MocoGoal):
     contact_force_direction: Direction = "positive-y"
     """Direction of that force, in ground."""
     walking_direction: Direction = "positive-x"
-    """Where the walk goes, in ground."""
+    """Direction of walking in ground."""
     contact_detection_smoothing: Number = 0.25
-    """How sharply contact is told from none; greater is sharper."""
+    """Sharpness of the detection of contact; greater is sharper."""
     asymmetry_smoothing: Number = 10.0
-    """How sharply the foot in front is told; greater is sharper."""
+    """Sharpness of the detection of the front foot; greater is sharper."""
 
 
 class MocoStepLengthAsymmetryGoal(MocoGoal):
-    """How far the asymmetry of step lengths is from a given one."""
+    """Deviation of the asymmetry of step lengths from a desired one."""
 
     left_foot_frame: FootFrame = ""
     """Path of the frame of the left foot."""
     right_foot_frame: FootFrame = ""
     """Path of the frame of the right foot."""
     walking_direction: Direction = "positive-x"
-    """Where the walk goes, in ground."""
+    """Direction of walking in ground."""
     asymmetry_smoothing: Number = 5.0
-    """How sharply the foot in front is told; greater is sharper."""
+    """Sharpness of the detection of the front foot; greater is sharper."""
     target_asymmetry: Number = 0.0
     """Difference of step lengths over their sum, right less left."""
     stride_length: Annotated[float, real("m")] = -1.0

@@ -50,7 +50,7 @@ class MocoFinalBounds(MocoBounds):
 
 
 class MocoWeight(Object):
-    """How much something counts; the name is that of a state, a control, a marker, a frame or what else is weighted."""
+    """Weight of the state, control, marker, frame or other item with the same name."""
 
     weight: Number = 1.0
     """Beside those of the others."""
@@ -73,9 +73,9 @@ class MocoConstraintInfo(Object):
     """Bounds of the equations of a constraint; OpenSim writes it and does not read it again."""
 
     bounds: Many[MocoBounds] = make_empty_list()
-    """For each equation its bounds; left out, they are zero."""
+    """Bounds of each equation; left out, they are zero."""
     suffixes: Strings = ()
-    """What tells the equations apart in names."""
+    """Suffixes that distinguish the equations in names."""
 
 
 class MocoScaleFactor(Component):
@@ -110,4 +110,4 @@ class MocoParameter(Object):
     property_name: Text = ""
     """The property of those components."""
     property_element: Annotated[int | None, Value("int", "optional")] = None
-    """Which number of the property, from 0; left out for a property of one number."""
+    """Index of the number in the property, from 0; left out for a property of one number."""

@@ -21,7 +21,7 @@ from osimlite.schema.moco.tracking import Projection
 
 
 class MocoPathConstraint(Object, abstract=True):
-    """Something that must hold at every moment."""
+    """Constraint that must hold at every time of the motion."""
 
     moco_constraint_info: Unnamed[MocoConstraintInfo] = make_default(MocoConstraintInfo)
     """Bounds of its equations."""
@@ -65,11 +65,11 @@ class MocoOutputBoundConstraint(MocoPathConstraint):
     second_output_path: SecondOutputPath = ""
     """Another output, which `operation` joins to the first."""
     operation: Operation = ""
-    """How the two are joined."""
+    """Operation that combines the two outputs."""
     exponent: Integer = 1
     """The power that the result is raised to."""
     output_index: Integer = -1
-    """Which component of an output of several numbers counts; -1 for its length."""
+    """Index of the component of an output of several numbers; -1 for its length."""
     lower_bound: Optional[Function] = None
     """Least value over time."""
     upper_bound: Optional[Function] = None
@@ -86,9 +86,9 @@ class MocoFrameDistanceConstraintPair(Object):
     frame2_path: FramePath = ""
     """Path of the second frame."""
     minimum_distance: Annotated[float, real("m")] = 0.0
-    """How near their origins may be."""
+    """Smallest distance of their origins."""
     maximum_distance: Annotated[float, real("m")] = float("inf")
-    """How far apart their origins may be."""
+    """Largest distance of their origins."""
 
 
 class MocoFrameDistanceConstraint(MocoPathConstraint):

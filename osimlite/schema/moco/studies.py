@@ -53,11 +53,11 @@ class MocoPhase(Object):
     time_initial_bounds: Single[MocoInitialBounds] = make_default(
         MocoInitialBounds, name="time_initial_bounds"
     )
-    """When the phase begins."""
+    """Bounds of the initial time."""
     time_final_bounds: Single[MocoFinalBounds] = make_default(
         MocoFinalBounds, name="time_final_bounds"
     )
-    """When the phase ends."""
+    """Bounds of the final time."""
     default_speed_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="default_speed_bounds", bounds=(-50.0, 50.0)
     )
@@ -81,7 +81,7 @@ class MocoPhase(Object):
     goals: Many[MocoGoal] = make_empty_list()
     """Costs and constraints at the ends."""
     path_constraints: Many[MocoPathConstraint] = make_empty_list()
-    """What must hold at every moment."""
+    """Constraints that must hold at every time of the motion."""
     kinematic_constraint_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="kinematic_constraint_bounds", bounds=(0.0,)
     )
@@ -100,7 +100,7 @@ class MocoProblem(Object):
 
 
 class MocoSolver(Object, abstract=True):
-    """What solves a problem."""
+    """Solver of an optimal control problem."""
 
 
 class MocoDirectCollocationSolver(MocoSolver, abstract=True):
@@ -115,7 +115,7 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     mesh: Annotated[Reals, reals()] = ()
     """Nodes of a mesh of unequal intervals, from 0 to 1."""
     verbosity: Annotated[int, Value("int", choices=(0, 1, 2))] = 2
-    """How much the solver prints."""
+    """Amount of output of the solver."""
     transcription_scheme: Annotated[
         str,
         word(
@@ -125,7 +125,7 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
             *(f"legendre-gauss-radau-{degree}" for degree in range(1, 10)),
         ),
     ] = "hermite-simpson"
-    """How the equations of motion are met between nodes."""
+    """Collocation scheme for the equations of motion."""
     interpolate_control_mesh_interior_points: Flag = True
     """Whether controls within intervals lie on lines between nodes."""
     enforce_constraint_derivatives: MaybeFlag = True
@@ -135,15 +135,15 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     optim_solver: Annotated[str, word("ipopt", "snopt")] = "ipopt"
     """The optimizer."""
     optim_max_iterations: Annotated[int, Value("int", domain=">= 0 or -1")] = -1
-    """How many iterations the optimizer may take; -1 for its own number."""
+    """Largest number of iterations of the optimizer; -1 for its own default."""
     optim_convergence_tolerance: Annotated[float, real(domain="> 0 or -1")] = -1.0
-    """How far the optimizer goes; -1 for its own number."""
+    """Convergence tolerance of the optimizer; -1 for its own default."""
     optim_constraint_tolerance: Annotated[float, real(domain="> 0 or -1")] = -1.0
-    """How well constraints are met; -1 for the optimizer's own number."""
+    """Constraint tolerance of the optimizer; -1 for its own default."""
     optim_hessian_approximation: Annotated[str, word("limited-memory", "exact")] = "limited-memory"
-    """Where the optimizer has second derivatives from."""
+    """Source of the optimizer's second derivatives."""
     optim_ipopt_print_level: Integer = -1
-    """How much Ipopt prints, from 0 to 12; -1 for its own number."""
+    """Amount of output of Ipopt, from 0 to 12; -1 for its own default."""
     guess_file: InputTable = ""
     """A motion to start from."""
     velocity_correction_bounds: Single[MocoBounds] = make_default(
@@ -161,9 +161,9 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     minimize_lagrange_multipliers: Flag = False
     """Whether multipliers of constraints are a cost."""
     lagrange_multiplier_weight: Number = 1.0
-    """How much that cost counts."""
+    """Weight of that cost."""
     kinematic_constraint_method: Annotated[str, word("Posa2016", "Bordalba2023")] = "Posa2016"
-    """How the model's constraints are met, by the authors of the method."""
+    """Method for the model's constraints, by the names of its authors."""
 
 
 class MocoCasADiSolver(MocoDirectCollocationSolver):
@@ -174,13 +174,13 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     parameters_require_initsystem: Flag = True
     """Whether the model is made anew for each value of the parameters."""
     optim_sparsity_detection: Annotated[str, word("none", "random", "initial-guess")] = "none"
-    """How it is found which derivatives are always zero."""
+    """Method for detecting derivatives that are always zero."""
     optim_write_sparsity: Annotated[str, Value("string")] = ""
-    """What the names of files of sparsity patterns begin with; left out, there are none."""
+    """Beginning of the names of files for sparsity patterns; left out, none are written."""
     optim_finite_difference_scheme: Annotated[str, word("central", "forward", "backward")] = (
         "central"
     )
-    """How derivatives are computed."""
+    """Scheme of finite differences for derivatives."""
     parallel: Annotated[int | None, Value("int", "optional")] = None
     """Number of threads: 0 for one, 1 for as many as there are processors."""
     output_interval: Integer = 0
@@ -188,17 +188,17 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     minimize_implicit_multibody_accelerations: Flag = False
     """Whether accelerations that are variables are a cost."""
     implicit_multibody_accelerations_weight: Number = 1.0
-    """How much that cost counts."""
+    """Weight of that cost."""
     minimize_implicit_auxiliary_derivatives: Flag = False
     """Whether derivatives of auxiliary states that are variables are a cost."""
     implicit_auxiliary_derivatives_weight: Number = 1.0
-    """How much that cost counts."""
+    """Weight of that cost."""
     enforce_path_constraint_mesh_interior_points: Flag = False
     """Whether path constraints are met within intervals too."""
     minimize_state_projection_distance: Flag = True
     """Whether the way that states are moved onto the constraints is a cost."""
     state_projection_distance_weight: Number = 1e-6
-    """How much that cost counts."""
+    """Weight of that cost."""
     projection_slack_variable_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="projection_slack_variable_bounds", bounds=(-0.001, 0.001)
     )
@@ -213,18 +213,18 @@ class MocoStudy(Object):
     results_directory: OutputFolder = "./"
     """Folder for the solution."""
     problem: Single[MocoProblem] = make_default(MocoProblem, name="problem")
-    """What is to be solved."""
+    """Optimal control problem."""
     solver: Single[MocoSolver] = make_default(MocoCasADiSolver, name="solver")
-    """What solves it."""
+    """Solver of the problem."""
 
 
 class MocoTool(Object, abstract=True):
     """Makes a study for a usual task."""
 
     initial_time: Annotated[float | None, maybe("s")] = None
-    """Where the motion begins; left out, where the data do."""
+    """Initial time of the motion; left out, that of the data."""
     final_time: Annotated[float | None, maybe("s")] = None
-    """Where the motion ends; left out, where the data do."""
+    """Final time of the motion; left out, that of the data."""
     mesh_interval: Annotated[float, real("s", "> 0")] = 0.02
     """Length of an interval of the mesh."""
     clip_time_range: Flag = False
@@ -245,11 +245,11 @@ class MocoInverse(MocoTool):
     minimize_sum_squared_activations: Flag = False
     """Whether squares of activations are a cost."""
     max_iterations: Annotated[int | None, Value("int", "optional")] = None
-    """How many iterations the optimizer may take."""
+    """Largest number of iterations of the optimizer."""
     convergence_tolerance: Number = 1e-3
-    """How far the optimizer goes."""
+    """Convergence tolerance of the optimizer."""
     constraint_tolerance: Number = 1e-3
-    """How well constraints are met."""
+    """Constraint tolerance of the optimizer."""
     output_paths: Annotated[
         tuple[str, ...],
         Reference("input", "Output", "list", required=False),
@@ -257,7 +257,7 @@ class MocoInverse(MocoTool):
     ] = ()
     """Outputs that are computed for the solution, as patterns of `path|output`."""
     reserves_weight: Number = 1.0
-    """How much reserve actuators cost."""
+    """Weight of the controls of reserve actuators in the cost."""
 
 
 class MocoTrack(MocoTool):
@@ -268,7 +268,7 @@ class MocoTrack(MocoTool):
     )
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
-    """How much deviations of states count."""
+    """Weight of deviations of states."""
     states_weight_set: Annotated[
         Single[MocoWeightSet],
         NamesOf(Reference("state-path", "state variable", consequence="left out")),
@@ -283,7 +283,7 @@ class MocoTrack(MocoTool):
     )
     """Markers to follow."""
     markers_global_tracking_weight: Number = 1.0
-    """How much deviations of markers count."""
+    """Weight of deviations of markers."""
     markers_weight_set: MarkerWeights = make_default(MocoWeightSet, name="markers_weight_set")
     """Weights by names of markers."""
     allow_unused_references: Flag = False
@@ -295,6 +295,6 @@ class MocoTrack(MocoTool):
     minimize_control_effort: Flag = True
     """Whether squares of controls are a cost."""
     control_effort_weight: Number = 0.001
-    """How much that cost counts."""
+    """Weight of that cost."""
     controls_weight_set: ControlWeights = make_default(MocoWeightSet, name="controls_weight_set")
     """Weights by paths of controls."""

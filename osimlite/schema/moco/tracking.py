@@ -183,7 +183,7 @@ class MocoGeneralizedForceTrackingGoal(MocoGoal):
     allow_unused_references: Flag = False
     """Whether the table may have columns that are no generalized forces."""
     normalize_tracking_error: MaybeFlag = False
-    """Whether deviations are divided by the greatest value of the column."""
+    """Whether deviations are divided by the largest value of the column."""
     ignore_constrained_coordinates: Flag = True
     """Whether coordinates that others determine are left out."""
 
@@ -203,7 +203,7 @@ class MocoContactTrackingGoal(MocoGoal):
     """Contact forces follow measured ones."""
 
     contact_groups: Many[MocoContactTrackingGoalGroup] = make_empty_list()
-    """What follows what."""
+    """Groups of contact forces, each with the measured load that it tracks."""
     external_loads: Optional[ExternalLoads] = None
     """The measured forces."""
     external_loads_file: LoadsFile = ""
@@ -213,7 +213,7 @@ class MocoContactTrackingGoal(MocoGoal):
     projection_vector: Annotated[Vec3 | None, Value("double", "Vec3", optional=True)] = None
     """That vector, in ground."""
     normalize_tracking_error: MaybeFlag = False
-    """Whether deviations are divided by the greatest measured force."""
+    """Whether deviations are divided by the largest measured force."""
 
 
 class MocoContactImpulseTrackingGoalGroup(Object):
@@ -231,7 +231,7 @@ class MocoContactImpulseTrackingGoal(MocoGoal):
     """Impulses of contact forces follow measured ones."""
 
     contact_groups: Many[MocoContactImpulseTrackingGoalGroup] = make_empty_list()
-    """What follows what."""
+    """Groups of contact forces, each with the measured load that it tracks."""
     external_loads: Optional[ExternalLoads] = None
     """The measured forces."""
     external_loads_file: LoadsFile = ""

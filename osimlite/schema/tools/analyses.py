@@ -45,14 +45,14 @@ class BodyKinematics(Analysis):
 
 
 class ForceReporter(Analysis):
-    """What all forces report of themselves."""
+    """Table of the records of all forces."""
 
     include_constraint_forces: LegacyFlag = False
     """Whether the forces of constraints are written too."""
 
 
 class IMUDataReporter(Analysis):
-    """What inertial sensors would measure."""
+    """Simulated measurements of inertial sensors."""
 
     report_orientations: Flag = True
     """Whether orientations are written."""
@@ -69,7 +69,7 @@ class IMUDataReporter(Analysis):
 
 
 class InducedAccelerations(Analysis):
-    """What each force contributes to accelerations."""
+    """Contribution of each force to accelerations."""
 
     coordinate_names: Annotated[
         Names, make_name_list("coordinate-name", "Coordinate", "all", any_case=True)
@@ -82,7 +82,7 @@ class InducedAccelerations(Analysis):
     constraint_set: LegacyUnnamed[ConstraintSet] = make_default(ConstraintSet)
     """Constraints that stand for the contact with the ground."""
     force_threshold: Annotated[float, real("N", legacy=True)] = 6.0
-    """Measured force above which the constraints hold."""
+    """Measured force above which the constraints are active."""
     compute_potentials_only: LegacyFlag = False
     """Whether each force is taken as one newton."""
     report_constraint_reactions: LegacyFlag = False
@@ -98,7 +98,7 @@ class JointReaction(Analysis):
     joint_names: LegacyJointNames = ("ALL",)
     """Joints that are written, or ALL."""
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
-    """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
+    """Side of the joints on which the loads act: child or parent, one word for all or for each."""
     express_in_frame: Annotated[
         Names, make_name_list("frame-path-or-member", "Frame", "child", "parent", any_case=True)
     ] = ("ground",)
@@ -172,11 +172,11 @@ class PointKinematics(Analysis):
     point_name: LegacyText = "NONAME"
     """Name of the point, which the results bear."""
     point: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (0.0, 0.0, 0.0)
-    """Where the point is in its body."""
+    """Position of the point in its body."""
 
 
 class ProbeReporter(Analysis):
-    """What the probes of the model measure."""
+    """Table of the values of the model's probes."""
 
 
 class StatesReporter(Analysis):
@@ -197,7 +197,7 @@ class StaticOptimization(Analysis):
     """Whether forces of muscles depend on their lengths and speeds."""
     # At this default, activations of OpenSim are up to 0.005 away from the exact solution.
     optimizer_convergence_criterion: LegacyNumber = 1e-4
-    """How far the optimizer goes."""
+    """Convergence tolerance of the optimizer."""
     # Where the optimizer fails, OpenSim warns and writes the point at which it stopped.
     optimizer_max_iterations: LegacyInteger = 100
-    """How many iterations the optimizer may take."""
+    """Largest number of iterations of the optimizer."""

@@ -16,15 +16,15 @@ from osimlite.schema.sets import Set
 
 
 class Analysis(Object, abstract=True):
-    """Something that is computed along a motion."""
+    """Base class of quantities that are computed along a motion."""
 
     on: LegacyFlag = True
     """Whether the analysis is done."""
     # OpenSim's tools ignore both times: analyses run over the range of the tool.
     start_time: Annotated[float, real("s", legacy=True)] = float("-inf")
-    """Where it begins."""
+    """Time at which the analysis begins."""
     end_time: Annotated[float, real("s", legacy=True)] = float("inf")
-    """Where it ends."""
+    """Time at which the analysis ends."""
     # OpenSim takes 0 and negative numbers as 1.
     step_interval: LegacyInteger = 1
     """Every how many steps of the integrator, or rows of the motion, something is written."""

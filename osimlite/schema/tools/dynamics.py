@@ -101,15 +101,15 @@ class AbstractTool(Object, abstract=True):
     output_precision: LegacyInteger = 8
     """Number of digits in the results."""
     initial_time: Annotated[float, real("s", legacy=True)] = 0.0
-    """Where the run begins."""
+    """Time at which the run begins."""
     # OpenSim's AnalyzeTool crashes if it is before the initial time.
     final_time: Annotated[float, real("s", legacy=True)] = 1.0
-    """Where the run ends."""
+    """Time at which the run ends."""
     solve_for_equilibrium_for_auxiliary_states: LegacyFlag = False
     """Whether muscles are brought into equilibrium before the run."""
     # OpenSim 4.6's forward tool does not stop there (measured with 1).
     maximum_number_of_integrator_steps: LegacyInteger = 20000
-    """How many steps the integrator may take."""
+    """Largest number of steps of the integrator."""
     maximum_integrator_step_size: Annotated[float, real(domain="> 0", legacy=True)] = 1.0
     """Longest step of the integrator, in seconds."""
     minimum_integrator_step_size: LegacyNumber = 1e-8
@@ -118,7 +118,7 @@ class AbstractTool(Object, abstract=True):
     integrator_error_tolerance: LegacyNumber = 1e-5
     """Error of a step above which the integrator takes a shorter one."""
     analysis_set: LegacyUnnamed[AnalysisSet] = make_default(AnalysisSet, name="Analyses")
-    """What is computed and written along the run."""
+    """Analyses that are computed and written along the run."""
     controller_set: LegacyUnnamed[ControllerSet] = make_default(ControllerSet, name="Controllers")
     """Controllers that are added to those of the model."""
     external_loads_file: LegacyInputLoads = ""
@@ -144,4 +144,4 @@ class ForwardTool(AbstractTool):
     # OpenSim does not interpolate: it takes the last row up to `initial_time` and gives it that
     # time.
     states_file: LegacyInputTable = ""
-    """Where the motion starts: the row at `initial_time`; without it the model's default state."""
+    """File of the initial state (row at `initial_time`); without it, the model's default state."""

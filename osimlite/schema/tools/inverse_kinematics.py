@@ -35,11 +35,11 @@ class InverseKinematicsToolBase(Tool, abstract=True):
     # OpenSim 4.6 never uses it: a constructor that delegates loses the number, and constraints are
     # always kept exactly (identical results for 0.001, 20 and infinity).
     constraint_weight: Annotated[float, real(domain=">= 0")] = float("inf")
-    """How much errors of the model's constraints count; infinite, the constraints are kept."""
+    """Weight of errors of the model's constraints; infinite, they are satisfied exactly."""
     # At this default OpenSim stops up to 0.14 degrees away from the best pose of a gait model; at
     # 1e-9 it is within about 1e-5 degrees.
     accuracy: Annotated[float, real(domain="> 0")] = 1e-5
-    """How exactly the best pose is found."""
+    """Accuracy of the best pose."""
     # The end of 2 s is OpenSim's default: without a range, longer trials are cut silently.
     time_range: Annotated[Reals, reals("s", least=2, most=2)] = (float("-inf"), 2.0)
     """First and last time; outside the data they are cut to the data."""
@@ -66,7 +66,7 @@ class InverseKinematicsTool(InverseKinematicsToolBase):
 
 
 class OrientationWeight(Object):
-    """How much the deviation of one sensor counts; the name is that of the sensor."""
+    """Weight of the deviation of the sensor with the same name."""
 
     weight: Number = 1.0
     """Beside those of the others."""
@@ -89,11 +89,11 @@ class IMUInverseKinematicsTool(InverseKinematicsToolBase):
     orientation_weights: Single[OrientationWeightSet] = make_default(
         OrientationWeightSet, name="orientation_weights"
     )
-    """How much each sensor counts."""
+    """Weights of the sensors."""
 
 
 class MarkerWeight(Object):
-    """How much the deviation of one marker counts; the name is that of the marker."""
+    """Weight of the deviation of the marker with the same name."""
 
     weight: Number = 1.0
     """Beside those of the others."""

@@ -22,12 +22,12 @@ Range = Annotated[Vec2, Value("double", "Vec2")]
 
 
 class PolynomialPathFitterBounds(Object):
-    """How far a coordinate is varied."""
+    """Range in which a coordinate is varied."""
 
     coordinate_path: Annotated[Named, Reference("model-path", "Coordinate")] = ""
     """Path of the coordinate."""
     bounds: Range = (-10.0, 10.0)
-    """Least and greatest deviation, in degrees or metres."""
+    """Smallest and largest deviation, in degrees or metres."""
 
 
 class PolynomialPathFitter(Object):
@@ -46,9 +46,9 @@ class PolynomialPathFitter(Object):
     moment_arm_threshold: Number = 0.001
     """Moment arm below which a coordinate does not count for a path, in metres."""
     moment_arm_tolerance: Annotated[float, real("m")] = 1e-4
-    """How well moment arms must be met."""
+    """Tolerance of moment arms."""
     path_length_tolerance: Annotated[float, real("m")] = 1e-4
-    """How well lengths must be met."""
+    """Tolerance of path lengths."""
     minimum_polynomial_order: Integer = 2
     """Least order that is tried."""
     maximum_polynomial_order: Integer = 6
@@ -59,13 +59,13 @@ class PolynomialPathFitter(Object):
         -10.0,
         10.0,
     )
-    """Least and greatest deviation of coordinates that have none of their own."""
+    """Smallest and largest deviation of coordinates without bounds of their own."""
     coordinate_sampling_bounds: Many[PolynomialPathFitterBounds] = make_empty_list()
     """Deviations of single coordinates."""
     num_samples_per_frame: Integer = 25
-    """How many variations there are of each row of the motion."""
+    """Number of variations of each row of the motion."""
     latin_hypercube_algorithm: Annotated[str, word("random", "ESEA")] = "random"
-    """How variations are spread."""
+    """Algorithm that spreads the variations."""
     include_moment_arm_functions: Flag = False
     """Whether polynomials of moment arms are written too."""
     include_lengthening_speed_function: Flag = False

@@ -30,7 +30,7 @@ class ModelProcessor(Object):
     filepath: Annotated[str, make_input_file("Model")] = ""
     """File of the model, found from the folder that OpenSim runs in."""
     operators: Many[ModelOperator] = make_empty_list()
-    """What is done, in this order."""
+    """Operators that are applied in this order."""
     model: Optional[Model] = None
     """The model itself, if it is in no file."""
 
@@ -48,7 +48,7 @@ class ModOpAddReserves(ModelOperator):
     optimal_force: Number = 1.0
     """Force or torque of each at full control."""
     bound: Annotated[float | None, maybe()] = None
-    """Greatest control, either way; left out, there is none."""
+    """Largest control in both directions; left out, there is none."""
     skip_coordinates_with_actuators: Flag = True
     """Whether coordinates that have an actuator already get none."""
     skip_residual_coordinates: Flag = False
@@ -97,21 +97,21 @@ class ModOpScaleActiveFiberForceCurveWidthDGF(ModelOperator):
     """Widens the active force-length curve of muscles of DeGroote and Fregly."""
 
     scale_factor: Number = 1.0
-    """What the width is multiplied by."""
+    """Factor of the width."""
 
 
 class ModOpScaleMaxIsometricForce(ModelOperator):
     """Makes muscles stronger."""
 
     scale_factor: Number = 1.0
-    """What their greatest forces are multiplied by."""
+    """Factor of their maximum isometric forces."""
 
 
 class ModOpTendonComplianceDynamicsModeDGF(ModelOperator):
     """Says how the tendons of muscles of DeGroote and Fregly are computed."""
 
     mode: Annotated[str, word("explicit", "implicit")] = "explicit"
-    """By a differential equation, or by one that is implicit."""
+    """Form of the differential equation: explicit or implicit."""
 
 
 class FunctionBasedPathSet(Set, tag="Set_FunctionBasedPath_"):
@@ -131,7 +131,7 @@ class TableProcessor(Object):
     filepath: InputTable = ""
     """File of the table, found from the folder of the document."""
     operators: Many[TableOperator] = make_empty_list()
-    """What is done, in this order."""
+    """Operators that are applied in this order."""
 
 
 class TabOpAppendCoupledCoordinateValues(TableOperator):

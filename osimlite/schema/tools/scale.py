@@ -84,7 +84,7 @@ class Measurement(Object):
     marker_pair_set: LegacyUnnamed[MarkerPairSet] = make_default(MarkerPairSet)
     """Pairs of markers whose distances are compared, measured to model."""
     body_scale_set: LegacyUnnamed[BodyScaleSet] = make_default(BodyScaleSet)
-    """What is scaled by the ratio."""
+    """Bodies and axes that are scaled by the ratio."""
 
 
 class MeasurementSet(Set):
@@ -108,24 +108,24 @@ class Scale(Object):
 
 
 class ScaleSet(Set):
-    """Scale factors given by hand."""
+    """Prescribed scale factors."""
 
     objects: LegacyMany[Scale] = make_empty_list()
     """The factors, body by body."""
 
 
 class ModelScaler(Object):
-    """Scales the bodies, by measurements or by hand."""
+    """Scales the bodies, by measurements or by prescribed factors."""
 
     apply: LegacyFlag = True
     """Whether the model is scaled."""
     # OpenSim compares the words with their case, and the tool fails with any other word.
     scaling_order: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
-    """What is scaled by, in turn: measurements, manualScale; both overwrite what was before."""
+    """Sources of scale factors in turn: measurements, manualScale; the last one wins."""
     measurement_set: LegacyUnnamed[MeasurementSet] = make_default(MeasurementSet)
     """Lengths that are taken from the data."""
     scale_set: LegacyUnnamed[ScaleSet] = make_default(ScaleSet)
-    """Factors given by hand."""
+    """Prescribed factors."""
     # OpenSim believes the units of the header: m for mm scales by 1000, silently.
     marker_file: LegacyInputMarkers = "Unassigned"
     """Measured markers of a standing subject (.trc)."""
@@ -151,7 +151,7 @@ class MarkerPlacer(Object):
     apply: LegacyFlag = True
     """Whether markers are moved."""
     ik_task_set: LegacyUnnamed[IKTaskSet] = make_default(IKTaskSet)
-    """What the pose is fitted to."""
+    """Tasks to which the pose is fitted."""
     marker_file: LegacyInputMarkers = "Unassigned"
     """Measured markers of a standing subject (.trc)."""
     coordinate_file: LegacyInputTable = ""
@@ -166,7 +166,7 @@ class MarkerPlacer(Object):
     output_marker_file: Annotated[str, make_output_file("MarkerSet", legacy=True)] = "Unassigned"
     """File for the moved markers."""
     max_marker_movement: Annotated[float, real("m", legacy=True)] = -1.0
-    """How far a marker may be moved, negative for any distance; the placer does not look at it."""
+    """Largest movement of a marker, negative for any distance; the placer ignores it."""
 
 
 class ScaleTool(Object):
@@ -180,7 +180,7 @@ class ScaleTool(Object):
     age: Annotated[float, real("years", legacy=True)] = -1.0
     """Age of the subject, for readers only."""
     notes: LegacyText = "Unassigned"
-    """On the subject, for readers only."""
+    """Notes on the subject, for readers only."""
     generic_model_maker: LegacyUnnamed[GenericModelMaker] = make_default(GenericModelMaker)
     """First step: the model is read."""
     model_scaler: LegacyUnnamed[ModelScaler] = make_default(ModelScaler)

@@ -13,7 +13,7 @@ class IMUPlacer(Object):
     model_file: InputModel = ""
     """The model, in the pose in which the subject stood."""
     base_imu_label: Annotated[str, Reference("column", "column", required=False)] = ""
-    """Label of the sensor that tells where the subject faces; left out, the data are not turned."""
+    """Label of the sensor that shows the heading; left out, the data are not rotated."""
     base_heading_axis: Annotated[str, word("", "x", "y", "z", "-x", "-y", "-z")] = ""
     """Axis of that sensor that points forwards."""
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
@@ -32,22 +32,22 @@ class ExperimentalSensor(Object):
 
 
 class APDMDataReaderSettings(Object):
-    """How files of APDM sensors are read."""
+    """Settings for reading files of APDM sensors."""
 
     ExperimentalSensors: Many[ExperimentalSensor] = make_empty_list()
     """The sensors."""
 
 
 class XsensDataReaderSettings(Object):
-    """How files of Xsens sensors are read."""
+    """Settings for reading files of Xsens sensors."""
 
     data_folder: Annotated[str, Reference("input-folder", "folder", required=False)] = ""
     """Folder of the files."""
     trial_prefix: Text = ""
-    """What the names of the files begin with."""
+    """Beginning of the names of the files."""
     trial_extension: Text = ".txt"
-    """What the names of the files end with."""
+    """End of the names of the files."""
     sampling_rate: Annotated[float, real("Hz")] = 40.0
-    """How often the sensors measured, if the files do not say."""
+    """Sampling rate of the sensors, if the files do not state it."""
     ExperimentalSensors: Many[ExperimentalSensor] = make_empty_list()
     """The sensors."""

@@ -54,37 +54,37 @@ def _make_body_reference(*words: str, consequence: Consequence = "refused") -> R
 
 
 class TrackingTask(Object, abstract=True):
-    """Something that a controller is to follow."""
+    """Base class of quantities that a controller follows."""
 
     on: LegacyFlag = True
     """Whether the task counts."""
     weight: LegacyReals = (1.0, 1.0, 1.0)
-    """How much its accelerations count beside those of other tasks, one number for each component."""
+    """Weights of its accelerations relative to other tasks, one number for each component."""
 
 
 class StateTrackingTask(TrackingTask, abstract=True):
-    """A state that is to be followed."""
+    """Task to follow a state."""
 
 
 class MuscleStateTrackingTask(StateTrackingTask):
-    """A state of a muscle that is to be followed; the name is that of the muscle and its state."""
+    """Task to follow a state of a muscle; the name is that of the muscle and its state."""
 
 
 class CMC_Task(TrackingTask, abstract=True):
-    """A point, an orientation or a coordinate that is to be followed."""
+    """Task to follow a point, an orientation or a coordinate."""
 
     wrt_body: Annotated[Named, _make_body_reference("center_of_mass", "-1")] = ""
     """The body whose motion is followed; coordinates do not need it."""
     express_body: Annotated[Named, _make_body_reference("ground", "-1")] = ""
     """The body along whose axes the motion is given; coordinates do not need it."""
     active: Annotated[tuple[bool, ...], Value("bool", "list", legacy=True)] = (False, False, False)
-    """Which of the three components count; a coordinate has the first only."""
+    """Whether each of the three components counts; a coordinate has the first only."""
     kp: LegacyReals = (1.0, 1.0, 1.0)
     """Acceleration per deviation of position."""
     kv: LegacyReals = (0.5, 0.5, 0.5)
     """Acceleration per deviation of speed; critical damping is at twice the root of `kp`."""
     ka: LegacyReals = (1.0, 1.0, 1.0)
-    """Share of the measured acceleration that is asked for."""
+    """Factor of the desired acceleration."""
     r0: _Direction = (0.0, 0.0, 0.0)
     """Direction of the first component; coordinates do not need it."""
     r1: _Direction = (0.0, 0.0, 0.0)
@@ -94,7 +94,7 @@ class CMC_Task(TrackingTask, abstract=True):
 
 
 class CMC_Joint(CMC_Task):
-    """A coordinate that is to be followed."""
+    """Task to follow a coordinate."""
 
     wrt_body: Annotated[Named, _make_body_reference(consequence="ignored")] = ""
     express_body: Annotated[Named, _make_body_reference(consequence="ignored")] = ""
@@ -105,21 +105,21 @@ class CMC_Joint(CMC_Task):
 
 
 class CMC_Point(CMC_Task):
-    """A point of a body that is to be followed."""
+    """Task to follow a point of a body."""
 
     point: _Direction = (0.0, 0.0, 0.0)
-    """Where the point is in its body."""
+    """Position of the point in its body."""
 
 
 class SMC_Joint(CMC_Joint):
-    """A coordinate that is to be followed by sliding mode control."""
+    """Task to follow a coordinate by sliding mode control."""
 
     surface_error_boundary: LegacyNumber = 100.0
     """Thickness of the layer around the sliding surface."""
 
 
 class CMC_TaskSet(Set):
-    """What RRA and CMC follow."""
+    """Tasks that RRA and CMC follow."""
 
     objects: LegacyMany[TrackingTask] = make_empty_list()
     """The tasks."""
@@ -138,7 +138,7 @@ class CMCTool(AbstractTool):
     desired_kinematics_file: LegacyInputMotion = ""
     """The measured motion."""
     task_set_file: _TaskSetFile = ""
-    """What is followed, and how closely."""
+    """File of the tasks to follow, with their gains and weights."""
     constraints_file: _ControlSetFile = ""
     """Bounds of the controls over time."""
     rra_controls_file: _ControlSetFile = ""
@@ -146,7 +146,7 @@ class CMCTool(AbstractTool):
     lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the motion; negative for no filter."""
     cmc_time_window: Annotated[float, real("s", "> 0", legacy=True)] = 0.01
-    """Time that muscles are given to come to the force that is asked for."""
+    """Time in which muscles reach the requested force."""
     use_fast_optimization_target: LegacyFlag = True
     """Whether accelerations must be met exactly; it is faster, and fails where they cannot be."""
     optimizer_algorithm: _Optimizer = "ipopt"
@@ -154,11 +154,11 @@ class CMCTool(AbstractTool):
     numerical_derivative_step_size: LegacyNumber = 1e-4
     """Step of the optimizer's numerical derivatives."""
     optimization_convergence_tolerance: LegacyNumber = 1e-4
-    """How far the optimizer goes."""
+    """Convergence tolerance of the optimizer."""
     optimizer_max_iterations: Annotated[int, Value("int", domain="> 0", legacy=True)] = 1000
-    """How many iterations the optimizer may take."""
+    """Largest number of iterations of the optimizer."""
     optimizer_print_level: LegacyInteger = 0
-    """How much the optimizer prints, from 0 to 3."""
+    """Amount of output of the optimizer, from 0 to 3."""
     use_verbose_printing: LegacyFlag = False
     """Whether the tool prints what it does."""
 
@@ -171,7 +171,7 @@ class RRATool(AbstractTool):
     desired_kinematics_file: LegacyInputMotion = ""
     """The measured motion."""
     task_set_file: _TaskSetFile = ""
-    """What is followed, and how closely."""
+    """File of the tasks to follow, with their gains and weights."""
     constraints_file: _ControlSetFile = ""
     """Bounds of the controls over time."""
     lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
@@ -181,7 +181,7 @@ class RRATool(AbstractTool):
     numerical_derivative_step_size: LegacyNumber = 1e-4
     """Step of the optimizer's numerical derivatives."""
     optimization_convergence_tolerance: LegacyNumber = 1e-5
-    """How far the optimizer goes."""
+    """Convergence tolerance of the optimizer."""
     adjust_com_to_reduce_residuals: LegacyFlag = False
     """Whether a center of mass is moved, and the model written with it."""
     initial_time_for_com_adjustment: LegacyNumber = -1.0
