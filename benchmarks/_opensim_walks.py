@@ -1,7 +1,11 @@
-"""Walks by OpenSim itself: foot strikes from its own contact forces, judged by the rules of `osimlite.studies.gait`.
+"""Walks that OpenSim simulates, evaluated by the rules of `osimlite.studies.gait`.
 
-``python benchmarks/_opensim_walks.py FILE SECONDS ACCURACY`` makes one and prints it as JSON, which
-is how several walk at a time.
+OpenSim integrates the model and reports its contact forces. A foot strike is a change of a contact
+force from zero; the rules of osimlite decide which strikes are steps, which are scuffs, and whether
+the walker has fallen.
+
+``python benchmarks/_opensim_walks.py FILE SECONDS ACCURACY`` simulates one walk and prints it as
+JSON. `simulate_opensim_walks` starts one such process for each walk, so that they run in parallel.
 """
 
 from __future__ import annotations
@@ -29,131 +33,186 @@ from osimlite.studies.gait.steps import (
 )
 
 
-class Order(NamedTuple):
-    """What OpenSim is to do: model file, how long (s), accuracy of its integrator."""
+class WalkRequest(NamedTuple):
+    """Simulation that OpenSim is to run.
+
+    Attributes:
+        path: model file.
+        to: final time (s).
+        accuracy: accuracy of OpenSim's integrator.
+    """
 
     path: Path
     to: float
     accuracy: float
 
 
-def opensim_walks(orders: Mapping[str, Order]) -> dict[str, tuple[WalkerSteps, float]]:
-    """What OpenSim makes of each order, and the processor time (s) that it took; all at a time, each in its process."""
+def simulate_opensim_walks(
+    requests: Mapping[str, WalkRequest],
+) -> dict[str, tuple[WalkerSteps, float]]:
+    """Simulate walks with OpenSim in parallel, each in a process of its own.
+
+    Args:
+        requests: simulations by name.
+
+    Returns:
+        The steps of each walk and the processor time of its integration (s), by name.
+
+    Raises:
+        RuntimeError: the process of a walk failed.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        running = {
+        processes = {
             name: subprocess.Popen(
-                [sys.executable, "-W", "ignore", __file__, *(str(each) for each in order)],
-                cwd=folder, stdout=subprocess.PIPE, text=True,
+                [sys.executable, "-W", "ignore", __file__, *map(str, request)],
+                # OpenSim may write a log file into the working folder.
+                cwd=folder,
+                stdout=subprocess.PIPE,
+                text=True,
             )
-            for name, order in orders.items()
-        }  # fmt: skip
+            for name, request in requests.items()
+        }
         try:
-            printed = {name: process.communicate()[0] for name, process in running.items()}
+            outputs = {name: process.communicate()[0] for name, process in processes.items()}
         finally:
-            for process in running.values():
+            for process in processes.values():
                 process.kill()
                 process.wait()
-    for name, process in running.items():
+    for name, process in processes.items():
         if process.returncode:
-            raise RuntimeError(
-                f"OpenSim did not walk with '{name}': it ended with {process.returncode}"
-            )
-    return {name: _from_json(text) for name, text in printed.items()}
+            raise RuntimeError(f"OpenSim did not simulate '{name}': exit code {process.returncode}")
+    return {name: _walk_from_json(text) for name, text in outputs.items()}
 
 
-def opensim_walk(path: Path, to: float, accuracy: float) -> tuple[WalkerSteps, float]:
-    """What OpenSim makes of a file, and the processor time that it took (s).
+def simulate_opensim_walk(path: Path, to: float, accuracy: float) -> tuple[WalkerSteps, float]:
+    """Simulate one walk with OpenSim in this process.
 
-    A touch-down is known to a step of its integrator; where the feet are then is computed from its
-    states.
+    The time of a touch-down is known to one step of OpenSim's integrator. The positions of the feet
+    at that time are computed by osimlite from OpenSim's states.
+
+    Args:
+        path: model file.
+        to: final time (s).
+        accuracy: accuracy of OpenSim's integrator.
+
+    Returns:
+        The steps of the walk, and the processor time of loading and integration (s).
     """
     import opensim
 
     opensim.Logger.setLevelString("off")
     opensim.Logger.removeFileSink()
-    began = time.process_time()
-    theirs = opensim.Model(str(path))
-    reporter = opensim.ForceReporter(theirs)
-    theirs.addAnalysis(reporter)
-    state = theirs.initSystem()
-    manager = opensim.Manager(theirs)
+    start = time.process_time()
+    model = opensim.Model(str(path))
+    reporter = opensim.ForceReporter(model)
+    model.addAnalysis(reporter)
+    state = model.initSystem()
+    manager = opensim.Manager(model)
     manager.setIntegratorAccuracy(accuracy)
     manager.initialize(state)
     manager.integrate(to)
-    taken = time.process_time() - began
-    names = theirs.getStateVariableNames()
-    states = _States(manager.getStateStorage(), [names.get(k) for k in range(names.getSize())])
+    processor_time = time.process_time() - start
+    names = model.getStateVariableNames()
+    paths = [names.get(k) for k in range(names.getSize())]
+    states = _StateHistory(manager.getStateStorage(), paths)
     with Simulation(osimlite.read(path), "compiled") as simulation:
-        return _read_off(simulation.engine, reporter.getForceStorage(), states), taken
+        walk = _evaluate_walk(simulation.engine, reporter.getForceStorage(), states)
+    return walk, processor_time
 
 
-class _States(NamedTuple):
-    """OpenSim's states at its steps, and the paths of what is in them.
+class _StateHistory(NamedTuple):
+    """States of OpenSim at the steps of its integrator.
 
-    OpenSim makes a table of them too, but copies all of it for each row that is added.
+    OpenSim also offers a table of them, but copies all of it for each row that is added.
+
+    Attributes:
+        storage: OpenSim's ``Storage`` of states.
+        paths: paths of the state variables, in the order of a row.
     """
 
     storage: Any
     paths: list[str]
 
-    def at(self, row: int, paths: list[str]) -> list[float]:
+    def get_values(self, row: int, paths: list[str]) -> list[float]:
+        """Return the values of some state variables at one step of the integrator."""
         values = self.storage.getStateVector(row).getData()
         return [values.get(self.paths.index(path)) for path in paths]
 
 
-def _read_off(engine: Any, forces: Any, states: _States) -> WalkerSteps:
-    labels = forces.getColumnLabels()
-    columns = [labels.get(k) for k in range(labels.getSize())]
-    times = _column(forces, "time")
-    touching = []
-    for contact in engine.contacts:
-        own = [label for label in columns if label.startswith(f"{contact}.") and ".force." in label]
-        touching.append(np.any([_column(forces, label) != 0.0 for label in own], axis=0))
-    changes = [
-        (k, contact, bool(pushes[k]))
-        for contact, pushes in zip(engine.contacts, touching, strict=True)
-        for k in (np.flatnonzero(np.diff(pushes)) + 1).tolist()
+def _evaluate_walk(engine: Any, forces: Any, states: _StateHistory) -> WalkerSteps:
+    """Find the steps of a walk in the contact forces that OpenSim has reported."""
+    times = _read_column(forces, "time")
+    touching = _find_contact_times(engine, forces)
+    # Each event is a row of the reports, a contact, and whether the contact begins there.
+    events = [
+        (k, contact, bool(is_touching[k]))
+        for contact, is_touching in zip(engine.contacts, touching, strict=True)
+        for k in (np.flatnonzero(np.diff(is_touching)) + 1).tolist()
     ]
-    changes.sort(key=lambda change: change[0])
-    paths = [engine.mechanism.coordinates[place].path for place in engine.order]
-    order = [f"{path}/{kind}" for kind in ("value", "speed") for path in paths]
-    moments = np.array([states.at(k, order) for k, _, _ in changes])
+    events.sort(key=lambda event: event[0])
+    coordinates = [engine.mechanism.coordinates[index].path for index in engine.order]
+    # The engine's state has all values, then all speeds.
+    variables = [f"{path}/{part}" for part in ("value", "speed") for path in coordinates]
+    event_states = np.array([states.get_values(k, variables) for k, _, _ in events])
     walk = follow_events(
         find_footing(engine),
         engine.contacts,
-        [(float(times[k]), contact, begins) for k, contact, begins in changes],
-        moments,
-        measure_along_slope(engine, moments)[0],
-        np.array([pushes[0] for pushes in touching]),
+        [(float(times[k]), contact, begins) for k, contact, begins in events],
+        event_states,
+        measure_along_slope(engine, event_states)[0],
+        np.array([is_touching[0] for is_touching in touching]),
     )
     if walk.walks:
         walk.end = float(times[-1])
     return walk
 
 
-def _column(storage: Any, label: str) -> Any:
+def _find_contact_times(engine: Any, forces: Any) -> list[np.ndarray]:
+    """Return, for each contact of the engine, at which rows of the reports its force is not zero."""
+    labels = forces.getColumnLabels()
+    columns = [labels.get(k) for k in range(labels.getSize())]
+    touching = []
+    for contact in engine.contacts:
+        components = [
+            label for label in columns if label.startswith(f"{contact}.") and ".force." in label
+        ]
+        values = [_read_column(forces, label) != 0.0 for label in components]
+        touching.append(np.any(values, axis=0))
+    return touching
+
+
+def _read_column(storage: Any, label: str) -> Any:
+    """Return a column of an OpenSim ``Storage`` as array; the label ``time`` gives the times."""
     import opensim
 
-    found = opensim.ArrayDouble()
+    values = opensim.ArrayDouble()
     if label == "time":
-        storage.getTimeColumn(found)
+        storage.getTimeColumn(values)
     else:
-        storage.getDataColumn(label, found)
-    return np.array([found.get(k) for k in range(found.getSize())])
+        storage.getDataColumn(label, values)
+    return np.array([values.get(k) for k in range(values.getSize())])
 
 
-def _to_json(walk: WalkerSteps, taken: float) -> str:
-    """A walk without the states at its steps."""
-    return json.dumps([{**vars(walk), "steps": [step[:4] for step in walk.steps]}, taken])
+def _walk_to_json(walk: WalkerSteps, processor_time: float) -> str:
+    """Return a walk and its processor time (s) as JSON, without the states at the steps."""
+    # The state is the fifth and last field of a step; comparisons do not need it.
+    content = {**vars(walk), "steps": [step[:4] for step in walk.steps]}
+    return json.dumps([content, processor_time])
 
 
-def _from_json(text: str) -> tuple[WalkerSteps, float]:
-    found, taken = json.loads(text)
-    found["steps"] = [GaitStep._make([*step, np.empty(0)]) for step in found["steps"]]
-    found["scuffs"] = [Scuff._make(scuff) for scuff in found["scuffs"]]
-    return WalkerSteps(**found), taken
+def _walk_from_json(text: str) -> tuple[WalkerSteps, float]:
+    """Return the walk and the processor time (s) that `_walk_to_json` has written."""
+    content, processor_time = json.loads(text)
+    content["steps"] = [GaitStep._make([*step, np.empty(0)]) for step in content["steps"]]
+    content["scuffs"] = [Scuff._make(scuff) for scuff in content["scuffs"]]
+    return WalkerSteps(**content), processor_time
+
+
+def main() -> None:
+    """Simulate the walk that the command line describes, and print it."""
+    path, to, accuracy = sys.argv[1:]
+    print(_walk_to_json(*simulate_opensim_walk(Path(path), float(to), float(accuracy))))
 
 
 if __name__ == "__main__":
-    file, seconds, finest = sys.argv[1:]
-    print(_to_json(*opensim_walk(Path(file), float(seconds), float(finest))))
+    main()

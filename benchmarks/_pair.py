@@ -1,11 +1,12 @@
-"""Fair timing of osimlite against OpenSim: the two run in turn (A B A B ...) and meet the same machine.
+"""Fair timing of osimlite against OpenSim: both programs run in turn (A B A B ...).
 
-A ratio is taken inside each pair and summarised after; a slow second of the machine spoils one
-pair, not the result. A benchmark script is then one screen::
+The ratio of times is computed within each pair of runs and summarised afterwards. A slow second of
+the machine then spoils one pair, not the result. A benchmark script needs one screen of code::
 
-    from _pair import pair, report
+    from _pair import print_pairs, time_pair
 
-    report("Simulation, 2 s", [pair("accuracy 1e-3", ours=run_ours, theirs=run_opensim, rounds=9)])
+    pair = time_pair("accuracy 1e-3", ours=run_ours, theirs=run_opensim, rounds=9)
+    print_pairs("Simulation, 2 s", [pair])
 """
 
 from __future__ import annotations
@@ -24,7 +25,13 @@ from rich.table import Table
 
 @dataclass(frozen=True)
 class Pair:
-    """Times of one comparison, both lists in seconds and in the order of the rounds."""
+    """Times of one comparison.
+
+    Attributes:
+        name: label of the comparison, the first cell of its row in a table.
+        ours: times of osimlite (s), one for each round.
+        theirs: times of OpenSim (s), in the same order.
+    """
 
     name: str
     ours: tuple[float, ...]
@@ -32,11 +39,11 @@ class Pair:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """Our time over OpenSim's, one per round; below 1 we are faster."""
+        """Time of osimlite divided by that of OpenSim, for each round; below 1 osimlite is faster."""
         return tuple(a / b for a, b in zip(self.ours, self.theirs, strict=True))
 
 
-def pair(
+def time_pair(
     name: str,
     *,
     ours: Callable[[], object],
@@ -48,28 +55,33 @@ def pair(
     """Time two callables in turn within this process.
 
     Args:
-        name: the row's name in the table.
-        ours: does the work with osimlite; what it returns is dropped.
+        name: label of the row in the table.
+        ours: does the work with osimlite; its result is ignored.
         theirs: does the same work with OpenSim.
         rounds: number of timed pairs, at least 1.
-        warmup: pairs run before the timed ones, their times dropped.
-        clock: seconds that only grow.
+        warmup: number of pairs that run before the timed ones; their times are ignored.
+        clock: returns seconds that never decrease.
+
+    Raises:
+        ValueError: there is no round, or a negative warm-up.
     """
     if rounds < 1 or warmup < 0:
         raise ValueError(
             f"a pair needs at least 1 round and no negative warm-up, not {rounds} and {warmup}"
         )
 
-    def timed(work: Callable[[], object]) -> float:
+    def measure_time(work: Callable[[], object]) -> float:
         start = clock()
         work()
         return clock() - start
 
-    times = [(timed(ours), timed(theirs)) for _ in range(warmup + rounds)][warmup:]
-    return Pair(name, tuple(a for a, _ in times), tuple(b for _, b in times))
+    # The first runs fill caches of files, code and memory, which later runs find filled.
+    times = [(measure_time(ours), measure_time(theirs)) for _ in range(warmup + rounds)]
+    counted = times[warmup:]
+    return Pair(name, tuple(a for a, _ in counted), tuple(b for _, b in counted))
 
 
-def pair_commands(
+def time_command_pair(
     name: str,
     *,
     ours: str | Sequence[str],
@@ -78,31 +90,43 @@ def pair_commands(
     warmup: int = 1,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Pair:
-    """Time two commands in turn, each a whole process from start to exit.
+    """Time two commands in turn, each as a process from its start to its exit.
 
-    A command is a list of arguments, or one line split as a shell would split it (no shell runs).
+    A command is a list of arguments, or one line, which is split as a shell does. No shell runs.
+
+    Args:
+        name: label of the row in the table.
+        ours: command that uses osimlite.
+        theirs: command that does the same work with OpenSim.
+        rounds: number of timed pairs, at least 1.
+        warmup: number of pairs that run before the timed ones.
+        clock: returns seconds that never decrease.
 
     Raises:
-        RuntimeError: a command failed; the message ends with what it wrote to standard error.
+        RuntimeError: a command failed; the message ends with its standard error.
     """
-    return pair(
+    return time_pair(
         name,
-        ours=lambda: _run(ours),
-        theirs=lambda: _run(theirs),
+        ours=lambda: run_command(ours),
+        theirs=lambda: run_command(theirs),
         rounds=rounds,
         warmup=warmup,
         clock=clock,
     )
 
 
-def _run(command: str | Sequence[str]) -> None:
+def run_command(command: str | Sequence[str]) -> None:
+    """Run a command in a process of its own, without input, and ignore its output.
+
+    Raises:
+        RuntimeError: the command failed; the message ends with its standard error.
+    """
     arguments = shlex.split(command) if isinstance(command, str) else list(command)
-    # With this variable Python compiles every module again in every process, which users do not
-    # have.
+    # With this variable Python compiles every module again in every process. Users do not set it.
     environment = {
         name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
     }
-    done = subprocess.run(
+    process = subprocess.run(
         arguments,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
@@ -110,36 +134,55 @@ def _run(command: str | Sequence[str]) -> None:
         env=environment,
         check=False,
     )
-    if done.returncode != 0:
-        said = done.stderr.decode(errors="replace").strip()
+    if process.returncode != 0:
+        message = process.stderr.decode(errors="replace").strip()
         raise RuntimeError(
-            f"{shlex.join(arguments)} ended with exit code {done.returncode}: {said}"
+            f"{shlex.join(arguments)} ended with exit code {process.returncode}: {message}"
         )
 
 
-def report(title: str, pairs: Iterable[Pair], *, console: Console | None = None) -> None:
-    """Print the table: least and median time of each side; median, least and greatest ratio per pair."""
+def print_pairs(title: str, pairs: Iterable[Pair], *, console: Console | None = None) -> None:
+    """Print a table of comparisons.
+
+    Each program has its least and its median time. The median, least and greatest ratio are those
+    of the pairs of runs.
+
+    Args:
+        title: title of the table.
+        pairs: rows of the table.
+        console: where to print; the terminal by default.
+    """
     table = Table(
-        title=title, caption="time in ms, least / median; ratio = ours / OpenSim, per pair"
+        title=title,
+        caption="times in ms, least / median; ratio = osimlite / OpenSim of each pair of runs",
     )
     table.add_column("")
-    for column in ("osimlite", "OpenSim", "ratio", "least", "greatest", "pairs"):
-        table.add_column(column, justify="right")
-    for row in pairs:
-        ratios = row.ratios
+    for heading in ("osimlite", "OpenSim", "ratio", "least", "greatest", "pairs"):
+        table.add_column(heading, justify="right")
+    for pair in pairs:
+        ratios = pair.ratios
+        # The median of the ratios is not the ratio of the medians: see the head of the module.
+        summary = (median(ratios), min(ratios), max(ratios))
         table.add_row(
-            row.name,
-            _milliseconds(row.ours),
-            _milliseconds(row.theirs),
-            *(_ratio(value) for value in (median(ratios), min(ratios), max(ratios))),
+            pair.name,
+            _format_milliseconds(pair.ours),
+            _format_milliseconds(pair.theirs),
+            *(_format_ratio(value) for value in summary),
             str(len(ratios)),
         )
     (console or Console()).print(table)
 
 
-def _ratio(value: float) -> str:
+def _format_ratio(value: float) -> str:
     return f"{value:.2f}" if value >= 0.1 else f"{value:.2g}"
 
 
-def _milliseconds(times: Sequence[float]) -> str:
+def _format_milliseconds(times: Sequence[float]) -> str:
     return f"{min(times) * 1e3:.4g} / {median(times) * 1e3:.4g}"
+
+
+# Other scripts still import these names.
+pair = time_pair
+pair_commands = time_command_pair
+report = print_pairs
+_run = run_command

@@ -6,7 +6,7 @@ import sys
 import pytest
 from rich.console import Console
 
-from benchmarks._pair import Pair, pair, pair_commands, report
+from benchmarks._pair import Pair, print_pairs, time_command_pair, time_pair
 
 
 class FakeClock:
@@ -30,7 +30,7 @@ class FakeClock:
 
 def test_runs_in_turn_drops_the_warm_up_and_divides_inside_each_pair():
     clock, log = FakeClock(), []
-    result = pair(
+    result = time_pair(
         "walk",
         ours=clock.work(log, "A", [9.0, 1.0, 2.0, 4.0]),
         theirs=clock.work(log, "B", [9.0, 2.0, 8.0, 2.0]),
@@ -45,13 +45,13 @@ def test_runs_in_turn_drops_the_warm_up_and_divides_inside_each_pair():
 
 def test_refuses_to_measure_nothing():
     with pytest.raises(ValueError, match="at least 1 round"):
-        pair("none", ours=lambda: None, theirs=lambda: None, rounds=0)
+        time_pair("none", ours=lambda: None, theirs=lambda: None, rounds=0)
 
 
 def test_the_table_says_time_in_milliseconds_and_the_median_of_ratios_not_the_ratio_of_medians():
     out = io.StringIO()
     # Medians are 2 ms and 2 ms (their ratio would be 1); the median of the ratios is 0.5.
-    report(
+    print_pairs(
         "Title",
         [Pair("walk", ours=(0.001, 0.002, 0.004), theirs=(0.002, 0.008, 0.002))],
         console=Console(file=out, width=100, color_system=None),
@@ -68,7 +68,7 @@ def test_commands_are_whole_processes_run_in_turn(tmp_path):
     def writes(letter):
         return [sys.executable, "-S", "-c", f"open({str(log)!r}, 'a').write({letter!r})"]
 
-    result = pair_commands("process", ours=writes("A"), theirs=writes("B"), rounds=2, warmup=1)
+    result = time_command_pair("process", ours=writes("A"), theirs=writes("B"), rounds=2, warmup=1)
     assert log.read_text() == "ABABAB"
     assert len(result.ours) == len(result.theirs) == 2
     assert min(result.ours + result.theirs) > 0
@@ -77,11 +77,11 @@ def test_commands_are_whole_processes_run_in_turn(tmp_path):
 def test_a_command_line_is_split_as_a_shell_would(tmp_path):
     target = tmp_path / "with space"
     line = f"{sys.executable} -S -c \"open('{target}', 'w').write('x')\""
-    pair_commands("line", ours=line, theirs=line, rounds=1, warmup=0)
+    time_command_pair("line", ours=line, theirs=line, rounds=1, warmup=0)
     assert target.read_text() == "x"
 
 
 def test_a_failing_command_is_told_with_its_own_words():
     fails = [sys.executable, "-S", "-c", "raise SystemExit('no such model')"]
     with pytest.raises(RuntimeError, match="exit code 1: no such model"):
-        pair_commands("fails", ours=fails, theirs=fails)
+        time_command_pair("fails", ours=fails, theirs=fails)

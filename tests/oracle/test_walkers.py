@@ -15,7 +15,7 @@ import osimlite
 from osimlite.simulation import Simulation
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-from benchmarks._opensim_walks import Order, opensim_walks
+from benchmarks._opensim_walks import WalkRequest, simulate_opensim_walks
 from osimlite.studies.gait.steps import walk_many
 from tests.suite import choose
 
@@ -31,16 +31,16 @@ ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8
 @pytest.fixture(scope="module")
 def walks(fixtures):
     """By name, OpenSim's walk and ours, from the same file."""
-    orders = {
-        name: Order(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy)
+    requests = {
+        name: WalkRequest(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy)
         for name, accuracy in ACCURACY.items()
     }
-    theirs = opensim_walks(orders)
+    theirs = simulate_opensim_walks(requests)
     result = {}
-    for name, order in orders.items():
-        with Simulation(osimlite.read(order.path), "compiled") as simulation:
+    for name, request in requests.items():
+        with Simulation(osimlite.read(request.path), "compiled") as simulation:
             start = simulation.initial_state({}, {})
-            (ours,) = walk_many(simulation.engine, [start], order.to, accuracy=order.accuracy)
+            (ours,) = walk_many(simulation.engine, [start], request.to, accuracy=request.accuracy)
         result[name] = theirs[name][0], ours
     return result
 
