@@ -1,9 +1,13 @@
-"""What a piece of work takes, in numbers that no machine changes: calls of Python functions, modules, bytes.
+"""Count the Python calls, modules and bytes that an action needs, which no machine changes.
 
-This runs in a Python that has just begun, and imports next to nothing: what it loads, the work need
-not load any more.
+cost.py starts this script once for each command, in a new Python process. The script imports almost
+nothing: a module that it has loaded would be missing in the count of the action.
 
-    python -S _counted.py RESULT PATH PACKAGE [WORD ...]    a command, or without WORDs the calls of cost.py
+    python -S _counted.py RESULT PATH PACKAGE [WORD ...]
+
+RESULT is the JSON file to write, PATH the import path, and PACKAGE the folder of osimlite. With
+WORDs the action is the command ``osimlite WORD ...``. Without, all library calls of cost.py are
+counted one after the other.
 """
 
 from __future__ import annotations
@@ -12,116 +16,158 @@ import os
 import sys
 from _lsprof import Profiler
 
+# The module `typing` is not imported: it would be missing in the count of the action.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-INLINED = frozenset(("<listcomp>", "<dictcomp>", "<setcomp>"))
-"""Calls of Python 3.11 alone: later ones inline comprehensions."""
-IMPORTING = ("<frozen importlib", "<frozen zipimport")
-"""What finds a module asks every folder of the path, which are more on one machine than on another."""
+COMPREHENSIONS = frozenset(("<listcomp>", "<dictcomp>", "<setcomp>"))
+"""Names of frames that do not count: only Python 3.11 calls comprehensions, later ones inline them."""
+
+IMPORT_MACHINERY = ("<frozen importlib", "<frozen zipimport")
+"""Beginnings of file names that do not count.
+
+To find a module, Python asks every folder of the import path, whose number depends on the machine.
+"""
+
+WRITE_FLAGS = 3
+"""Bits of the flags of an opened file that say it is written (``O_WRONLY | O_RDWR``)."""
+
+GENERATED_SUFFIXES = (".py", ".pyc", ".code")
+"""Files that are not data: byte code is counted by module, and machine code depends on the processor."""
 
 
-class Opened:
-    """The files that are opened to be read while this is on."""
+class OpenedFiles:
+    """Record of the files that are opened for reading while `recording` is true.
+
+    Attributes:
+        recording: whether opened files are recorded.
+        names: names of the files, in the order of opening.
+    """
 
     def __init__(self) -> None:
-        self.on = False
+        self.recording = False
         self.names: list[str] = []
         sys.addaudithook(self)
 
-    def __call__(self, event: str, given: tuple[Any, ...]) -> None:
-        """Take note, as Python's audit hook."""
-        if not self.on or event != "open" or not isinstance(given[0], str):
+    def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
+        """Record a file; Python calls this audit hook at every event."""
+        if not self.recording or event != "open" or not isinstance(arguments[0], str):
             return
-        name, mode, flags = given
-        # Of the flags, 1 and 2 are about writing. What `open` has an opener of ours open is told
-        # twice.
-        if not (flags or 0) & 3 and not (mode is None and self.names[-1:] == [name]):
-            self.names.append(name)
+        name, mode, flags = arguments
+        if (flags or 0) & WRITE_FLAGS:
+            return
+        # `open` with an opener causes two events: its own, and one without mode by `os.open`.
+        if mode is None and self.names[-1:] == [name]:
+            return
+        self.names.append(name)
 
 
-class Counter:
-    """Counts work, one piece after the other.
+class WorkCounter:
+    """Counter of the work of actions, one after the other.
 
-    Args: package: the folder of the package whose own functions, modules and files are told from
-        those of others.
+    Args:
+        package: folder of the package whose functions, modules and files are counted separately from
+            those of libraries.
     """
 
     def __init__(self, package: str) -> None:
         self.package = package + "/"
-        self.opened = Opened()
+        self.opened = OpenedFiles()
 
     def count(self, work: Callable[[], object]) -> dict[str, dict[str, int]]:
-        """Do the work, and say what it took."""
-        before, profiler = set(sys.modules), Profiler(subcalls=False, builtins=False)
+        """Do the work and count it.
+
+        Returns:
+            For each kind of cost (the keys of ``KINDS`` in cost.py) the counts by function, module,
+            file or library.
+        """
+        modules_before = set(sys.modules)
+        profiler = Profiler(subcalls=False, builtins=False)
         self.opened.names = []
-        self.opened.on = True
+        self.opened.recording = True
         profiler.enable()
         try:
             work()
         finally:
             profiler.disable()
-            self.opened.on = False
-        return self._told(profiler.getstats(), [name for name in sys.modules if name not in before])
-
-    def _told(self, entries: list[Any], modules: list[str]) -> dict[str, dict[str, int]]:
-        own: dict[str, int] = {}
-        libraries: dict[str, int] = {}
-        for entry in entries:
-            code = entry.code
-            if isinstance(code, str) or code.co_name in INLINED or code.co_filename == __file__:
-                continue
-            file = code.co_filename.replace("\\", "/")
-            if file.startswith(IMPORTING):
-                continue
-            ours = file.startswith(self.package)
-            name = (
-                f"{file.removeprefix(self.package)}: {code.co_qualname}" if ours else _library(file)
-            )
-            counts = own if ours else libraries
-            counts[name] = counts.get(name, 0) + entry.callcount + entry.reccallcount
-        loaded = sorted(name for name in modules if _top(name) == "osimlite")
-        others: dict[str, int] = {}
-        for name in modules:
-            if name not in loaded:
-                top = "python" if _top(name) in sys.stdlib_module_names else _top(name)
-                others[top] = others.get(top, 0) + 1
+            self.opened.recording = False
+        new_modules = [name for name in sys.modules if name not in modules_before]
+        package_calls, library_calls = self._count_calls(profiler.getstats())
+        package_modules = sorted(
+            name for name in new_modules if _get_top_package(name) == "osimlite"
+        )
         return {
-            "calls": own,
-            "modules": dict.fromkeys(loaded, 1),
-            "data": self._data(),
-            "code": {name: _size_of_code(name) for name in loaded},
-            "library calls": libraries,
-            "library modules": others,
+            "calls": package_calls,
+            "modules": dict.fromkeys(package_modules, 1),
+            "data": self._measure_data(),
+            "code": {name: _measure_byte_code(name) for name in package_modules},
+            "library calls": library_calls,
+            "library modules": _count_library_modules(new_modules),
         }
 
-    def _data(self) -> dict[str, int]:
-        """Bytes of what was read in the working folder and in that of the package, by file."""
-        here = os.getcwd().replace("\\", "/") + "/"
-        found: dict[str, int] = {}
+    def _count_calls(self, entries: list[Any]) -> tuple[dict[str, int], dict[str, int]]:
+        """Return the calls of the package by function, and those of libraries by library."""
+        package_calls: dict[str, int] = {}
+        library_calls: dict[str, int] = {}
+        for entry in entries:
+            code = entry.code
+            if isinstance(code, str):
+                # A function of C.
+                continue
+            if code.co_name in COMPREHENSIONS or code.co_filename == __file__:
+                continue
+            file = code.co_filename.replace("\\", "/")
+            if file.startswith(IMPORT_MACHINERY):
+                continue
+            if file.startswith(self.package):
+                name = f"{file.removeprefix(self.package)}: {code.co_qualname}"
+                counts = package_calls
+            else:
+                name = _find_library(file)
+                counts = library_calls
+            # The profiler counts recursive calls separately.
+            counts[name] = counts.get(name, 0) + entry.callcount + entry.reccallcount
+        return package_calls, library_calls
+
+    def _measure_data(self) -> dict[str, int]:
+        """Return the bytes that were read in the working folder and in the package, by file."""
+        working_folder = os.getcwd().replace("\\", "/") + "/"
+        sizes: dict[str, int] = {}
         for name in self.opened.names:
             file = os.path.abspath(name).replace("\\", "/")
-            # Byte code is counted by the module; machine code is another for each processor.
-            if file.startswith((self.package, here)) and not file.endswith(
-                (".py", ".pyc", ".code")
-            ):
-                told = file.removeprefix(self.package).removeprefix(here)
-                found[told] = found.get(told, 0) + (
-                    os.path.getsize(file) if os.path.exists(file) else 0
-                )
-        return found
+            if not file.startswith((self.package, working_folder)):
+                continue
+            if file.endswith(GENERATED_SUFFIXES):
+                continue
+            label = file.removeprefix(self.package).removeprefix(working_folder)
+            size = os.path.getsize(file) if os.path.exists(file) else 0
+            sizes[label] = sizes.get(label, 0) + size
+        return sizes
 
 
-def _top(module: str) -> str:
+def _count_library_modules(modules: list[str]) -> dict[str, int]:
+    """Return how many modules of each library are among these; those of Python are one library."""
+    counts: dict[str, int] = {}
+    for module in modules:
+        library = _get_top_package(module)
+        if library == "osimlite":
+            continue
+        if library in sys.stdlib_module_names:
+            library = "python"
+        counts[library] = counts.get(library, 0) + 1
+    return counts
+
+
+def _get_top_package(module: str) -> str:
     return module.partition(".")[0]
 
 
-def _library(file: str) -> str:
-    """The package that a file is of: the first folder in site-packages, or Python itself."""
+def _find_library(file: str) -> str:
+    """Return the library of a source file: its folder in site-packages, or ``python``."""
     if file.startswith("<"):
-        # Made by a program: named tuples, dataclasses, attrs.
+        # Named tuples, dataclasses and attrs compile source text without a file.
         return "python"
     for word in ("/site-packages/", "/dist-packages/"):
         if word in file:
@@ -129,46 +175,45 @@ def _library(file: str) -> str:
     return "python"
 
 
-def _size_of_code(module: str) -> int:
-    """Bytes of a module's byte code, without the path of its file, which it holds once."""
+def _measure_byte_code(module: str) -> int:
+    """Return the size of the byte code of a module (bytes), 0 where there is none."""
     spec = sys.modules[module].__spec__
-    if (
-        spec is None
-        or spec.cached is None
-        or spec.origin is None
-        or not os.path.exists(spec.cached)
-    ):
+    if spec is None or spec.cached is None or spec.origin is None:
         return 0
+    if not os.path.exists(spec.cached):
+        return 0
+    # Byte code contains the path of its source once, whose length depends on the machine.
     return os.path.getsize(spec.cached) - len(os.fsencode(spec.origin))
 
 
 def main() -> None:
-    """Count, and write the result to a file."""
+    """Count what the command line asks for, and write the counts to a file."""
     import gc
 
     result, path, package, *words = sys.argv[1:]
     sys.path[:] = path.split(os.pathsep)
-    # When the collector comes, and what that calls, depends on all that went before.
+    # When the garbage collector runs, and what it calls, depends on everything that ran before.
     gc.disable()
-    counter = Counter(package)
+    counter = WorkCounter(package)
     if words:
 
-        def command() -> None:
+        def run_command() -> None:
             from osimlite.cli import main
 
             try:
                 main(words)
             except SystemExit as end:
-                # 1 is an answer, too.
+                # With exit code 1 a command has worked and found something.
                 if end.code not in (None, 0, 1):
                     raise
 
-        counts = {"": counter.count(command)}
+        counts = {"": counter.count(run_command)}
     else:
-        from cost import calls
+        from cost import make_library_calls
 
         counts = {}
-        for name, work in calls():
+        for name, work in make_library_calls():
+            # The second call is counted: the first one fills caches and imports modules.
             work()
             counts[name] = counter.count(work)
     import json
