@@ -256,7 +256,7 @@ def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
 
 
 _DATACLASS_ATTRIBUTES = ("__dataclass_fields__", "__dataclass_params__")
-"""What `dataclasses`, `pprint` and pytest read from the class of a dataclass."""
+"""Attributes that `dataclasses`, `pprint` and pytest read from the class of a dataclass."""
 
 
 class _DataclassAttribute:

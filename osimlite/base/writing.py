@@ -223,7 +223,7 @@ def open_to_append(path: Path) -> BinaryIO:
 
 
 def expect_folder_inside(folder: Path) -> None:
-    """Refuse a folder that the program chose in the current folder and that is a link out of it.
+    """Raise an error if a folder whose name the program chose is a link out of the current folder.
 
     Raises:
         OsimliteError: it is such a link.
@@ -439,7 +439,7 @@ def _open_special(target: Path) -> Iterator[BinaryIO]:
 
 
 def _copy_attributes(name: str, target: Path, target_stat: os.stat_result) -> bool:
-    """Copy owner, mode and extended attributes to a new file; return whether all could be copied.
+    """Copy owner, mode and extended attributes to a new file.
 
     Returns:
         Whether all could be copied; no file with several hard links counts as copied.

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from osimlite.tools.outcome import Outcome
 
 WORTH_SHARING = 4
-"""Of fewer setups, processes of their own take longer to begin than they save."""
+"""Number of setups from which on several processes are worth their start."""
 MOST_WARNINGS = 3
-"""Of a setup that is run alone, so many are shown beside what is misspelt."""
+"""Number of warnings that are shown of a single setup, besides those with a suggestion."""
 MOST_ROWS = 40
-"""Of more setups those are shown that failed, or whose markers are farthest off."""
+"""Largest number of setups in the table; of more, the worst are shown."""
 
 
 @command

@@ -1,4 +1,4 @@
-"""How nimblephysics reads the joints of a model, which AddBiomechanics and SKEL build on.
+"""Joints of a model as nimblephysics reads them; AddBiomechanics and SKEL are based on it.
 
 Nimble's reader replaces a CustomJoint by a simpler joint where the functions allow it, and ignores
 slopes, offsets and constants then. It leaves out the patellae, and reads only the largest tree of

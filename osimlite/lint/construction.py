@@ -104,7 +104,7 @@ _memory: OrderedDict[str, list[Obstacle]] = OrderedDict()
 
 
 def forget_obstacles() -> None:
-    """Forget the obstacles of all models, so that the next look at a model builds it again."""
+    """Remove the obstacles of all models from memory, so that the next check builds a model again."""
     _memory.clear()
 
 

@@ -33,7 +33,7 @@ class Joint(ModelComponent, abstract=True):
     class; None if the joint's own properties decide. The shifts come first.
     """
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
-    """The motion of each coordinate by `moves`."""
+    """Motion type of each coordinate, from `moves`."""
     speeds_are_rates: ClassVar[bool] = True
     """Whether its speeds are the rates of its coordinates; otherwise those of its rotations are an angular velocity."""
 

@@ -97,7 +97,7 @@ def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
         names: names of columns.
 
     Returns:
-        For each name, the name without its side, and the side: "r", "l" or "".
+        Name without its side, and side ("r", "l" or ""), by name.
     """
     unique_names = dict.fromkeys(names)
     return {name: _split_side(name, unique_names) for name in unique_names}

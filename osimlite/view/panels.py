@@ -352,7 +352,7 @@ def find_title_height(panel_axes: Any) -> float | None:
     of a page. Only a power of ten above the axis of ordinates can be in the way of the title.
 
     Returns:
-        1, or None where matplotlib must find the height.
+        Height 1, or None where matplotlib must find it.
     """
     largest_limit = max(map(abs, panel_axes.get_ylim()))
     # Ticks may be smaller than the limits by a digit.

@@ -243,7 +243,7 @@ class DocumentAnalysis:
         """Find the value of an element's attribute `name`.
 
         Returns:
-            Its start and end offsets; None without the attribute.
+            Start and end offset of the value; None without the attribute.
         """
         element_span = self.find_span(number)
         position = self.source.locate_attribute(number, "name")

@@ -32,7 +32,7 @@ _NAMED_AFTER = {
     "Control": Reference("actuator-name", "Actuator"),
     "MarkerWeight": Reference("marker-name", "Marker"),
 }
-"""What objects of a class are usually named after, although OpenSim does not require it."""
+"""References after which objects of a class are usually named; OpenSim does not require it."""
 _TABLE = (".sto", ".mot")
 _SUFFIXES = {
     "Model": (".osim",),
@@ -173,7 +173,7 @@ def find_marker_labels(setup: Setup) -> tuple[str, list[str]] | None:
     """Find the marker file of a tool.
 
     Returns:
-        Its name as the setup spells it, and its labels; None without such a file.
+        Name of the file as in the setup, and its labels; None without such a file.
     """
     for part in setup.tool[1].walk() if setup.tool is not None else ():
         name = str(getattr(part, "marker_file", "")).strip()

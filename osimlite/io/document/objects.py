@@ -53,7 +53,7 @@ _TEXT, _ONE, _WRAPPED, _LIST = range(4)
 
 
 class ReadingPlan(NamedTuple):
-    """How to read the children of an element of one class.
+    """Plan for reading the children of an element of one class.
 
     Attributes:
         steps: steps by tag.

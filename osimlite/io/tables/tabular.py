@@ -21,13 +21,12 @@ MAX_NAME_LENGTH = 40
 class Tabular(ABC):
     """Result that can be converted to tables of other libraries.
 
-    Its text is a short table: a line that says what it is, then smallest and largest value of the
-    first columns.
+    Its text is a short table: the heading, then smallest and largest value of the first columns.
     """
 
     @property
     def heading(self) -> str:
-        """What the result is, in one line."""
+        """Class and size of the result, in one line."""
         rows, columns = self.table
         count = len(next(iter(rows.values()), ()))
         words = f"{format_count(count, 'row')}, {format_count(len(columns), 'column')}"

@@ -1,1 +1,1 @@
-"""The rules, a module for each subject; :mod:`osimlite.lint.registry` lists them."""
+"""Rules, one module for each subject; :mod:`osimlite.lint.registry` lists the modules."""

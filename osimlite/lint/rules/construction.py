@@ -1,4 +1,4 @@
-"""OSIM42x and OSIM53x: what stops the computation of a model."""
+"""OSIM42x and OSIM53x: obstacles to the computation of a model."""
 
 from __future__ import annotations
 

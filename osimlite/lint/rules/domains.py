@@ -1,4 +1,4 @@
-"""OSIM205 and on: numbers and words that can be read and make no sense."""
+"""OSIM205 and following: readable numbers and words without a valid meaning."""
 
 from __future__ import annotations
 

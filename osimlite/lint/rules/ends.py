@@ -1,4 +1,4 @@
-"""OSIM54x: forces between two places, and forces without what they need."""
+"""OSIM54x: forces between two points, and forces that lack a required part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM7xx: files that a model needs beside its own."""
+"""OSIM7xx: further files that a model needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM60x: functions given by points."""
+"""OSIM60x: functions that are given by points."""
 
 from __future__ import annotations
 

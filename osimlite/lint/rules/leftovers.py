@@ -1,4 +1,4 @@
-"""OSIM1xx: attributes, text and blocks that mean nothing, or not what they seem."""
+"""OSIM1xx: attributes, text and blocks without meaning, or with an unexpected meaning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM81x: what is special to marker files (.trc)."""
+"""OSIM81x: faults that only marker files (.trc) have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM0xx: markup that OpenSim reads otherwise than the rest of the world."""
+"""OSIM0xx: markup that OpenSim reads differently from other XML parsers."""
 
 from __future__ import annotations
 

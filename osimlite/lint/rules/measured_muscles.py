@@ -1,4 +1,4 @@
-"""OSIM635 and on: fibers of muscles, where they start and over the ranges of the coordinates."""
+"""OSIM635 and following: muscle fibers at the start and over the ranges of the coordinates."""
 
 from __future__ import annotations
 

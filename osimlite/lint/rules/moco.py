@@ -126,7 +126,7 @@ _COUNTED = (
     "parameters",
     "input_controls",
 )
-"""What the columns of a trajectory are, of which its header must say how many; the last need not be counted."""
+"""Types of columns of a trajectory that the header must count; the last one is optional."""
 
 
 @rule("OSIM862", "study-data", severity=ERROR, about="document")

@@ -1,4 +1,4 @@
-"""OSIM31x: what components are called."""
+"""OSIM31x: names of components."""
 
 from __future__ import annotations
 

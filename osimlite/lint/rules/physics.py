@@ -1,4 +1,4 @@
-"""OSIM505 and on: gravity, materials and limits."""
+"""OSIM505 and following: gravity, materials and limits."""
 
 from __future__ import annotations
 

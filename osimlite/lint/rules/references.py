@@ -1,4 +1,4 @@
-"""OSIM30x: one component names another that is not there, or not in the way its property wants it."""
+"""OSIM30x: references to components that do not exist, or in a form that the property rejects."""
 
 from __future__ import annotations
 

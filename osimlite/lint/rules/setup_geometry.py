@@ -1,4 +1,4 @@
-"""OSIM855 and OSIM856: where markers were measured, beside where the model has them."""
+"""OSIM855 and OSIM856: measured positions of markers compared with those in the model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM843 and OSIM849: measured loads, their columns and where they act."""
+"""OSIM843 and OSIM849: measured loads, their columns and points of application."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from osimlite.mechanics.laws.vectors import Vector, dot
 from osimlite.schema.tree import is_a
 
 _SAMPLE_COUNT = 16
-"""How many times of a motion are looked at."""
+"""Number of times of a motion that are examined."""
 _MAX_DISTANCE_M = 0.4
-"""How far from all that is known of its body, m, a measured force may act. In the projects of
-docs/public-projects.md that measure gaits none is farther than 0.275 from the origin."""
+"""Largest distance of a measured force from all known points of its body, m. In the projects of
+docs/public-projects.md that measure gaits, the largest distance from the origin is 0.275 m."""
 
 
 @rule("OSIM843", "load-columns", severity=ERROR, fixes="both", about="document")

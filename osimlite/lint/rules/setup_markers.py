@@ -1,4 +1,4 @@
-"""OSIM841: the markers of a tool, beside those that were measured."""
+"""OSIM841: markers of a tool compared with the measured ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM83x: what a setup names in the model of its tool."""
+"""OSIM83x: names in a setup that refer to the model of its tool."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
 
 
 def _get_kind(kind: Reference) -> str | None:
-    """Return what a reference names in the model; None if it is not looked up there."""
+    """Return the class that a reference names in the model; None if it names nothing there."""
     by_rule = (target_kind for target_kind in _KINDS if kind.rule.startswith(target_kind))
     return kind.target if kind.rule in _PATHS else next(by_rule, None)
 
@@ -164,7 +164,7 @@ def _look_up_text(
     """Look up a text in the model.
 
     Returns:
-        What it should name or None, the text as looked up, and the component or None.
+        Class that the text should name or None, the searched text, and the component or None.
     """
     item = use.holder
     kind = use.reference

@@ -1,4 +1,4 @@
-"""OSIM851 and OSIM854: tasks that a pose is fitted to."""
+"""OSIM851 and OSIM854: tasks to which a pose is fitted."""
 
 from __future__ import annotations
 

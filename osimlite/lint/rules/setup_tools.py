@@ -1,4 +1,4 @@
-"""OSIM852: settings of tools that cannot work, or do not what they seem to."""
+"""OSIM852: settings of tools that make them fail, or have an unexpected effect."""
 
 from __future__ import annotations
 

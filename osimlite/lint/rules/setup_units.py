@@ -1,4 +1,4 @@
-"""OSIM857, OSIM858 and OSIM859: units of markers and loads beside the model, and ground that pushes twice."""
+"""OSIM857 to OSIM859: units of markers and loads, and ground reactions that act twice."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from osimlite.schema.frames import Ground
 from osimlite.schema.tree import is_a
 
 _SIZE_RATIOS = 0.3, 3.0
-"""Between these, the size of a body that was measured over that of the model can be believed."""
+"""Smallest and largest plausible ratio of the measured size of a body to that in the model."""
 _MAX_ROWS = 50
-"""How many rows of markers are looked at."""
+"""Number of rows of markers that are examined."""
 _MIN_MARKERS = 3
-"""Markers that must be in both data and model."""
+"""Smallest number of markers that data and model must share."""
 _MAX_SLIGHT_SHARE = 0.02
 """Loads that are never more than this part of the weight of the model are doubted."""
 _WEIGHT_RANGE = 0.2, 10.0

@@ -1,4 +1,4 @@
-"""What only shows once frames are put in their places: frames laid through points, contact, lengths."""
+"""Faults that need positions of frames: frames through points, contact, lengths."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM101, OSIM104 and OSIM107: elements that are no properties, that stand twice, or in a value."""
+"""OSIM101, OSIM104 and OSIM107: elements that are no properties, are repeated, or are in a value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM0xx: the text itself, before anything in it has a meaning."""
+"""OSIM0xx: faults of the text itself, such as its encoding, syntax and version."""
 
 from __future__ import annotations
 

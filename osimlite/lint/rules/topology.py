@@ -1,4 +1,4 @@
-"""OSIM4xx: how bodies and joints hang together."""
+"""OSIM4xx: connections of bodies and joints."""
 
 from __future__ import annotations
 

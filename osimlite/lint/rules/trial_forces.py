@@ -1,4 +1,4 @@
-"""OSIM911 and on: residuals, reserves, errors of tracking and muscles of a finished trial."""
+"""OSIM911 and following: residuals, reserves, tracking errors and muscles of a finished trial."""
 
 from __future__ import annotations
 

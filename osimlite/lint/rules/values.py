@@ -1,4 +1,4 @@
-"""OSIM20x: numbers and switches that OpenSim drops or cuts."""
+"""OSIM20x: numbers and switches that OpenSim ignores or reads in part."""
 
 from __future__ import annotations
 

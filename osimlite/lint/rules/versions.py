@@ -1,4 +1,4 @@
-"""OSIM113: what another version of OpenSim has not."""
+"""OSIM113: classes and properties that the target version of OpenSim lacks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM33x: what is wired by position or by output: controllers with their actuators, inputs with outputs."""
+"""OSIM33x: connections by position or output: controllers and actuators, inputs and outputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OSIM616 and on: paths that wrap around surfaces."""
+"""OSIM616 and following: paths that wrap around surfaces."""
 
 from __future__ import annotations
 

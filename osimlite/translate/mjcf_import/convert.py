@@ -1,4 +1,4 @@
-"""The conversion of an MJCF file: passes over a draft, and the result."""
+"""Conversion of an MJCF file to an OpenSim model, in passes over a draft."""
 
 from __future__ import annotations
 
