@@ -82,8 +82,8 @@ def find_consistent_state(
         mechanism: the mechanism.
         q: values of all coordinates (n,).
         u: generalized speeds of all coordinates (n,).
-        set_values: indices of the coordinates whose values stay.
-        set_speeds: indices of those whose speeds stay.
+        set_values: indices of the coordinates whose values do not change.
+        set_speeds: indices of the coordinates whose speeds do not change.
 
     Returns:
         Values (n,) and generalized speeds (n,).

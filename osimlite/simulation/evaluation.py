@@ -101,7 +101,7 @@ class StateEvaluator:
         self._set_model(mechanism, forces, packed.numbers)
 
     def _set_model(self, mechanism: Mechanism, forces: Forces, numbers: Floats) -> None:
-        """Set the model, its numbers, and what is derived from them.
+        """Set the model, its numbers, and everything that depends on them.
 
         Args:
             mechanism: the mechanism.

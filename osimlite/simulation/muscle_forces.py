@@ -151,8 +151,8 @@ def static_optimization(
             None.
 
     Returns:
-        A column for each actuator. Times without a solution are NaN, and `describe_unsolved` says
-        what is missing there.
+        A column for each actuator. Times without a solution are NaN, and `describe_unsolved`
+        describes the missing generalized forces.
 
     Raises:
         OsimliteError: the source is not a motion of the model, or forces or loads cannot be read.

@@ -342,7 +342,7 @@ Options.__doc__ = f"{Options.__doc__}\n    Attributes:\n{describe_options(Option
 
 
 MAX_FIXED_STEPS = 1_000_000_000
-"""Largest number of fixed steps of a run; so many take hours to days."""
+"""Largest number of fixed steps of a run, which take hours to days."""
 
 MAX_FIXED_STEP_S = 0.1
 """Longest fixed step, s. Motions of bodies need about 0.001 s; MuJoCo's default is 0.002 s."""

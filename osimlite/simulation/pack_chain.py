@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 class Chain(NamedTuple):
     """Robot whose mass matrix and bias another program computes."""
 
-    joints: Sequence[RobotJoint]  # moving joints, in the order of that program
-    # bodies, and what is added to their principal moments of inertia there (kg·m²)
+    joints: Sequence[RobotJoint]  # moving joints, in the order of the other program
+    # bodies, and the number added to their principal moments of inertia there (kg·m²)
     excess: Sequence[tuple[int, float]]
     # kernel in Python. It reads values, rates and accelerations of the joints from the work vector,
     # and writes after them the joint forces that these accelerations require against gravity, and
@@ -173,7 +173,8 @@ def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[i
 
     Args:
         packer: writer of the kernel vectors.
-        excess: bodies, and what is added to each of their principal moments of inertia (kg·m²).
+        excess: bodies, and the number that is added to each of their principal moments of inertia in
+            the other program (kg·m²).
 
     Returns:
         Records with the link, the last degree of freedom on the path to it, and the offset of the

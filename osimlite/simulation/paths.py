@@ -98,7 +98,7 @@ class Paths:
     ) -> None:
         mechanism = build_mechanism(model) if mechanism is None else mechanism
         builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
-        # The lazy filter asks each component once.
+        # The lazy filter tests each component once.
         owners = filter(_has_path, builder.tree.components)
         self._build_system(
             builder, [owner for owner in owners if builder.path(owner) not in left_out], code

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
 MAX_COORDINATE = 1e25
-"""Largest accepted coordinate (rad or m); larger numbers overflow in what is computed from them."""
+"""Largest accepted coordinate (rad or m); larger numbers overflow in later computations."""
 SAME_VALUE_TOLERANCE = 1e-6
 """Values (rad or m) at one time that differ by less are the same."""
 _HALF_SPLINE_ORDER = 3

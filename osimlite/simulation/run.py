@@ -392,7 +392,7 @@ class Simulation:
     def _require_inertia(self, y: Sequence[float]) -> None:
         """Check that the first initial state allows no motion without inertia.
 
-        All engines give the same error thereby, although Bullet would compute a motion.
+        With this check all engines give the same error; Bullet would compute a motion.
 
         Args:
             y: initial state (y,).

@@ -92,7 +92,7 @@ class StaticOptimization:
             )
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
-        # Controls are what is searched for.
+        # Controls are the unknowns.
         model.controller_set.objects.clear()
         # Probes are not reported here, and those of muscles would refer to muscles that are
         # replaced below.
@@ -161,7 +161,7 @@ class StaticOptimization:
                 coordinates are ignored.
 
         Returns:
-            The distribution, with what is missing at times without a solution.
+            The distribution, with the missing generalized forces at times without a solution.
 
         Raises:
             SimulationError: the forces cannot be computed at one of the states.

@@ -296,7 +296,7 @@ class CHAIN(metaclass=Record):
     DYNAMICS = next(_at)
     """Number of the law that computes the mass matrix."""
     SUPPLY = next(_at)
-    """Address of the kernel that asks the other program."""
+    """Address of the kernel that obtains joint forces and mass matrix from the other program."""
     JOINTS = next(_at)
     """Number of joints."""
     JOINT_AT = next(_at)

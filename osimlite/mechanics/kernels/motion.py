@@ -80,7 +80,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             a = operation_work(model, data, operation)
             b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
             # Apply the fixed transform before the motion.
-            # Most joints are not offset by a rotation: skip what is the identity.
+            # Most joints are not offset by a rotation: skip identity transforms.
             if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
                 origin = plus(origin, combine_axes(axes, vector(b, FIXED.TRANSLATION)))
                 if j[OPERATION.BEFORE] == TRANSFORM.MOVE:

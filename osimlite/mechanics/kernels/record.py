@@ -282,7 +282,7 @@ def note_events(
     first = counts[COUNTS.EVENTS]
     total = pairs + m.sizes[RUN_SIZES.WATCHES]
     event = m.sizes[RUN_SIZES.EVENT]
-    # WORK_STATE has room for STATES states, and `integrate_run` uses the first four.
+    # The workspace at WORK_STATE has STATES states, and `integrate_run` uses the first four.
     ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(next_levels, total)
     for number in range(total):

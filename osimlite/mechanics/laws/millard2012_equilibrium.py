@@ -82,7 +82,7 @@ class MillardCurves(NamedTuple):
 class MillardFibers(NamedTuple):
     """Intermediate results of a muscle.
 
-    Before a curve is evaluated, its argument is in place of its value.
+    A field for the value of a curve has the argument of the curve until it is evaluated.
     """
 
     velocity_source: (

@@ -182,7 +182,7 @@ def degroote(
     the normalized lengthening speed of the tendon.
 
     As in OpenSim, the damping of the fibers is not contained in the rate of the tendon force: with an
-    elastic tendon it changes only what is reported of the fibers.
+    elastic tendon it changes only the reported forces of the fibers.
 
     Args:
         inputs: inputs of the muscle.

@@ -65,7 +65,7 @@ class ConstraintReader:
         )
 
     def _find_frame(self, owner: Component, socket: str) -> FramePlacement:
-        """Return the body and place of the frame that a socket refers to.
+        """Return the body of the frame that a socket refers to, and the frame in this body.
 
         Args:
             owner: component with the socket.

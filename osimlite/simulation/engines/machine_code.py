@@ -79,7 +79,7 @@ def is_ready(name: str) -> bool:
     if name in _addresses:
         return True
     address = None
-    # The sources are asked in the order of their speed.
+    # The sources are tried in the order of their speed.
     if is_allowed(LIBRARY) and (library := kernel_library.load_library()) is not None:
         address = library.get_address(name)
     if address is None and is_allowed(COMPILER):
@@ -170,7 +170,7 @@ def describe_source() -> str:
 
 
 def explain_source() -> list[str]:
-    """Return sentences that say what runs the kernels, and why."""
+    """Return sentences on the source of the kernels, and the reason for it."""
     sentences = []
     library = kernel_library.load_library() if is_allowed(LIBRARY) else None
     compiler = find_compiler() if is_allowed(COMPILER) else None

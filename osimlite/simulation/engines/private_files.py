@@ -1,6 +1,6 @@
 """Files that nobody but the user can have written.
 
-Compiled kernels are executed, and whoever can change a file that is executed can execute anything.
+Compiled kernels are executed: users who can change such a file could execute anything.
 """
 
 from __future__ import annotations

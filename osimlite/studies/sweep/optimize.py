@@ -392,7 +392,7 @@ class _Evaluations:
         values = self._compute_values(points)
         # A deterministic method requests the same points again when it is resumed.
         evaluated = self._history[self.count : self.count + len(points)]
-        # Even a rounding difference means that the method takes another course than in the history.
+        # Even a rounding difference means that the method continues differently from the history.
         if any(
             row != list(requested_row)
             for (row, _, _), requested_row in zip(evaluated, values.tolist(), strict=False)

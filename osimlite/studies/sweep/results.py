@@ -317,7 +317,7 @@ class PartialTable:
     def _release_file(self, *, removing: bool = False) -> None:
         """Close the file, remove it if requested, and release the lock."""
         with suppress(OSError, AttributeError):
-            # The user has been told about a full disk already; and there may be no stream yet.
+            # A full disk has been reported already, and there may be no stream yet.
             self.stream.close()
         if removing:
             # After `close`, because Windows does not remove open files; before the lock is released,

@@ -205,8 +205,8 @@ class Cable:
             # As Python, kernels raise where machine code gets NaN: a path that is normal to a plane
             # at its hint has no direction on it.
             return None
-        # Machine code goes on with NaN where Python raises. If the cable then leaves the obstacle, its
-        # length is a number, but the record of the obstacle is not.
+        # Machine code continues with NaN where Python raises. If the cable then leaves the obstacle,
+        # its length is a number, but the record of the obstacle is not.
         if np.isnan(work).any():
             return None
         kept = ints[CABLE.ELEMENTS + ELEMENT.KEPT :: ELEMENT.SIZE].tolist()
