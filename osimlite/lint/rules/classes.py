@@ -329,7 +329,7 @@ def find_set(cls: type[Object] | None) -> str | None:
         return None
     for spec in get_field_specs(Model).values():
         members = get_field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
-        # Any component fits into the ComponentSet, so that it says nothing.
+        # Any component fits into the ComponentSet, so that set is no hint.
         member_class = (
             members.accepts if members is not None and spec.tag != "ComponentSet" else None
         )

@@ -261,7 +261,7 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
     groups: dict[object, list[Obstacle]] = {}
     for obstacle in _select_unreported(subject, report, Stage.UNSUPPORTED):
         item = subject.tree.by_path.get(obstacle.path)
-        # Who declares the classes of a plug-in knows what they are.
+        # Users who declare the classes of a plug-in know them.
         if isinstance(item, Unknown) or (
             item is not None and type(item).tag in get_plugin_classes()
         ):

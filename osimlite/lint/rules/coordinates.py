@@ -220,7 +220,7 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
             largest = max(
                 (abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0
             )
-            # 99999.9 and the like stand for "no bound".
+            # Numbers such as 99999.9 mean "no bound".
             if max_angle < largest < unbounded:
                 report(
                     f"the range of {describe_object(coordinate)}, "

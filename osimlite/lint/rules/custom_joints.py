@@ -51,7 +51,7 @@ def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> Non
             continue
         for axis in list_axes(joint):
             for index, name in enumerate(axis.coordinates):
-                # An unreadable word has a finding of its own.
+                # An unreadable word has a finding of another rule.
                 if not isinstance(name, str) or name in declared:
                     continue
                 word, nth = subject.word_at(axis, "coordinates", index)
@@ -176,7 +176,7 @@ def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """
     for joint in subject.find_by_class("CustomJoint"):
         coordinates = list_coordinates(joint)
-        # Where OpenSim rejects the joint, OSIM405 says why.
+        # If OpenSim rejects the joint, OSIM405 reports the reason.
         if not coordinates or refuses_axes(joint):
             continue
         columns = {
@@ -217,7 +217,7 @@ def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[floa
     result = []
     for number, axis in enumerate(list_axes(joint)):
         names = axis.names
-        # Of a name that stands twice the last place counts.
+        # For a repeated name the last position counts.
         variable_index = max(
             (
                 variable_index

@@ -301,11 +301,11 @@ def report_unknown_choice(subject: Subject, report: FindingCollector) -> None:
 
 
 HUGE = 1e20
-"""No quantity of a motion, in whatever unit, is as large."""
+"""Number that no quantity of a motion reaches, in any unit."""
 
 
 OVERFLOWS = 1e100
-"""Formulas of muscles and contacts have third and fourth powers, which overflow beyond this number."""
+"""Number above which third and fourth powers in formulas of muscles and contacts overflow."""
 
 SHORTEST_FIBER = 3e-8
 """Optimal length (m) up to which no Millard muscle of 81 random ones in OpenSim 4.6 had a velocity."""
@@ -314,11 +314,11 @@ DOUBTFUL_FIBER = 1e-6
 """Optimal length (m) from which all of them had one."""
 
 TINY = 1e-20
-"""No size of a part of a body, in whatever unit, is as small."""
+"""Number below which no size of a part of a body lies, in any unit."""
 
 
 class DomainVerdict(NamedTuple):
-    """A number outside its domain: the number, the domain, what OpenSim makes of it, and whether that is known."""
+    """Number outside its domain, with the domain and the (known or unknown) consequence."""
 
     number: float
     domain: str
@@ -339,7 +339,7 @@ _DECLARED_CONSEQUENCES = {
     facts.STOPS: FAILS,
     facts.STUCK: FAILS,
 }
-"""What OpenSim does, by the words of the messages."""
+"""Consequences in OpenSim by the words of the messages."""
 _NAN_REFUSED = {
     "PathSpring": "resting_length stiffness dissipation",
     "ClutchedPathSpring": "stiffness dissipation relaxation_time_constant initial_stretch",
@@ -350,7 +350,7 @@ _NAN_REFUSED = {
     "passive_fiber_strain_at_one_norm_force tendon_strain_at_one_norm_force "
     "activation_dynamics_smoothing",
 }
-"""By class, the properties in which OpenSim 4.6 refuses NaN, even in a disabled force (measured)."""
+"""Properties in which OpenSim 4.6 rejects NaN, even in a disabled force (measured), by class."""
 _MILD_CONSEQUENCES = (_DRAWN_CONSEQUENCE, _BOUND_CONSEQUENCE, UNUSED)
 _DRAWN = {
     "Geometry",
@@ -359,7 +359,7 @@ _DRAWN = {
     "ModelDisplayHints",
     "ModelVisualPreferences",
 }
-"""Classes of what is only drawn."""
+"""Classes of objects that are only drawn."""
 
 
 _OutsideDomain = tuple[Object, FieldSpec, Any, DomainVerdict]
@@ -373,7 +373,7 @@ def find_outside_domain(subject: Subject) -> list[_OutsideDomain]:
 
 def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
     """Yield each property with a number outside its domain, and what OpenSim does with it."""
-    # A path is laid around them at once, which needs a surface.
+    # Paths wrap around them when the model is built, which needs a surface.
     obstacles = {
         id(subject.target_of(obstacle, "socket_contact_geometry"))
         for obstacle in subject.find_by_class("Scholz2015GeometryPathObstacle")

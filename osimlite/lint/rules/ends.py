@@ -170,7 +170,7 @@ _End = tuple[Component | None, Any]
 
 
 def _find_two_ended_forces(subject: Subject) -> Iterator[tuple[Component, _End, _End]]:
-    """Yield each force between two points with the frame and the place of both."""
+    """Yield each force between two points with the frame and the position of both."""
     for force in subject.find_by_class("PointToPointSpring"):
         first, second = (subject.target_of(force, f"socket_body{number}") for number in (1, 2))
         yield force, (first, force.point1), (second, force.point2)
@@ -187,7 +187,7 @@ def _find_two_ended_forces(subject: Subject) -> Iterator[tuple[Component, _End, 
 
 
 def _locate_in_ground(subject: Subject, frame: Component | None, point: Any) -> Any:
-    """Return where a point of a frame is in ground in the default pose; None if it is not known."""
+    """Return the position in ground of a point of a frame in the default pose; None if unknown."""
     end = locate_frame(subject, frame)
     if end is None:
         return None
@@ -197,7 +197,7 @@ def _locate_in_ground(subject: Subject, frame: Component | None, point: Any) -> 
 
 
 def _are_coincident(subject: Subject, before: Any, point: Any) -> bool:
-    """Return whether two points of a path are fixed to different bodies and in one place."""
+    """Return whether two points of a path coincide and are fixed to different bodies."""
     frames = []
     for item in (before, point):
         if not is_a(item, "PathPoint"):

@@ -23,7 +23,7 @@ FORMULAS = {
     "ExpressionBasedPathForce": (("expression",), ("s", "ldot")),
     "ExpressionBasedBushingForce": (_BUSHING_PROPERTIES, _BUSHING_VARIABLES),
 }
-"""The properties of each class that are formulas, and the variables that these may name."""
+"""Properties that are formulas, with the variables that they may name, by class."""
 
 
 @rule("OSIM606", "broken-expression", severity=ERROR, consequences=(REFUSES, FAILS))

@@ -161,7 +161,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
             if note.why
             else ""
         )
-        # What stays empty has no name either.
+        # Objects that stay empty have no name either.
         uses = subject.uses if note.why and subject.model is not None else []
         use_count = sum(subject.resolution(use).target is note.owner for use in uses)
         if use_count:
@@ -248,7 +248,7 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
 
 
 class _FolderListings:
-    """The folders that files are looked for in, each join_words once: a model names a hundred meshes in one of them."""
+    """Listings of the folders in which files are searched, each read once for all meshes."""
 
     def __init__(self) -> None:
         self._known: dict[str, dict[str, str]] = {}

@@ -334,7 +334,7 @@ _REQUIRED_FUNCTIONS: Final = {
     "FunctionBasedPath": ("length_function",),
     "MovingPathPoint": ("x_location", "y_location", "z_location"),
 }
-"""Properties that may be empty by OpenSim's declarations, and without which it cannot compute."""
+"""Properties that OpenSim's declarations allow to be empty, and that it needs for computing."""
 
 
 @rule("OSIM605", "missing-function", severity=ERROR, consequences=(REFUSES, FAILS))

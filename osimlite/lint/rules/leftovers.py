@@ -145,7 +145,7 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
         if note.kind == "child-in-value"
     ]
     for start, stray in sorted(_find_stray_texts(source)):
-        # Text outside the root is worse, and another rule speaks of it.
+        # Text outside the root is worse, and has another rule.
         if (
             any(value_start < start < value_end for value_start, value_end in in_values)
             or start >= source.spans[0].end
@@ -302,7 +302,7 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     if subject.sure_until is not None:
-        # What is missing may stand behind the syntax error.
+        # The missing part may be after the syntax error.
         return
     reported_numbers = {note.number for note in subject.notes if note.kind == "child-in-value"}
     for refusal in subject.refusals:

@@ -9,7 +9,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 
 SHOWN = 5e-6
-"""Less (m) is no error of the default pose."""
+"""Smallest error of a length in the default pose that messages mention, m."""
 
 OFF = Threshold(
     "wrapping-error",

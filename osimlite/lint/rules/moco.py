@@ -20,7 +20,7 @@ from osimlite.schema.states import find_variables
 from osimlite.schema.tree import Tree, is_a
 
 _ALLOWING_FLAGS = ("allow_unused_references", "kinematics_allow_extra_columns")
-"""What lets a table have columns that nothing follows."""
+"""Properties that allow a table to have columns that nothing tracks."""
 
 
 @rule("OSIM861", "impossible-bounds", severity=ERROR, about="document")
@@ -219,7 +219,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 
 
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
-    """Return what is wrong with the columns of a trajectory; empty if nothing is."""
+    """Return the fault in the columns of a trajectory; empty if there is none."""
     # Parameters are columns of a guess as well.
     expected_columns = set(find_variables(tree, "state or control variable")) | {
         item.name for item in setup.find_by_class("MocoParameter")
@@ -279,7 +279,7 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
 def _find_unknown_columns(
     setup: Setup, reference: Reference, table_processor: Any, table: Table
 ) -> list[str]:
-    """Return the columns of a table that do not name what they should."""
+    """Return the columns of a table with unknown names."""
     tree = setup.tree
     if tree is None or Unknown in tree.by_class or any(setup.find_by_class("ModelOperator")):
         return []
@@ -388,7 +388,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
 
 
 def _describe_property_fault(parameter: Any, component: Component) -> str:
-    """Return what is wrong with the property of a parameter; empty if nothing is."""
+    """Return the fault in the property of a parameter; empty if there is none."""
     name, element = parameter.property_name, parameter.property_element
     spec = get_field_specs(type(component)).get(name)
     if spec is None:

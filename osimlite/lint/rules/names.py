@@ -85,7 +85,7 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     + <Marker name="right_asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
-    # Almost every model is done with when its names are looked at all at once.
+    # Almost every model passes this test of all its names at once.
     components = subject.tree.components
     together = "".join([component.name for component in components])
     if not any(character in together for character in ILLEGAL_CHARACTERS):
@@ -155,11 +155,11 @@ def list_old_references(subject: Subject, source: Source, name: str) -> list[str
         source: text of the document.
         name: name with white space, which OpenSim removes from the name but not from references.
     """
-    # Almost no document has such a name, and every start would pay for the import.
+    # Almost no document has such a name, so the import is delayed until one is found.
     from osimlite.io.document.upgrade.version_3_structure import NAME_LIST_TAGS, TEXT_TAGS
 
     collapsed_name = " ".join(name.split())
-    # What OpenSim leaves out refers to nothing.
+    # Elements that OpenSim ignores refer to nothing.
     left_out = [
         source.spans[note.number] for kind in LEFT_OUT for note, _ in subject.notes_of(kind)
     ]
@@ -173,7 +173,7 @@ def list_old_references(subject: Subject, source: Source, name: str) -> list[str
         is_reference = collapsed_name == text or (
             span.tag in NAME_LIST_TAGS and f" {collapsed_name} " in f" {text} "
         )
-        # OpenSim leaves out what a group or most controllers name in vain.
+        # OpenSim ignores unresolved names in groups and most controllers.
         harmless = span.tag == "members" or (
             span.tag in ("actuator_list", "muscle_list")
             and not (owners and owners[-1].tag == "PrescribedController")

@@ -72,7 +72,7 @@ def report_short_path(subject: Subject, report: FindingCollector) -> None:
 
 _CABLE_POINT = "Scholz2015GeometryPathPoint"
 _NOT_READ = frozenset(("unknown-tag", "wrong-name", "wrong-class", "unknown-class", "empty"))
-"""What is reported of an element that may have been meant for the path."""
+"""Kinds of notes about unread elements that may have been meant as the path."""
 
 
 DISTANCE = Threshold(

@@ -221,7 +221,7 @@ def report_reference_case(subject: Subject, report: FindingCollector) -> None:
 
 
 class BrokenReference(NamedTuple):
-    """A reference that does not work: why, what it leads to instead, and what would be right."""
+    """Broken reference, with the reason, its present target, and the correct text."""
 
     use: Use
     text: str

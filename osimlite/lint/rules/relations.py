@@ -102,7 +102,7 @@ def report_controls_swapped(subject: Subject, report: FindingCollector) -> None:
 
 
 _Relation = Callable[[Any, Any], Iterator[Contradiction]]
-"""Gives the find_contradictions of an object, from it and the component that it belongs to."""
+"""Function that yields the contradictions of an object, from it and its component."""
 
 
 def _make_curve_relation(make: Callable[..., object]) -> _Relation:
@@ -177,4 +177,4 @@ _RELATIONS: Final[dict[str, _Relation]] = {
     "FunctionBasedPath": _check_function_based_path,
     "TendonForceLengthCurve": _make_curve_relation(tendon_force_length),
 }
-"""What OpenSim 4.6 rejects of classes whose arithmetic is not in their declaration."""
+"""Checks for combinations of numbers that OpenSim 4.6 rejects, by class."""

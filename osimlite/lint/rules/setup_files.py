@@ -21,13 +21,13 @@ from osimlite.schema.tree import is_a
 
 _TABLE = (".sto", ".mot", ".trc", ".csv")
 _ENDINGS = {"table": _TABLE, "motion": _TABLE, "marker data": (".trc", ".sto", ".c3d")}
-"""How files of a content are called; others are documents."""
+"""Suffixes of files by their content; other files are documents."""
 _SHARED = {
     "external_loads_file": "applies the loads of {}",
     "lowpass_cutoff_frequency_for_coordinates": "filters at {:g} Hz",
     "lowpass_cutoff_frequency": "filters at {:g} Hz",
 }
-"""Settings that should be those of all tools that are given the same motion."""
+"""Settings that should be equal in all tools that use the same motion."""
 
 
 @rule("OSIM821", "missing-input", severity=ERROR, fixes="safe", about="document")
@@ -96,7 +96,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
                 )
         if (
             is_a(item, "MocoPhase")
-            # A phase inside a study, which needs a model of its own.
+            # A phase in a study needs its own model.
             and item is not setup.top
             and not (item.model.filepath or getattr(item.model.model, "_index", None))
         ):

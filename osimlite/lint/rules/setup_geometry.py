@@ -25,11 +25,11 @@ _MIN_FACTOR = 0.5
 _MAX_FACTOR = 2.0
 """Largest plausible scale factor of a body."""
 _MIN_ROWS = 3
-"""Sampled rows within the time range of the tool that suffice; with fewer, the table is read."""
+"""Number of sampled rows in the time range that suffice; with fewer, the table is read."""
 _MAX_ROWS = 100
-"""Rows that are read from a table at most."""
+"""Largest number of rows that are read from a table."""
 _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT", "LEFT"))
-"""How names tell sides."""
+"""Patterns of the sides in names."""
 
 
 @rule("OSIM855", "scale-factor", severity=WARNING, about="document")

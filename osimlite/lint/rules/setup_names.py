@@ -18,15 +18,15 @@ from osimlite.schema.states import find_variables
 from osimlite.schema.tree import Tree, Use, is_a
 
 _KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
-"""What the rules of references are about that look a name up in one place of the model; their names begin with it."""
+"""Beginnings of the names of reference rules that search a name in one part of the model."""
 _PATHS = ("model-path", "state-path", "pattern")
-"""The other rules that lead from a setup into the model, whatever their target is."""
+"""Other reference rules that lead from a setup into the model, with any target."""
 _CONSEQUENCES = {
     "refused": ("OpenSim rejects it", None),
     "left out": ("OpenSim ignores it", WARNING),
 }
 _PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/controllerset"}
-"""Where in the model stands what a tool adds to it; relative paths start there."""
+"""Paths in the model of the sets to which tools add components; relative paths start there."""
 
 
 @rule("OSIM831", "unknown-name", severity=ERROR, fixes="both", about="document")
@@ -199,7 +199,7 @@ def _look_up_controls(
     # Without a model every control would be unknown.
     if not actuator_names:
         return
-    # Of tools that follow a motion these are bounds, and go by the whole name.
+    # Tools that follow a motion take these as bounds, and compare complete names.
     follows = hasattr(tool, "desired_kinematics_file")
     consequence, severity = _CONSEQUENCES["left out" if follows else "refused"]
     actuators = {f"{name}.excitation" for name in actuator_names} | (

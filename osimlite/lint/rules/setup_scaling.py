@@ -30,7 +30,7 @@ _TOOL = """```setup
 </ScaleTool>
 ```"""
 _LINES = {"mass": 2, "scaler": 5, "pairs": 8, "axes": 11, "placer": 17}
-"""Lines of the tool that examples stand for."""
+"""Numbers of the lines of the tool that examples replace."""
 
 
 def _make_frame(number: int) -> str:

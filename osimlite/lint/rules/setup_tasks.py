@@ -43,7 +43,7 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
         task_counts: Counter[tuple[str, str]] = Counter()
         for task in applied:
             task_counts[type(task).__name__, task.name] += 1
-            # One finding, at the second task, however many follow.
+            # One finding at the second task, whatever the number of further ones.
             if task_counts[type(task).__name__, task.name] == 2:
                 report(
                     f"'{task.name}' has two tasks: only one of them counts",

@@ -20,11 +20,11 @@ from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import is_a
 
 _FIRST_STATES = 0.03
-"""For how long computed muscle control runs to find the states of muscles at the start, s."""
+"""Time that computed muscle control runs to find the states of muscles at the start, s."""
 _MIN_JOINTS = 4
-"""So many joints do not all stay straight."""
+"""Smallest number of joint angles that do not all stay near 0 during a motion."""
 _USUAL_WINDOW = 0.01
-"""The time over which its controls are found, if nothing is said, s."""
+"""Default window of computed muscle control, s."""
 
 
 _WHOLE = '<{0} name="run">\n    <model_file>leg.osim</model_file>\n    {{}}\n    {1}\n</{0}>'

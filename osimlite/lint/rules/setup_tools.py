@@ -32,7 +32,7 @@ _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
     ("loose-optimizer-convergence", "StaticOptimization", "optimizer_convergence_criterion", lambda value: value > 0.05,
      "the optimizer stops at {:g}, far from its goal"),
 )  # fmt: skip
-"""By fault the class and the property, whether its value is none to work with, and what is said of it then."""
+"""Name, class, property, test for invalid values, and message of each fault."""
 
 
 def _make_tool_example(kind: str, *lines: str, model: str = "leg.osim") -> str:
@@ -80,7 +80,7 @@ FRAMES = {
     ),
     "forces": '```setup\n<ForceSet name="forces">\n    <objects>\n        {}\n    </objects>\n</ForceSet>\n```',
 }
-"""What the examples of OSIM852 stand in."""
+"""Documents around the lines of the examples of OSIM852."""
 
 
 _FAULTS = """\

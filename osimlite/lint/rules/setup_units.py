@@ -25,9 +25,9 @@ _MAX_ROWS = 50
 _MIN_MARKERS = 3
 """Smallest number of markers that data and model must share."""
 _MAX_SLIGHT_SHARE = 0.02
-"""Loads that are never more than this part of the weight of the model are doubted."""
+"""Ratio of the largest load to the model's weight below which loads are doubtful."""
 _WEIGHT_RANGE = 0.2, 10.0
-"""In newtons, the largest load of a trial is between these parts of the weight of the model."""
+"""Plausible ratios of the largest load of a trial, in newtons, to the model's weight."""
 
 
 @rule("OSIM857", "marker-size", severity=WARNING, about="document")

@@ -33,7 +33,7 @@ from osimlite.schema.specs import FieldSpec, get_value_specs
 from osimlite.schema.tree import is_a
 
 POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
-"""Sockets of a frame laid through stations."""
+"""Sockets of a frame that is defined by stations."""
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR, consequences=(REFUSES,))

@@ -78,7 +78,7 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
 
 
 class _UnknownTag(NamedTuple):
-    """An element that is no property, and what is reported of it."""
+    """Element that is not a property, with its message."""
 
     note: Note
     owner: Object
@@ -89,7 +89,7 @@ class _UnknownTag(NamedTuple):
 
 
 def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTag:
-    """Return what is reported of an element that no version has as a property."""
+    """Return the message about an element that no version has as a property."""
     reason = reason_unused(type(owner), note.word)
     if reason is not None:
         fix = remove_element(subject.source, note.number)
@@ -309,7 +309,7 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
 
 
 def _describe_interruption(subject: Subject, number: int) -> str:
-    """Return what stands in the middle of a value; nothing if it is a CDATA section, which is reported apart."""
+    """Return the markup inside a value; nothing for a CDATA section, which is reported apart."""
     inner_text = _get_inner_text(subject, number)
     if "<![CDATA[" in inner_text:
         return ""
@@ -331,7 +331,7 @@ def _find_cdata_elements(source: Source) -> Iterator[int]:
 
 
 def _report_cdata(subject: Subject, source: Source, number: int, report: FindingCollector) -> None:
-    """Report a value that OpenSim does not read as it is meant, since it stands in a CDATA section."""
+    """Report a value in a CDATA section, which OpenSim does not read as intended."""
     spec = _find_property(subject, source, number)
     if spec is None:
         return
@@ -396,7 +396,7 @@ _SECTION = compile_later(r"<!\[CDATA\[(.*?)\]\]>", re.DOTALL)
 _SECTIONS = compile_later(r"<!\[CDATA\[.*?\]\]>|<!--.*?-->|<\?.*?>", re.DOTALL)
 _OFF = compile_later(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
 _FORMER = {"enable_controller": "enabled"}
-"""Names that properties had in early releases; OpenSim brings them up to date in no file."""
+"""Names of properties in early releases, which OpenSim does not update in any file."""
 
 
 def _list_given(owner: Object) -> set[str]:

@@ -14,7 +14,7 @@ from osimlite.lint.table import Table
 
 _WHOLE = compile_later(r"\+?[0-9]+")
 _TO_THE_END = 1_000_000
-"""As many characters as stand in no line."""
+"""Length of a position that reaches to the end of any line, in characters."""
 
 
 @rule("OSIM801", "table-header", severity=ERROR, fixes="safe", about="table")

@@ -16,9 +16,9 @@ from osimlite.schema.model import CURRENT_VERSION
 # The line of seven "=" between the two sides is left out: it may occur in a comment.
 _CONFLICT = compile_later(r"^(<{7}|>{7})(?= |$)[^\n]*", re.MULTILINE)
 _OLDEST_FOR_OPENSIM = 10901
-"""The oldest version that OpenSim 4.6 loads."""
+"""Oldest version that OpenSim 4.6 loads."""
 _SOCKETS = 30505
-"""The version in which joints, points and forces got sockets."""
+"""Version in which joints, points and forces got sockets."""
 _SOCKET = compile_later(r"<(socket_\w+)>")
 _LATE: Final = (
     (compile_later(r"\w+Joint"), ("socket_parent_frame", "socket_child_frame")),
@@ -32,7 +32,7 @@ _LATE: Final = (
     (compile_later("(?:Point|ConstantDistance)Constraint"), ("socket_body_1", "socket_body_2")),
     (compile_later("PointOnLineConstraint"), ("socket_line_body", "socket_follower_body")),
 )
-"""Sockets that OpenSim does not take in an older document, by class; those of other classes it does."""
+"""Sockets that OpenSim does not read in an older document, by class."""
 
 
 @rule("OSIM001", "syntax-error", severity=ERROR)

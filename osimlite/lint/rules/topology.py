@@ -244,7 +244,7 @@ def _describe_loop(bones: Skeleton, link: JointLink) -> tuple[str, Consequence |
 
 
 class _Groups:
-    """Which components belong together (a union-find by identity)."""
+    """Groups of connected components (union-find by identity)."""
 
     def __init__(self) -> None:
         self._up: dict[int, int] = {}

@@ -25,10 +25,10 @@ from osimlite.schema.fields import Value, real
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 KEEPS_DEFAULT = "OpenSim keeps the default"
-"""What a message says of a value that OpenSim cannot read, where it continues."""
+"""Consequence of an unreadable value after which OpenSim continues, in messages."""
 
 _SEPARATORS = ",;"
-"""Characters between numbers in other languages and programs."""
+"""Separators of numbers in other languages and programs."""
 _ONE_NUMBER = real()
 
 

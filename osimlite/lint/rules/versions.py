@@ -53,7 +53,7 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
         first = cls.since or later_changes.classes.get(cls.tag)
         if first:
             for item in items:
-                # What is there by default stands in no file.
+                # Default objects are in no file.
                 if subject.source is None or item._index is not None:
                     report(
                         f"{describe_object(item)}: OpenSim has {add_article(cls.tag)} since "

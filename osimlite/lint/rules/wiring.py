@@ -138,7 +138,7 @@ def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
 
 
 class _InputFault(NamedTuple):
-    """What is wrong with the text of an input, and a text that would be right."""
+    """Fault in the text of an input, with a correct text."""
 
     message: str
     suggestion: str | None = None

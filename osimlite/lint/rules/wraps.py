@@ -17,7 +17,7 @@ from osimlite.schema.wrapping import WrapObject
 
 
 def _list_wraps(path: GeometryPath) -> list[PathWrap]:
-    # What has no business there has a finding of its own.
+    # Objects that do not belong there have a finding of another rule.
     return [wrap for wrap in path.path_wrap_set.objects if isinstance(wrap, PathWrap)]
 
 
