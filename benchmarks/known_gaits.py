@@ -1,16 +1,26 @@
-"""Gaits whose rigid limits are published, under compliant contact: the stiffer the contact, the closer.
+"""Passive walkers with compliant contact, compared with published results for rigid contact.
 
-The rimless wheel rolls down a slope on its spokes; every impact is plastic, so that its speed is
-known in closed form. The simplest walking model (Garcia, Chatterjee, Ruina and Coleman, J. Biomech.
-Eng. 120, 1998) has a point mass at the hip and feet of no mass; the compass gait (Goswami, Thuilot
-and Espiau, Int. J. Robotics Research 17, 1998) has legs of mass. Their straight legs would scuff:
-as in these papers the foot that swings does not feel the ground until it has passed the other leg.
+    python benchmarks/known_gaits.py
+
+The published results are for impacts that are plastic and take no time. With compliant contact, the
+difference from them should decrease as the contact becomes stiffer. There are three walkers:
+
+- The rimless wheel rolls down a slope on its spokes. The speed before an impact is known in closed
+  form.
+- The simplest walking model (Garcia, Chatterjee, Ruina and Coleman, J. Biomech. Eng. 120, 1998) has
+  a point mass at the hip and massless feet.
+- The compass gait (Goswami, Thuilot and Espiau, Int. J. Robotics Research 17, 1998) has legs with
+  mass.
+
+The straight legs of the last two would scuff the ground. As in these papers, the swing foot has no
+contact until it has passed the other leg. Each walker has a table with one row for each ground;
+"stiffness" is that of the Hunt-Crossley contact, "slip" the transition velocity of its friction.
 """
 
 from __future__ import annotations
 
 from math import cos, pi, radians, sin, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -27,21 +37,76 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.batches import Watch, run_many
 
 GRAVITY = 9.81
-FOOT = 2e-4
-"""Radius of the spheres, m."""
+"""Acceleration of gravity, m/s^2."""
 
-GROUNDS = ((1e7, 0.1), (1e8, 0.03), (1e9, 0.01))
-"""Stiffness (Pa) and transition velocity of friction (m/s): ever stiffer, both ways."""
+FOOT_RADIUS = 2e-4
+"""Radius of the contact spheres, m."""
 
 ACCURACY = 1e-6
-SIMPLEST = {"gamma": 0.009, "angle": 0.200310901, "rate": -0.199832473}
-COMPASS = {"period": 0.734, "step": 0.535}
+"""Relative accuracy of the integrator."""
+
 STEPS = 8
-MASSLESS = 5e-3
-"""Mass of a foot that should have none, kg."""
+"""Number of steps after which a gait counts as converged."""
+
+FOOT_MASS = 5e-3
+"""Mass of a foot that has none in the published model, kg."""
 
 
-def ground(model: Model, slope: float) -> ContactHalfSpace:
+class Ground(NamedTuple):
+    """Parameters of the contact with the ground."""
+
+    stiffness: float
+    """Stiffness of the Hunt-Crossley contact, Pa."""
+    transition_velocity: float
+    """Slip velocity at which friction is fully developed, m/s."""
+
+
+# Friction that sticks is the limit of a small transition velocity, so both approach the rigid case.
+GROUNDS = (Ground(1e7, 0.1), Ground(1e8, 0.03), Ground(1e9, 0.01))
+"""Grounds of increasing stiffness."""
+
+SIMPLEST_SLOPE = 0.009
+"""Slope of the simplest walking model, rad."""
+
+SIMPLEST_ANGLE = 0.200310901
+"""Published angle of its stance leg just after a heel strike, rad."""
+
+SIMPLEST_RATE = -0.199832473
+"""Published rate of its stance leg just after a heel strike, divided by sqrt(g / leg length)."""
+
+
+class LegParameters(NamedTuple):
+    """Parameters of a walker with two straight legs of 1 m."""
+
+    slope: float
+    """Slope of the ground, rad."""
+    hip_mass: float
+    """Point mass at the hip, kg."""
+    leg_mass: float
+    """Point mass of each leg, kg."""
+    mass_distance: float
+    """Distance of the mass of a leg from the hip, m."""
+
+
+SIMPLEST = LegParameters(SIMPLEST_SLOPE, hip_mass=1.0, leg_mass=FOOT_MASS, mass_distance=1.0)
+COMPASS = LegParameters(radians(3.0), hip_mass=10.0, leg_mass=5.0, mass_distance=0.5)
+
+
+class Gait(NamedTuple):
+    """Last step of a converged gait."""
+
+    period: float
+    """Duration of the step, s."""
+    length: float
+    """Distance between the feet at the heel strike, m."""
+    angle: float
+    """Half of the angle between the legs at the heel strike, rad."""
+    rate: float
+    """Rate of the stance leg just after the heel strike, rad/s."""
+
+
+def add_slope(model: Model, slope: float) -> ContactHalfSpace:
+    """Add an inclined ground (slope in rad) to a model, and return its contact geometry."""
     plane = model.add(
         ContactHalfSpace(
             name="slope", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2 - slope)
@@ -51,32 +116,49 @@ def ground(model: Model, slope: float) -> ContactHalfSpace:
     return plane
 
 
-def touch(
+def add_contact(
     model: Model,
     plane: ContactHalfSpace,
     body: Body,
-    at: tuple[float, float, float],
+    location: tuple[float, float, float],
     name: str,
-    K: float,
-    vt: float,
+    ground: Ground,
 ) -> None:
+    """Add a sphere to a body, and its contact with a plane.
+
+    Args:
+        model: model to extend.
+        plane: contact geometry of the ground.
+        body: body of the sphere.
+        location: centre of the sphere in the body (m).
+        name: name of the force.
+        ground: parameters of the contact.
+    """
     sphere = model.add(
-        ContactSphere(name=f"{name}_sphere", socket_frame=body, location=at, radius=FOOT)
+        ContactSphere(
+            name=f"{name}_sphere", socket_frame=body, location=location, radius=FOOT_RADIUS
+        )
     )
     material = HuntCrossleyForce.ContactParameters(
-        geometry=(sphere, plane), stiffness=K, dissipation=10.0, static_friction=1.0, dynamic_friction=1.0,
+        geometry=(sphere, plane),
+        stiffness=ground.stiffness,
+        # Impacts of the published models are plastic: the dissipation lets nothing bounce.
+        dissipation=10.0,
+        static_friction=1.0,
+        dynamic_friction=1.0,
         viscous_friction=0.0,
-    )  # fmt: skip
+    )
     model.add(
         HuntCrossleyForce(
             name=name,
             contact_parameters=HuntCrossleyForce.ContactParametersSet(objects=[material]),
-            transition_velocity=vt,
+            transition_velocity=ground.transition_velocity,
         )
     )
 
 
-def floating(model: Model, body: Body) -> None:
+def add_planar_joint(model: Model, body: Body) -> None:
+    """Let a body move freely in the sagittal plane."""
     model.add(
         PlanarJoint(
             name="planar",
@@ -88,83 +170,120 @@ def floating(model: Model, body: Body) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ rimless wheel
-def wheel(K: float, vt: float, spokes: int, slope: float, inertia: float) -> Model:
+def build_wheel(ground: Ground, spokes: int, slope: float, inertia: float) -> Model:
+    """Return a rimless wheel of 1 kg on spokes of 1 m.
+
+    Args:
+        ground: parameters of the contact.
+        spokes: number of spokes.
+        slope: slope of the ground (rad).
+        inertia: moment of inertia about the hub (kg m^2).
+    """
     model = Model(name="RimlessWheel", gravity=(0.0, -GRAVITY, 0.0))
     hub = model.add(Body(name="hub", mass=1.0, inertia=(1.0, 1.0, inertia, 0.0, 0.0, 0.0)))
-    floating(model, hub)
-    plane = ground(model, slope)
-    for k in range(spokes):
-        angle = -pi / 2 + 2.0 * pi * k / spokes
-        at = (1.0 - FOOT) * cos(angle), (1.0 - FOOT) * sin(angle), 0.0
-        touch(model, plane, hub, at, f"spoke{k}", K, vt)
+    add_planar_joint(model, hub)
+    plane = add_slope(model, slope)
+    for index in range(spokes):
+        angle = -pi / 2 + 2.0 * pi * index / spokes
+        location = (1.0 - FOOT_RADIUS) * cos(angle), (1.0 - FOOT_RADIUS) * sin(angle), 0.0
+        add_contact(model, plane, hub, location, f"spoke{index}", ground)
     return model
 
 
-def wheel_speed(
-    K: float, vt: float, spokes: int = 8, slope: float = 0.08, inertia: float = 0.1
-) -> tuple[float, float]:
-    """Mean speed of the wheel between two impacts far down the slope, as it is and rigid, in rad/s just before one."""
+def compute_rigid_speed(spokes: int, slope: float, inertia: float) -> float:
+    """Return the speed of the wheel with rigid contact just before an impact (rad/s).
+
+    An impact multiplies the speed by a factor. In the steady state, the energy that it takes is what
+    gravity adds until the next impact.
+
+    Args:
+        spokes: number of spokes.
+        slope: slope of the ground (rad).
+        inertia: moment of inertia about the hub (kg m^2).
+    """
     half = pi / spokes
-    kept = 1.0 - (1.0 - cos(2.0 * half)) / (1.0 + inertia)
-    rigid = sqrt(4.0 * GRAVITY * sin(half) * sin(slope) / ((1.0 + inertia) * (1.0 - kept**2)))
-    with Simulation(wheel(K, vt, spokes, slope, inertia), "compiled") as simulation:
+    factor = 1.0 - (1.0 - cos(2.0 * half)) / (1.0 + inertia)
+    return sqrt(4.0 * GRAVITY * sin(half) * sin(slope) / ((1.0 + inertia) * (1.0 - factor**2)))
+
+
+def measure_wheel_speed(
+    ground: Ground, spokes: int = 8, slope: float = 0.08, inertia: float = 0.1
+) -> tuple[float, float]:
+    """Simulate the wheel far down the slope.
+
+    Args:
+        ground: parameters of the contact.
+        spokes: number of spokes.
+        slope: slope of the ground (rad).
+        inertia: moment of inertia about the hub (kg m^2).
+
+    Returns:
+        Mean speed just before the last impacts, and the speed with rigid contact (rad/s).
+    """
+    rigid = compute_rigid_speed(spokes, slope, inertia)
+    with Simulation(build_wheel(ground, spokes, slope, inertia), "compiled") as simulation:
         engine: Any = simulation.engine
-        # It stands on spoke 0 and rolls towards +x.
+        # The wheel stands on spoke 0 and rolls towards +x.
         y = simulation.initial_state(
             {"tx": sin(slope), "ty": cos(slope)},
             {"rz": -rigid, "tx": rigid * cos(slope), "ty": -rigid * sin(slope)},
         )
         runs = run_many(engine, [y], 20.0, accuracy=ACCURACY, most_events=4000, event_states=True)
+        rate_offset = list(engine.order).index(0) + len(engine.order)
         speeds = []
-        seen: set[str] = set()
+        latest_spoke: set[str] = set()
         for (_, name, begins), state in zip(runs.events[0], runs.event_states[0], strict=True):
-            # The first touch of a spoke counts, not what it rattles.
-            if begins and name not in seen:
-                speeds.append(-float(state[list(engine.order).index(0) + len(engine.order)]))
-                seen = {name}
+            # Only the first contact of a spoke is an impact; later ones are rattling.
+            if begins and name not in latest_spoke:
+                speeds.append(-float(state[rate_offset]))
+                latest_spoke = {name}
         return float(np.mean(speeds[-8:])), rigid
 
 
 # ---------------------------------------------------------------------------------------------- two straight legs
-def two_legs(K: float, vt: float, slope: float, hip: float, leg: float, above: float) -> Model:
-    """Legs of 1 m with a point mass each, so far from the hip (m)."""
+def build_legs(ground: Ground, parameters: LegParameters) -> Model:
+    """Return a walker with two straight legs of 1 m, each with a point mass."""
     model = Model(name="TwoLegs", gravity=(0.0, -GRAVITY, 0.0))
-    pelvis = model.add(Body(name="hip", mass=hip, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    floating(model, pelvis)
-    plane = ground(model, slope)
+    hip = model.add(
+        Body(name="hip", mass=parameters.hip_mass, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    )
+    add_planar_joint(model, hip)
+    plane = add_slope(model, parameters.slope)
     for name in ("right", "left"):
-        body = model.add(Body(name=name, mass=leg, mass_center=(0.0, -above, 0.0)))
-        model.add(
-            PinJoint(name=f"{name}_hip", coordinates=[Coordinate(name=f"{name}_rz")]).between(
-                pelvis, body
-            )
-        )
-        touch(model, plane, body, (0.0, -(1.0 - FOOT), 0.0), f"{name}_foot", K, vt)
+        mass_center = (0.0, -parameters.mass_distance, 0.0)
+        leg = model.add(Body(name=name, mass=parameters.leg_mass, mass_center=mass_center))
+        joint = PinJoint(name=f"{name}_hip", coordinates=[Coordinate(name=f"{name}_rz")])
+        model.add(joint.between(hip, leg))
+        add_contact(model, plane, leg, (0.0, -(1.0 - FOOT_RADIUS), 0.0), f"{name}_foot", ground)
     return model
 
 
 class Legs:
-    """Two straight legs walking, with the ground under the foot that swings taken away until it has passed."""
+    """Simulation of two straight legs whose swing foot has no contact until it has passed the other.
 
-    def __init__(
-        self, K: float, vt: float, slope: float, hip: float, leg: float, above: float
-    ) -> None:
-        self.simulation = Simulation(two_legs(K, vt, slope, hip, leg, above), "compiled")
+    Args:
+        ground: parameters of the contact.
+        parameters: parameters of the legs.
+    """
+
+    def __init__(self, ground: Ground, parameters: LegParameters) -> None:
+        self.simulation = Simulation(build_legs(ground, parameters), "compiled")
         self.engine: Any = self.simulation.engine
-        self.slope = slope
+        self.slope = parameters.slope
         infos = self.simulation.mechanism.coordinates
-        self.names = [infos[place].name for place in self.engine.order]
-        self.without = [
-            self._without(foot, K, vt, slope, hip, leg, above)
-            for foot in ("right_foot", "left_foot")
+        self.names = [infos[index].name for index in self.engine.order]
+        self.swing_numbers = [
+            self._disable_contact(foot, ground, parameters) for foot in ("right_foot", "left_foot")
         ]
-        self.normal = (sin(slope), cos(slope), 0.0)
+        self.normal = (sin(self.slope), cos(self.slope), 0.0)
+        self.rate = 0.0
 
-    def _without(
-        self, foot: str, K: float, vt: float, slope: float, hip: float, leg: float, above: float
-    ) -> Any:
-        """The numbers of a model one foot of which is so soft that it does not feel the ground."""
-        model = two_legs(K, vt, slope, hip, leg, above)
+    def _disable_contact(self, foot: str, ground: Ground, parameters: LegParameters) -> Any:
+        """Return the parameters of the engine in which one foot has no contact.
+
+        The foot has no stiffness instead of no contact, so that the layout of the engine is the same.
+        """
+        model = build_legs(ground, parameters)
         for force in model.components(HuntCrossleyForce):
             if force.name == foot:
                 force.contact_parameters.objects[0].stiffness = 0.0
@@ -172,137 +291,178 @@ class Legs:
             engine: Any = simulation.engine
             return engine.numbers.copy()
 
-    def place(self, name: str) -> int:
-        """Place of a coordinate in the state."""
+    def get_index(self, name: str) -> int:
+        """Return the index of a coordinate in the state."""
         return self.names.index(name)
 
-    def start(self, angle: float, rate: float, swing: float) -> Any:
-        """Just after a heel strike: the right leg in front stands, the left one is about to swing.
+    def create_start(self, angle: float, rate: float, swing_rate: float) -> Any:
+        """Return the state just after a heel strike of the right leg, with the left leg behind.
 
-        Args: angle: of the leg that stands to the normal of the slope, and half of the angle
-            between the legs. rate: of the leg that stands. swing: of the leg that swings.
+        Args:
+            angle: angle of the stance leg from the normal of the slope, and half of the angle
+                between the legs (rad).
+            rate: rate of the stance leg (rad/s).
+            swing_rate: rate of the swing leg (rad/s).
         """
-        from_normal = -self.slope
-        standing, behind = from_normal + angle, from_normal - angle
+        stance = -self.slope + angle
         values = {
-            "right_rz": standing,
-            "left_rz": behind,
-            "tx": -sin(standing),
-            "ty": cos(standing),
+            "right_rz": stance,
+            "left_rz": -self.slope - angle,
+            "tx": -sin(stance),
+            "ty": cos(stance),
         }
         speeds = {
             "right_rz": rate,
-            "left_rz": swing,
-            "tx": -rate * cos(standing),
-            "ty": -rate * sin(standing),
+            "left_rz": swing_rate,
+            "tx": -rate * cos(stance),
+            "ty": -rate * sin(stance),
         }
         return np.array(self.simulation.initial_state(values, speeds))
 
-    def step(self, y: Any, standing: int) -> tuple[float, Any] | None:
-        """From a heel strike of the standing foot to the next one of the other: how long it takes, and the state."""
-        legs, feet = ("right", "left"), ("right_foot", "left_foot")
-        swing = 1 - standing
-        passed = 0.0
-        # Both feet push until the one behind leaves the ground.
+    def simulate_step(self, y: Any, stance: int) -> tuple[float, Any] | None:
+        """Simulate from a heel strike to the next one of the other foot.
+
+        Also sets `rate` to the rate of the stance leg once the other foot has left the ground.
+
+        Args:
+            y: state just after a heel strike.
+            stance: index of the foot in front, 0 for right and 1 for left.
+
+        Returns:
+            Duration of the step (s) and the state at its end, or None if the walker falls.
+        """
+        legs = ("right", "left")
+        swing = 1 - stance
+        duration = 0.0
+        # Both feet are in contact until the one behind leaves the ground.
         if self.engine.find_touching_contacts(0.0, y.tolist()) >> swing & 1:
-            runs = self._run(y, None, 0.5, [Watch("lift", contact=feet[swing], stops=-1)])
-            y, passed = runs.states[0], float(runs.times[0])
-        # The rate of the leg, as far as it moves the hip: its foot may slip a little.
-        angle, n = float(y[self.place(f"{legs[standing]}_rz")]), len(self.names)
+            lift = Watch("lift", contact=f"{legs[swing]}_foot", stops=-1)
+            runs = self._integrate(y, None, 0.5, lift)
+            y = runs.states[0]
+            duration = float(runs.times[0])
+        # Take the rate from the velocity of the hip, because the foot may slip a little.
+        angle = float(y[self.get_index(f"{legs[stance]}_rz")])
+        speeds = y[len(self.names) :]
         self.rate = -float(
-            y[n + self.place("tx")] * cos(angle) + y[n + self.place("ty")] * sin(angle)
+            speeds[self.get_index("tx")] * cos(angle) + speeds[self.get_index("ty")] * sin(angle)
         )
-        # It swings through until it is ahead.
+        # The leg swings forward without contact until it is ahead of the normal of the slope.
         ahead = Watch("ahead", coordinate=f"{legs[swing]}_rz", level=-self.slope, stops=1)
-        runs = self._run(y, self.without[swing], 5.0, [ahead])
+        runs = self._integrate(y, self.swing_numbers[swing], 5.0, ahead)
         if runs.endings[0] != ENDING.STOPPED:
             return None
-        y, passed = runs.states[0], passed + float(runs.times[0])
-        # And on until it comes down on the slope.
+        y = runs.states[0]
+        duration += float(runs.times[0])
+        # Then it continues until the foot reaches the slope.
         down = Watch(
             "down",
             body=legs[swing],
-            station=(0.0, -(1.0 - FOOT), 0.0),
+            station=(0.0, -(1.0 - FOOT_RADIUS), 0.0),
             direction=self.normal,
-            level=FOOT,
+            level=FOOT_RADIUS,
             stops=-1,
         )
-        runs = self._run(y, self.without[swing], 5.0, [down])
+        runs = self._integrate(y, self.swing_numbers[swing], 5.0, down)
         if runs.endings[0] != ENDING.STOPPED:
             return None
-        return passed + float(runs.times[0]), runs.states[0]
+        return duration + float(runs.times[0]), runs.states[0]
 
-    def _run(self, y: Any, numbers: Any, to: float, watches: list[Watch]) -> Any:
+    def _integrate(self, y: Any, numbers: Any, to: float, watch: Watch) -> Any:
         return run_many(
-            self.engine, [y], to, numbers=numbers, accuracy=ACCURACY, watches=watches, most_events=4
+            self.engine,
+            [y],
+            to,
+            numbers=numbers,
+            accuracy=ACCURACY,
+            watches=[watch],
+            most_events=4,
         )
 
 
-def walk(legs: Legs, y: Any) -> dict[str, float] | None:
-    """What the gait settles to."""
-    standing, found = 0, None
+def find_gait(legs: Legs, y: Any) -> Gait | None:
+    """Return the gait to which the legs converge from a state, or None if they fall."""
+    stance = 0
+    period = 0.0
     for _ in range(STEPS):
-        found = legs.step(y, standing)
-        if found is None:
+        step = legs.simulate_step(y, stance)
+        if step is None:
             return None
-        standing, y = 1 - standing, found[1]
-    assert found is not None
-    right, left = (float(y[legs.place(f"{name}_rz")]) for name in ("right", "left"))
-    between = abs(right - left)
-    return {
-        "period": found[0],
-        "step": 2.0 * sin(between / 2.0),
-        "angle": between / 2.0,
-        "rate": legs.rate,
-    }
+        period, y = step
+        stance = 1 - stance
+    right, left = (float(y[legs.get_index(f"{name}_rz")]) for name in ("right", "left"))
+    angle = abs(right - left) / 2.0
+    return Gait(period, 2.0 * sin(angle), angle, legs.rate)
+
+
+def create_table(title: str, headings: tuple[str, ...]) -> Table:
+    """Return an empty table whose first columns describe the ground."""
+    table = Table(title=title)
+    for heading in ("stiffness (Pa)", "slip (m/s)", *headings):
+        table.add_column(heading, justify="right")
+    return table
+
+
+def format_ground(ground: Ground) -> list[str]:
+    """Return the first cells of a row."""
+    return [f"{ground.stiffness:.0e}", f"{ground.transition_velocity:g}"]
+
+
+def compare_wheel() -> Table:
+    """Return the table of the rimless wheel."""
+    title = "Rimless wheel, 8 spokes, slope 0.08: speed before an impact (rad/s)"
+    table = create_table(title, ("speed", "rigid", "difference"))
+    for ground in GROUNDS:
+        speed, rigid = measure_wheel_speed(ground)
+        cells = (f"{speed:.6f}", f"{rigid:.6f}", f"{speed / rigid - 1.0:+.2%}")
+        table.add_row(*format_ground(ground), *cells)
+    return table
+
+
+def compare_simplest_model() -> Table:
+    """Return the table of the simplest walking model."""
+    table = create_table(
+        f"Simplest walking model, slope {SIMPLEST_SLOPE:g} "
+        f"(published: {SIMPLEST_ANGLE}, {SIMPLEST_RATE})",
+        ("step angle (rad)", "rate / sqrt(g/l)", "difference of angle", "difference of rate"),
+    )
+    for ground in GROUNDS:
+        legs = Legs(ground, SIMPLEST)
+        start_rate = SIMPLEST_RATE * sqrt(GRAVITY)
+        # In the published gait, the swing leg starts with this multiple of the rate.
+        swing_rate = start_rate * cos(2.0 * SIMPLEST_ANGLE)
+        gait = find_gait(legs, legs.create_start(SIMPLEST_ANGLE, start_rate, swing_rate))
+        if gait is None:
+            table.add_row(*format_ground(ground), "falls")
+            continue
+        rate = gait.rate / sqrt(GRAVITY)
+        table.add_row(
+            *format_ground(ground),
+            f"{gait.angle:.6f}",
+            f"{rate:.6f}",
+            f"{gait.angle / SIMPLEST_ANGLE - 1.0:+.2%}",
+            f"{rate / SIMPLEST_RATE - 1.0:+.2%}",
+        )
+    return table
+
+
+def compare_compass_gait() -> Table:
+    """Return the table of the compass gait."""
+    title = "Compass gait, mu = 2, beta = 1, 3 degrees (published: 0.734 s, 0.535 m)"
+    table = create_table(title, ("period (s)", "step length (m)"))
+    for ground in GROUNDS:
+        legs = Legs(ground, COMPASS)
+        # A state near the published gait cycle.
+        gait = find_gait(legs, legs.create_start(0.2708, -1.0923, -0.3772))
+        cells = ("falls", "") if gait is None else (f"{gait.period:.5f}", f"{gait.length:.5f}")
+        table.add_row(*format_ground(ground), *cells)
+    return table
 
 
 def main() -> None:
     console = Console()
-    table = Table(title="Rimless wheel, 8 spokes, slope 0.08: speed before an impact (rad/s)")
-    for heading in ("stiffness (Pa)", "slip (m/s)", "speed", "rigid", "difference"):
-        table.add_column(heading, justify="right")
-    for K, vt in GROUNDS:
-        speed, rigid = wheel_speed(K, vt)
-        table.add_row(
-            f"{K:.0e}", f"{vt:g}", f"{speed:.6f}", f"{rigid:.6f}", f"{speed / rigid - 1.0:+.2%}"
-        )
-    console.print(table)
-    table = Table(
-        title="Simplest walking model, slope 0.009 (published: 0.200310901, -0.199832473)"
-    )
-    for heading in (
-        "stiffness (Pa)",
-        "slip (m/s)",
-        "step angle",
-        "rate",
-        "difference",
-        "of the rate",
-    ):
-        table.add_column(heading, justify="right")
-    for K, vt in GROUNDS:
-        legs = Legs(K, vt, SIMPLEST["gamma"], hip=1.0, leg=MASSLESS, above=1.0)
-        rate = SIMPLEST["rate"] * sqrt(GRAVITY)
-        found = walk(legs, legs.start(SIMPLEST["angle"], rate, rate * cos(2.0 * SIMPLEST["angle"])))
-        if found is None:
-            table.add_row(f"{K:.0e}", f"{vt:g}", "falls")
-            continue
-        angle, rate = found["angle"], found["rate"] / sqrt(GRAVITY)
-        off = f"{angle / SIMPLEST['angle'] - 1.0:+.2%}", f"{rate / SIMPLEST['rate'] - 1.0:+.2%}"
-        table.add_row(f"{K:.0e}", f"{vt:g}", f"{angle:.6f}", f"{rate:.6f}", *off)
-    console.print(table)
-    table = Table(title="Compass gait, mu = 2, beta = 1, 3 degrees (published: 0.734 s, 0.535 m)")
-    for heading in ("stiffness (Pa)", "slip (m/s)", "period (s)", "step (m)"):
-        table.add_column(heading, justify="right")
-    for K, vt in GROUNDS:
-        legs = Legs(K, vt, radians(3.0), hip=10.0, leg=5.0, above=0.5)
-        found = walk(legs, legs.start(0.2708, -1.0923, -0.3772))
-        table.add_row(
-            f"{K:.0e}",
-            f"{vt:g}",
-            *((f"{found['period']:.5f}", f"{found['step']:.5f}") if found else ("falls", "")),
-        )
-    console.print(table)
+    console.print(compare_wheel())
+    console.print(compare_simplest_model())
+    console.print(compare_compass_gait())
 
 
 if __name__ == "__main__":

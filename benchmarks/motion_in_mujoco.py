@@ -1,11 +1,15 @@
-"""How fast models move in MuJoCo, by the plain file and by the driver, beside OpenSim: simulated seconds per second.
-
-From the default pose, in processor time, in turn; the least of three. OpenSim takes the steps that
-its accuracy asks for; the plain file has other laws (see docs/mujoco.md). Give the model files; the
-walker is always among them:
+"""Simulation speed in MuJoCo, with osimlite's plain file and with its driver, compared with OpenSim.
 
     python benchmarks/motion_in_mujoco.py
-    opensim-models/Models/*/{gait10dof18musc,Rajagopal2016}.osim
+    python benchmarks/motion_in_mujoco.py FILE.osim...
+
+The models are the Dynamic Walker and the given files, for example gait10dof18musc.osim and
+Rajagopal2016.osim of opensim-models. The *plain file* is the translated MuJoCo model, whose force
+laws differ from OpenSim's (see docs/mujoco.md). The *driver* computes OpenSim's forces in each step
+of MuJoCo. Both use fixed steps; OpenSim selects steps by its accuracy.
+
+Each line is one model and one program with its step (s) or accuracy. The number is the simulated
+time per processor time (s/s) from the default pose; the shortest time of three rounds counts.
 """
 
 from __future__ import annotations
@@ -22,48 +26,70 @@ import osimlite
 import osimlite.mjcf
 
 WALKER = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
-TO, STEPS, ACCURACIES, ROUNDS = 0.1, (1e-3, 2e-4), (1e-3, 1e-5), 3
+
+TO = 0.1
+"""End of the simulation (s)."""
+
+STEPS = (1e-3, 2e-4)
+"""Step lengths in MuJoCo (s)."""
+
+ACCURACIES = (1e-3, 1e-5)
+"""Relative accuracies in OpenSim."""
+
+# Other work on the machine only makes a run slower, so the shortest time is the most reliable.
+ROUNDS = 3
+"""Number of rounds; the programs run in turn in each."""
 
 
 def main() -> None:
     opensim.Logger.setLevelString("off")
     for path in (WALKER, *map(Path, sys.argv[1:])):
         model = osimlite.read(path)
-        runs = {f"plain file, {step:g} s": plain(model, step) for step in STEPS}
-        runs |= {f"driver, {step:g} s": driven(model, step) for step in STEPS}
-        runs |= {f"OpenSim, {accuracy:g}": in_opensim(path, accuracy) for accuracy in ACCURACIES}
-        times = {
-            name: min(turn[name] for turn in [timed(runs) for _ in range(ROUNDS)]) for name in runs
+        runs = {f"plain file, {step:g} s": prepare_plain_file(model, step) for step in STEPS}
+        runs |= {f"driver, {step:g} s": prepare_driver(model, step) for step in STEPS}
+        runs |= {
+            f"OpenSim, {accuracy:g}": prepare_opensim(path, accuracy) for accuracy in ACCURACIES
         }
-        for name, seconds in times.items():
+        rounds = [time_runs(runs) for _ in range(ROUNDS)]
+        for name in runs:
+            seconds = min(times[name] for times in rounds)
             print(f"{path.stem:24} {name:20} {TO / seconds:8.2f} s/s")
 
 
-def timed(runs: dict[str, Callable[[], None]]) -> dict[str, float]:
-    """Processor time (s) of each."""
-    found = {}
+def time_runs(runs: dict[str, Callable[[], None]]) -> dict[str, float]:
+    """Do each run once.
+
+    Args:
+        runs: functions by name.
+
+    Returns:
+        Processor time of each (s).
+    """
+    times = {}
     for name, run in runs.items():
         start = time.process_time()
         run()
-        found[name] = time.process_time() - start
-    return found
+        times[name] = time.process_time() - start
+    return times
 
 
-def plain(model: osimlite.Model, step: float) -> Callable[[], None]:
+def prepare_plain_file(model: osimlite.Model, step: float) -> Callable[[], None]:
+    """Return a function that simulates the translated model in MuJoCo with a fixed step (s)."""
     mjcf = osimlite.to_mjcf(model, visuals=False)
-    compiled = mujoco.MjModel.from_xml_string(mjcf.text)
-    compiled.opt.timestep = step
-    data = mujoco.MjData(compiled)
+    mujoco_model = mujoco.MjModel.from_xml_string(mjcf.text)
+    mujoco_model.opt.timestep = step
+    data = mujoco.MjData(mujoco_model)
 
     def run() -> None:
-        mujoco.mj_resetDataKeyframe(compiled, data, 0)
+        mujoco.mj_resetDataKeyframe(mujoco_model, data, 0)
         for _ in range(round(TO / step)):
-            mujoco.mj_step(compiled, data)
+            mujoco.mj_step(mujoco_model, data)
 
     return run
 
 
-def driven(model: osimlite.Model, step: float) -> Callable[[], None]:
+def prepare_driver(model: osimlite.Model, step: float) -> Callable[[], None]:
+    """Return a function that simulates in MuJoCo with OpenSim's forces and a fixed step (s)."""
     driver = osimlite.mjcf.Driver(model, timestep=step, equilibrate=True)
 
     def run() -> None:
@@ -73,11 +99,13 @@ def driven(model: osimlite.Model, step: float) -> Callable[[], None]:
     return run
 
 
-def in_opensim(path: Path, accuracy: float) -> Callable[[], None]:
+def prepare_opensim(path: Path, accuracy: float) -> Callable[[], None]:
+    """Return a function that simulates a model file in OpenSim with a relative accuracy."""
     model = opensim.Model(str(path))
     model.initSystem()
 
     def run() -> None:
+        # As the driver, OpenSim begins from the equilibrium of the muscles.
         state = model.initSystem()
         model.equilibrateMuscles(state)
         manager = opensim.Manager(model)

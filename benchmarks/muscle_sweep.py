@@ -1,11 +1,15 @@
-"""Runs of a muscle-driven model under other controls each: `osimlite sweep` with one worker, beside OpenSim's Manager.
-
-gait10dof18musc for half a second from equilibrium, at accuracy 1e-3. Each muscle, alike on both
-sides, has six nodes of its control. osimlite's time is that of the whole sweep: samples, models,
-simulations, an expression of the mass centre, the file. OpenSim's model is made once, and only the
-ordinates of its functions change. Times of the processor, in turn.
+"""Speed of `osimlite sweep` with a muscle-driven model, compared with a loop over OpenSim's Manager.
 
     python benchmarks/muscle_sweep.py
+
+gait10dof18musc is simulated many times for half a second from equilibrium, at accuracy 1e-3. Each
+run has other controls: every pair of left and right muscles shares six nodes of a piecewise linear
+control.
+
+The table has processor times; the programs run in turn. osimlite's time includes the complete sweep
+with one worker: samples, models, simulations, an expression of the mass centre, and the results
+file. OpenSim's model is made once, and only the ordinates of its control functions change. The last
+line has the differences of the final height of the mass centre between the programs.
 """
 
 from __future__ import annotations
@@ -31,71 +35,113 @@ from osimlite.studies.sweep.variables import Floats
 from osimlite.studies.sweep.variants import Variants
 
 MODEL = CORPUS.parent / "models" / "m0005" / "gait10dof18musc.osim"
-TO, NODES, RUNS, ROUNDS, HEIGHT = 0.5, 6, 100, 3, "end(center_of_mass_Y)"
+
+TO = 0.5
+"""End of each simulation (s)."""
+
+NODES = 6
+"""Number of nodes of each control."""
+
+RUNS = 100
+"""Number of simulations of a sweep."""
+
+ROUNDS = 3
+"""Number of timed pairs of sweeps."""
+
+HEIGHT = "end(center_of_mass_Y)"
+"""Measure of each simulation: the final height of the mass centre (m)."""
 
 
 def main() -> None:
-    model = osimlite.read(MODEL)
-    made = plan(
-        model,
+    muscle_plan = plan(
+        osimlite.read(MODEL),
+        # The pattern gives the left and the right muscle of a pair the same control.
         {f"{{*}}_?/control@0:{TO:g}:{NODES}": "0.01:1"},
         measures=(HEIGHT,),
         to=TO,
         equilibrate=True,
     )
-    chosen = choose_samples(made.variables, "sobol", RUNS)
-    rows, variants = chosen.make_block(0, RUNS), Variants(made)
+    samples = choose_samples(muscle_plan.variables, "sobol", RUNS)
+    rows = samples.make_block(0, RUNS)
+    # A variant has the controller whose functions the loop in OpenSim changes.
+    variants = Variants(muscle_plan)
     variants.apply_sample(rows[0].tolist())
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder)
-        osimlite.write(variants.model, path / "model.osim")
-        theirs = by_opensim(path / "model.osim", [item.name for item in made.variables], rows)
-        ours = partial(sweep, made, chosen, path / "runs.parquet", workers=1, force=True)
-        name = f"{RUNS} runs of {TO:g} s, {len(made.variables)} nodes"
-        times = pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        osimlite.write(variants.model, folder / "model.osim")
+        names = [variable.name for variable in muscle_plan.variables]
+        theirs = prepare_opensim_runs(folder / "model.osim", names, rows)
+        times = pair(
+            f"{RUNS} runs of {TO:g} s, {len(names)} nodes",
+            ours=partial(
+                sweep, muscle_plan, samples, folder / "runs.parquet", workers=1, force=True
+            ),
+            theirs=theirs,
+            rounds=ROUNDS,
+            clock=time.process_time,
+        )
     console = Console()
     report(
-        "gait10dof18musc under other controls each, accuracy 1e-3, processor time",
+        "gait10dof18musc with other controls in each run, accuracy 1e-3, processor time",
         [times],
         console=console,
     )
-    apart = np.abs(Runner(made).run(rows).measures[HEIGHT] - np.array(theirs()))
+    heights = Runner(muscle_plan).run(rows).measures[HEIGHT]
+    differences = np.abs(heights - np.array(theirs()))
     console.print(
-        f"heights differ by {np.median(apart):.2g} m in the middle, {apart.max():.2g} at most"
+        f"difference of the heights: median {np.median(differences):.2g} m, "
+        f"greatest {differences.max():.2g} m"
     )
 
 
-def by_opensim(path: Path, names: list[str], rows: Floats) -> Callable[[], list[float]]:
+def prepare_opensim_runs(path: Path, names: list[str], rows: Floats) -> Callable[[], list[float]]:
+    """Return a function that simulates all runs in OpenSim and returns the final heights (m).
+
+    Args:
+        path: model file, which has the controller of the sweep.
+        names: names of the variables, each the name of a muscle without its side, and a node.
+        rows: values of the variables (runs, variables).
+    """
     import opensim
 
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(path))
     state = model.initSystem()
     model.equilibrateMuscles(state)
-    brain = opensim.PrescribedController.safeDownCast(model.getControllerSet().get("node_1"))
-    actuators, functions = brain.getSocket("actuators"), brain.get_ControlFunctions()
-    curves: list[tuple[Any, list[int]]] = []
-    for number in range(functions.getSize()):
-        muscle = Path(actuators.getConnecteePath(number)).name.rpartition("_")[0]
-        places = [place for place, name in enumerate(names) if name.startswith(f"{muscle}_")]
-        curve = opensim.PiecewiseLinearFunction.safeDownCast(functions.get(number))
-        curves.append((curve, [places[0], *places, places[-1]]))
+    curves = find_control_curves(model, names)
 
     def run() -> list[float]:
-        found = []
+        heights = []
         for row in rows.tolist():
-            for curve, places in curves:
-                for point, place in enumerate(places):
-                    curve.setY(point, row[place])
+            for curve, indices in curves:
+                for point, index in enumerate(indices):
+                    curve.setY(point, row[index])
             manager = opensim.Manager(model)
             manager.setIntegratorAccuracy(1e-3)
             manager.initialize(opensim.State(state))
             end = manager.integrate(TO)
             model.realizePosition(end)
-            found.append(model.calcMassCenterPosition(end)[1])
-        return found
+            heights.append(model.calcMassCenterPosition(end)[1])
+        return heights
 
     return run
+
+
+def find_control_curves(model: Any, names: list[str]) -> list[tuple[Any, list[int]]]:
+    """Return each control function of the model, and the indices of the variables of its points."""
+    import opensim
+
+    controller = opensim.PrescribedController.safeDownCast(model.getControllerSet().get("node_1"))
+    actuators = controller.getSocket("actuators")
+    functions = controller.get_ControlFunctions()
+    curves: list[tuple[Any, list[int]]] = []
+    for number in range(functions.getSize()):
+        muscle = Path(actuators.getConnecteePath(number)).name.rpartition("_")[0]
+        indices = [index for index, name in enumerate(names) if name.startswith(f"{muscle}_")]
+        curve = opensim.PiecewiseLinearFunction.safeDownCast(functions.get(number))
+        # The function has one more point on either side, which keep it constant outside the nodes.
+        curves.append((curve, [indices[0], *indices, indices[-1]]))
+    return curves
 
 
 if __name__ == "__main__":
