@@ -1,13 +1,19 @@
-"""Models with muscles: osimlite and OpenSim side by side, in processor time.
+"""Speed of models with muscles, compared with OpenSim, in processor time.
 
     python benchmarks/muscles.py [NAME=FILE ...]
 
-Without files: models of the shared corpus, if that stands beside the repository. An evaluation is
-that of the derivative of a state, in turn of 16 poses; OpenSim's goes through its Python binding,
-which adds about a microsecond. Motions start from the equilibrium of the muscles and go 0.1 s at
-accuracy 1e-5. "apart" is the largest difference of a coordinate (rad or m) between the programs at
-the end of the motion, "steps" how many each took. "First use" is a new process with an empty cache
-of machine code, then one that has it, less what reading the model takes.
+Without files, the models are those of the shared corpus if it is present. The tables are:
+
+- *evaluation*: derivatives of one state, mean of 16 poses. OpenSim is called through its Python
+  binding, which adds about a microsecond.
+- *motion*: a simulation of 0.1 s from the equilibrium of the muscles, at accuracy 1e-5.
+- *moment arms*: moment arms of all muscles about all coordinates in one pose.
+- *equilibrium*: equilibrium of all muscles, mean of 16 poses.
+
+Another table has the number of integrator steps of both programs, and the largest difference of a
+coordinate at the end of the motion (rad or m). *First use* is the time of a new process without and
+then with cached machine code, without reading the model. The last table and line are about many
+simulations: the time of a sweep, and the memory of ten times as many runs.
 """
 
 from __future__ import annotations
@@ -38,16 +44,39 @@ from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
 from osimlite.studies.sweep.sampling import choose_samples
 
-REAL = {
+CORPUS_MODELS = {
     "arm26": "m0001",
     "gait10dof18musc": "m0005",
     "gait2392, Thelen": "m0014",
     "gait2392, Millard": "m0013",
     "Rajagopal": "m0954",
 }
-TO, ACCURACY, ROUNDS, POSES = 0.1, 1e-5, 5, 16
-SWEPT, RUNS = "gait10dof18musc", 1000
-FIRST = """
+"""Titles of models in the tables, and their names in the corpus."""
+
+TO = 0.1
+"""End of the simulation (s)."""
+
+ACCURACY = 1e-5
+"""Relative accuracy of the integrators."""
+
+ROUNDS = 5
+"""Number of timed pairs of runs."""
+
+# Poses that differ keep either program from using earlier results.
+POSES = 16
+"""Number of poses in which one evaluation is timed."""
+
+SWEPT_MODEL = "gait10dof18musc"
+"""Title of the model that is simulated many times."""
+
+SWEEP_RUNS = 1000
+"""Number of simulations of that model."""
+
+# OpenSim's time is proportional to the number of runs, so a part of them is enough.
+OPENSIM_SHARE = 20
+"""Divisor of the number of simulations that OpenSim does."""
+
+FIRST_USE_SCRIPT = """
 import sys, time, osimlite
 model = osimlite.read(sys.argv[1])
 started = time.perf_counter()
@@ -62,7 +91,14 @@ def main() -> None:
     opensim.Logger.setLevelString("off")
     console = Console()
     ends = Table(title=f"After {TO:g} s at accuracy {ACCURACY:g}")
-    for heading in ("model", "muscles", "engine", "steps", "OpenSim's", "apart"):
+    for heading in (
+        "model",
+        "muscles",
+        "engine",
+        "osimlite, steps",
+        "OpenSim, steps",
+        "difference, rad or m",
+    ):
         ends.add_column(heading, justify="left" if heading in ("model", "engine") else "right")
     times: dict[str, list[Pair]] = {
         "evaluation": [],
@@ -71,75 +107,111 @@ def main() -> None:
         "equilibrium": [],
     }
     with tempfile.TemporaryDirectory() as folder:
-        for name, path in models(Path(folder)):
-            theirs = opensim.Model(str(path))
-            theirs.initSystem()
-            model = osimlite.read(path)
-            for engine in ("compiled", "bullet"):
-                with Simulation(model, engine, opensim_derivatives=True) as simulation:
-                    title = f"{name}, {engine}"
-                    times["evaluation"].append(
-                        compared(
-                            title,
-                            evaluations(simulation),
-                            in_poses(theirs, theirs.realizeAcceleration),
-                            POSES,
-                        )
-                    )
-                    ours, other = motions(simulation), their_motions(theirs, ROUNDS + 2)
-                    row = apart(simulation, ours(), other())
-                    ends.add_row(name, str(theirs.getMuscles().getSize()), engine, *row)
-                    times["motion"].append(compared(title, ours, other))
-                    if engine == "compiled":
-                        asked = in_poses(theirs, theirs.equilibrateMuscles)
-                        times["equilibrium"].append(
-                            compared(name, equilibria(simulation), asked, POSES)
-                        )
-            times["moment arms"].append(
-                compared(name, moment_arms(model, theirs), their_moment_arms(theirs))
-            )
-            console.print(f"{name}: first use {first_use(path)}", highlight=False)
+        for name, path in find_models(Path(folder)):
+            compare_model(name, path, times, ends)
+            console.print(f"{name}: first use {measure_first_use(path)}", highlight=False)
         console.print(ends)
         for title, pairs in times.items():
             report(f"{title}, processor time", pairs, console=console)
-        sweep(dict(models(Path(folder))).get(SWEPT), console)
+        swept_file = dict(find_models(Path(folder))).get(SWEPT_MODEL)
+        if swept_file is not None:
+            compare_sweep(swept_file, console)
 
 
-def models(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Name and file of each model."""
-    given = [word.partition("=") for word in sys.argv[1:]]
-    yield from ((name, Path(path)) for name, _, path in given)
-    for name, number in {} if given else REAL.items():
+def find_models(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Find the models of the command line, or those of the corpus.
+
+    Args:
+        folder: folder for uncompressed models of the corpus.
+
+    Yields:
+        Name and file of each model.
+    """
+    words = [word.partition("=") for word in sys.argv[1:]]
+    yield from ((name, Path(path)) for name, _, path in words)
+    if words:
+        return
+    for name, number in CORPUS_MODELS.items():
         path = CORPUS / f"{number}.osim.gz"
         if path.exists():
             (folder / f"{number}.osim").write_bytes(gzip.decompress(path.read_bytes()))
             yield name, folder / f"{number}.osim"
 
 
-def compared(
+def compare_model(name: str, path: Path, times: dict[str, list[Pair]], ends: Table) -> None:
+    """Time a model with each engine of osimlite and with OpenSim.
+
+    Args:
+        name: title of the model.
+        path: model file.
+        times: lists by title of their table, which are extended.
+        ends: table of steps and differences, to which rows are added.
+    """
+    opensim_model = opensim.Model(str(path))
+    opensim_model.initSystem()
+    model = osimlite.read(path)
+    for engine in ("compiled", "bullet"):
+        with Simulation(model, engine, opensim_derivatives=True) as simulation:
+            title = f"{name}, {engine}"
+            ours: Callable[[], Any] = prepare_evaluations(simulation)
+            theirs: Callable[[], Any] = prepare_opensim_poses(
+                opensim_model, opensim_model.realizeAcceleration
+            )
+            times["evaluation"].append(time_pair(title, ours, theirs, POSES))
+            ours = prepare_motions(simulation)
+            # One run for the differences, one as warm-up, and one for each round.
+            theirs = prepare_opensim_motions(opensim_model, ROUNDS + 2)
+            row = compare_ends(simulation, ours(), theirs())
+            ends.add_row(name, str(opensim_model.getMuscles().getSize()), engine, *row)
+            times["motion"].append(time_pair(title, ours, theirs))
+            # Equilibria involve no dynamics of the bodies, so that one engine is enough.
+            if engine == "compiled":
+                ours = prepare_equilibria(simulation)
+                theirs = prepare_opensim_poses(opensim_model, opensim_model.equilibrateMuscles)
+                times["equilibrium"].append(time_pair(name, ours, theirs, POSES))
+    ours = prepare_moment_arms(model, opensim_model)
+    theirs = prepare_opensim_moment_arms(opensim_model)
+    times["moment arms"].append(time_pair(name, ours, theirs))
+
+
+def time_pair(
     name: str, ours: Callable[[], object], theirs: Callable[[], object], count: int = 1
 ) -> Pair:
-    found = pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
+    """Return the processor times of one evaluation (s).
+
+    Args:
+        name: name of the row.
+        ours: evaluations with osimlite.
+        theirs: evaluations with OpenSim.
+        count: number of evaluations that one call makes.
+    """
+    row = pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
     return Pair(
-        name, *(tuple(value / count for value in row) for row in (found.ours, found.theirs))
+        name,
+        tuple(seconds / count for seconds in row.ours),
+        tuple(seconds / count for seconds in row.theirs),
     )
 
 
 # ---------------------------------------------------------------------------------------------- one evaluation
-def poses(count: int) -> np.ndarray:
+def draw_offsets(count: int) -> np.ndarray:
+    """Return small random offsets (poses, count) of coordinates, rad or m."""
     return np.random.default_rng(0).uniform(-0.02, 0.02, (POSES, count))
 
 
-def states_of(simulation: Simulation) -> np.ndarray:
+def create_states(simulation: Simulation) -> np.ndarray:
+    """Return states (poses, states) near the default pose, with muscles near equilibrium."""
     start = np.array(simulation.initial_state({}, {}, equilibrate=True))
     states = np.repeat(start[None], POSES, axis=0)
     count = len(simulation.state.order)
-    states[:, :count] += poses(count)
+    states[:, :count] += draw_offsets(count)
     return states
 
 
-def evaluations(simulation: Simulation) -> Callable[[], None]:
-    engine, states = cast(System, simulation.engine), states_of(simulation)
+def prepare_evaluations(simulation: Simulation) -> Callable[[], None]:
+    """Return a function that computes the derivatives of all states."""
+    engine = cast(System, simulation.engine)
+    states = create_states(simulation)
 
     def run() -> None:
         for y in states:
@@ -148,27 +220,42 @@ def evaluations(simulation: Simulation) -> Callable[[], None]:
     return run
 
 
-def in_poses(model: Any, ask: Callable[[Any], object]) -> Callable[[], None]:
+def prepare_opensim_poses(model: Any, evaluate: Callable[[Any], object]) -> Callable[[], None]:
+    """Return a function that makes an evaluation in OpenSim in each pose.
+
+    Args:
+        model: initialised OpenSim model.
+        evaluate: evaluation of a state.
+    """
     state = opensim.State(model.initializeState())
     model.equilibrateMuscles(state)
     start = state.getQ().to_numpy().copy()
-    vectors = [opensim.Vector.createFromMat(start + shift) for shift in poses(len(start))]
+    # Convert the poses before, so that the conversion is not timed.
+    vectors = [opensim.Vector.createFromMat(start + offset) for offset in draw_offsets(len(start))]
 
     def run() -> None:
         for q in vectors:
             state.setQ(q)
-            ask(state)
+            evaluate(state)
 
     return run
 
 
 # ----------------------------------------------------------------------------------------------------- motions
-def motions(simulation: Simulation) -> Callable[[], Any]:
+def prepare_motions(simulation: Simulation) -> Callable[[], Any]:
+    """Return a function that simulates from equilibrium and returns the trajectory."""
     return lambda: simulation.run(TO, accuracy=ACCURACY, report_interval=TO, equilibrate=True)
 
 
-def their_motions(model: Any, count: int) -> Callable[[], Any]:
-    ready = []
+def prepare_opensim_motions(model: Any, count: int) -> Callable[[], Any]:
+    """Return a function that simulates in OpenSim, and returns manager, final state and model.
+
+    Args:
+        model: initialised OpenSim model.
+        count: how often the function can be called.
+    """
+    # A manager can start only once. Initialise all of them here, so that only the motion is timed.
+    managers = []
     for _ in range(count):
         state = opensim.State(model.initializeState())
         state.setTime(0.0)
@@ -176,39 +263,59 @@ def their_motions(model: Any, count: int) -> Callable[[], Any]:
         manager = opensim.Manager(model)
         manager.setIntegratorAccuracy(ACCURACY)
         manager.initialize(state)
-        ready.append(manager)
+        managers.append(manager)
 
     def run() -> Any:
-        manager = ready.pop()
+        # The final state lives only as long as its manager, which is returned for that reason.
+        manager = managers.pop()
         return manager, manager.integrate(TO), model
 
     return run
 
 
-def apart(simulation: Simulation, ours: Any, theirs: Any) -> tuple[str, str, str]:
+def compare_ends(simulation: Simulation, ours: Any, theirs: Any) -> tuple[str, str, str]:
+    """Compare the ends of two simulations.
+
+    Args:
+        simulation: simulation of osimlite.
+        ours: its trajectory.
+        theirs: manager, final state and model of OpenSim.
+
+    Returns:
+        Cells of a row: steps of osimlite, steps of OpenSim, largest difference (rad or m).
+    """
     manager, end, model = theirs
     values = {item.getAbsolutePathString(): item.getValue(end) for item in model.getCoordinateSet()}
     infos = simulation.mechanism.coordinates
-    most = max(abs(ours.values[-1, k] - values[info.path]) for k, info in enumerate(infos))
-    return str(ours.summary["steps"]), str(manager.getStatesTable().getNumRows() - 1), f"{most:.1e}"
+    difference = max(
+        abs(ours.values[-1, index] - values[info.path]) for index, info in enumerate(infos)
+    )
+    opensim_steps = manager.getStatesTable().getNumRows() - 1
+    return str(ours.summary["steps"]), str(opensim_steps), f"{difference:.1e}"
 
 
 # ------------------------------------------------------------------------------------ moment arms, equilibrium
-def moment_arms(model: Any, theirs: Any) -> Callable[[], object]:
+def prepare_moment_arms(model: Any, opensim_model: Any) -> Callable[[], object]:
+    """Return a function that computes all moment arms in OpenSim's default pose."""
     paths = osimlite.paths(model)
-    state = theirs.initializeState()
-    q = {item.getAbsolutePathString(): item.getValue(state) for item in theirs.getCoordinateSet()}
+    state = opensim_model.initializeState()
+    q = {
+        item.getAbsolutePathString(): item.getValue(state)
+        for item in opensim_model.getCoordinateSet()
+    }
     return lambda: paths.moment_arms(q)
 
 
-def their_moment_arms(model: Any) -> Callable[[], None]:
+def prepare_opensim_moment_arms(model: Any) -> Callable[[], None]:
+    """Return a function that computes all moment arms in OpenSim."""
     state = opensim.State(model.initializeState())
-    muscles = [model.getMuscles().get(k) for k in range(model.getMuscles().getSize())]
-    coordinates = [
-        model.getCoordinateSet().get(k) for k in range(model.getCoordinateSet().getSize())
-    ]
+    muscle_set = model.getMuscles()
+    muscles = [muscle_set.get(index) for index in range(muscle_set.getSize())]
+    coordinate_set = model.getCoordinateSet()
+    coordinates = [coordinate_set.get(index) for index in range(coordinate_set.getSize())]
 
     def run() -> None:
+        # Setting the coordinates invalidates the results in the state.
         state.setQ(state.getQ())
         model.realizePosition(state)
         for muscle in muscles:
@@ -218,8 +325,10 @@ def their_moment_arms(model: Any) -> Callable[[], None]:
     return run
 
 
-def equilibria(simulation: Simulation) -> Callable[[], None]:
-    engine, states = simulation.engine, states_of(simulation).tolist()
+def prepare_equilibria(simulation: Simulation) -> Callable[[], None]:
+    """Return a function that solves the equilibrium of the muscles in all states."""
+    engine = simulation.engine
+    states = create_states(simulation).tolist()
 
     def run() -> None:
         for y in states:
@@ -229,34 +338,62 @@ def equilibria(simulation: Simulation) -> Callable[[], None]:
 
 
 # --------------------------------------------------------------------------------------- first use, many runs
-def first_use(path: Path) -> str:
+def measure_first_use(path: Path) -> str:
+    """Return the times of two new processes that simulate a model, the first without a cache."""
     with tempfile.TemporaryDirectory() as cache:
         environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
-        command = [sys.executable, "-c", FIRST, str(path)]
-        seconds = [
-            float(
-                subprocess.run(
-                    command, env=environment, check=True, capture_output=True, text=True
-                ).stdout
+        command = [sys.executable, "-c", FIRST_USE_SCRIPT, str(path)]
+        seconds = []
+        for _ in range(2):
+            done = subprocess.run(
+                command, env=environment, check=True, capture_output=True, text=True
             )
-            for _ in range(2)
-        ]
+            seconds.append(float(done.stdout))
     return f"{seconds[0]:.2f} s the first time, {seconds[1]:.2f} s the second"
 
 
-def sweep(path: Path | None, console: Console) -> None:
-    """Muscle-driven runs from starts apart: per core, and the memory of ten times as many."""
-    if path is None:
-        return
-    made = plan(osimlite.read(path), {"hip_flexion_r": "-0.1:0.1"}, to=TO, accuracy=ACCURACY)
-    runner = Runner(made)
-    rows = choose_samples(made.variables, "sobol", RUNS).make_block(0, RUNS)
+def compare_sweep(path: Path, console: Console) -> None:
+    """Print the times of many runs of a model from different starts, and the growth of memory.
+
+    Args:
+        path: model file.
+        console: console to print to.
+    """
+    sweep_plan = plan(osimlite.read(path), {"hip_flexion_r": "-0.1:0.1"}, to=TO, accuracy=ACCURACY)
+    runner = Runner(sweep_plan)
+    rows = choose_samples(sweep_plan.variables, "sobol", SWEEP_RUNS).make_block(0, SWEEP_RUNS)
+    row = pair(
+        f"{SWEEP_RUNS} runs of {SWEPT_MODEL}",
+        ours=lambda: runner.run(rows),
+        theirs=prepare_opensim_sweep(path, rows[: SWEEP_RUNS // OPENSIM_SHARE]),
+        rounds=3,
+        clock=time.process_time,
+    )
+    opensim_times = tuple(float(OPENSIM_SHARE) * seconds for seconds in row.theirs)
+    report("A sweep, processor time", [Pair(row.name, row.ours, opensim_times)], console=console)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    samples = choose_samples(sweep_plan.variables, "sobol", 10 * SWEEP_RUNS)
+    for first in range(0, 10 * SWEEP_RUNS, SWEEP_RUNS):
+        runner.run(samples.make_block(first, first + SWEEP_RUNS))
+    growth = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    console.print(
+        f"{10 * SWEEP_RUNS} runs take {growth:.1f} MB more than {SWEEP_RUNS}", highlight=False
+    )
+
+
+def prepare_opensim_sweep(path: Path, rows: Any) -> Callable[[], None]:
+    """Return a function that simulates from several hip angles in OpenSim.
+
+    Args:
+        path: model file.
+        rows: hip angles (runs, 1), rad.
+    """
     model = opensim.Model(str(path))
     state = model.initSystem()
     hip = model.getCoordinateSet().get("hip_flexion_r")
 
-    def theirs() -> None:
-        for (value,) in rows[: RUNS // 20].tolist():
+    def run() -> None:
+        for (value,) in rows.tolist():
             start = opensim.State(state)
             hip.setValue(start, value, False)
             manager = opensim.Manager(model)
@@ -264,24 +401,7 @@ def sweep(path: Path | None, console: Console) -> None:
             manager.initialize(start)
             manager.integrate(TO)
 
-    found = pair(
-        f"{RUNS} runs of {SWEPT}",
-        ours=lambda: runner.run(rows),
-        theirs=theirs,
-        rounds=3,
-        clock=time.process_time,
-    )
-    report(
-        "A sweep, processor time",
-        [Pair(found.name, found.ours, tuple(20.0 * x for x in found.theirs))],
-        console=console,
-    )
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    many = choose_samples(made.variables, "sobol", 10 * RUNS)
-    for first in range(0, 10 * RUNS, RUNS):
-        runner.run(many.make_block(first, first + RUNS))
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    console.print(f"{10 * RUNS} runs take {grown:.1f} MB more than {RUNS}", highlight=False)
+    return run
 
 
 if __name__ == "__main__":

@@ -1,10 +1,15 @@
-"""What 18 muscles do in a measured gait: MocoInverse beside StaticOptimization.
+"""Forces of 18 muscles in a measured gait: MocoInverse compared with StaticOptimization.
 
     python benchmarks/muscles_of_gait.py [--core FOLDER] [--picture FILE.png]
 
-FOLDER: as of ``benchmarks/optimal.py``. Both are of one model, whose muscles are those of De Groote
-and Fregly. OpenSim's StaticOptimization cannot begin with these; it is asked about the muscles of
-the file, and so is ours then.
+FOLDER contains the sources of opensim-core, or is its git directory, as for benchmarks/optimal.py.
+Both methods are osimlite's and use one model, with muscles of De Groote and Fregly. OpenSim's
+StaticOptimization does not support these muscles; for a check of ours, both programs also solve with
+the original muscles of the file, and the largest difference of an activation is printed.
+
+The table in Markdown has, for each muscle, the mean activation and the largest force of MocoInverse
+and then of StaticOptimization, the root mean square of the difference of the forces, and their
+correlation. The picture shows the forces of the right leg.
 """
 
 from __future__ import annotations
@@ -21,75 +26,120 @@ import osimlite
 from _moco_studies import CORE, GAIT, TESTS, gait_tool, sources
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable, read_sto, write_sto
+from osimlite.moco import MocoTrajectory
 
-THEIRS = (
+OPENSIM_SCRIPT = (
     "import opensim; opensim.Logger.setLevelString('Off'); opensim.AnalyzeTool('setup.xml').run()"
 )
-START, END = 0.45, 1.0
+
+START = 0.45
+"""Start of the analyses (s)."""
+
+END = 1.0
+"""End of the analyses (s)."""
 
 
 def main(core: Path, picture: str) -> None:
-    """Print what both find, and draw it."""
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
+    """Solve with both methods, print the table, and draw the picture if its name is not empty."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         sources(core, TESTS, GAIT, folder)
-        tool = gait_tool()
-        found = osimlite.moco.solve_inverse(tool, folder=folder)
-        print(
-            f"MocoInverse: {found.status}, {found.iterations} iterations, objective {found.objective:.6g}"
-        )
-        states, operators = found.states, tool.model.operators
+        solution = solve_moco_inverse(folder)
+        states = solution.states
         write_sto(folder / "states.sto", "", states.times, states.columns, states.rows)
-        # Loads come from the setup of a tool.
-        for file, own in (("moco.osim", operators[:-1]), ("millard.osim", operators[:1])):
-            model = process_model(osimlite.ModelProcessor(filepath=GAIT[0], operators=own), folder)
-            osimlite.write(model, folder / file)
-        muscles = [
-            muscle.name for muscle in model.components(osimlite.Millard2012EquilibriumMuscle)
-        ]
-        reported = osimlite.MuscleAnalysis(name="MuscleAnalysis", start_time=START, end_time=END)
-        (forces,) = _run(folder, "moco.osim", reported, "states.sto", ("TendonForce",))
+        muscles = write_models(folder)
+        (forces,) = run_analysis(
+            folder,
+            "moco.osim",
+            osimlite.MuscleAnalysis(name="MuscleAnalysis", start_time=START, end_time=END),
+            "states.sto",
+            ("TendonForce",),
+        )
         static = osimlite.StaticOptimization(
             name="StaticOptimization", start_time=START, end_time=END
         )
-        activations, shared = _run(folder, "moco.osim", static, "", ("activation", "force"))
-        ours, theirs = (
-            _run(folder, "millard.osim", static, "", ("activation",), by_opensim=by_opensim)[0]
-            for by_opensim in (False, True)
+        static_activations, static_forces = run_analysis(
+            folder, "moco.osim", static, "", ("activation", "force")
         )
-    at = np.abs(ours.times[:, None] - theirs.times).argmin(axis=1)
-    off = max(float(np.abs(ours[name] - theirs[name][at]).max()) for name in muscles)
-    print(f"StaticOptimization of the muscles of the file: activations are OpenSim's to {off:.2g}")
+        difference = compare_with_opensim(folder, static, muscles)
     print(
-        "| muscle | activation, mean | | largest force, N | | rms of the difference, N | correlation |"
+        "StaticOptimization with the muscles of the file: activations differ from OpenSim's by at "
+        f"most {difference:.2g}"
     )
-    print("|---|---|---|---|---|---|---|")
-    for name in muscles:
-        a, f = (
-            found.states[f"/forceset/{name}/activation"],
-            np.interp(states.times, forces.times, forces[name]),
-        )
-        b, g = (
-            np.interp(states.times, table.times, table[name]) for table in (activations, shared)
-        )
-        rms, alike = np.sqrt(np.mean((f - g) ** 2)), np.corrcoef(f, g)[0, 1]
-        print(
-            f"| {name} | {a.mean():.3f} | {b.mean():.3f} | {f.max():.0f} | {g.max():.0f} | {rms:.0f} | {alike:.2f} |"
-        )
+    print_table(muscles, solution, forces, static_activations, static_forces)
     if picture:
-        _draw([name for name in muscles if name.endswith("_r")], forces, shared, picture)
+        right_muscles = [name for name in muscles if name.endswith("_r")]
+        draw_forces(right_muscles, forces, static_forces, picture)
 
 
-def _run(
+def solve_moco_inverse(folder: Path) -> MocoTrajectory:
+    """Solve MocoInverse with the files of a folder, and print how the solver ended."""
+    solution = osimlite.moco.solve_inverse(gait_tool(), folder=folder)
+    print(
+        f"MocoInverse: {solution.status}, {solution.iterations} iterations, "
+        f"objective {solution.objective:.6g}"
+    )
+    return solution
+
+
+def write_models(folder: Path) -> list[str]:
+    """Write the models of MocoInverse and with the original muscles.
+
+    Args:
+        folder: folder with the source files, to which `moco.osim` and `millard.osim` are added.
+
+    Returns:
+        Names of the muscles.
+    """
+    operators = gait_tool().model.operators
+    # The last operator adds external loads, which the analyses take from their setup file.
+    for file, file_operators in (("moco.osim", operators[:-1]), ("millard.osim", operators[:1])):
+        model = process_model(
+            osimlite.ModelProcessor(filepath=GAIT[0], operators=file_operators), folder
+        )
+        osimlite.write(model, folder / file)
+    return [muscle.name for muscle in model.components(osimlite.Millard2012EquilibriumMuscle)]
+
+
+def compare_with_opensim(
+    folder: Path, static: osimlite.StaticOptimization, muscles: list[str]
+) -> float:
+    """Return the largest difference of an activation from OpenSim's, with the original muscles.
+
+    Args:
+        folder: folder with the model files.
+        static: static optimization.
+        muscles: names of the muscles.
+    """
+    (ours,) = run_analysis(folder, "millard.osim", static, "", ("activation",))
+    (theirs,) = run_analysis(folder, "millard.osim", static, "", ("activation",), by_opensim=True)
+    # The programs may write different times; compare with the nearest ones.
+    nearest = np.abs(ours.times[:, None] - theirs.times).argmin(axis=1)
+    return max(float(np.abs(ours[name] - theirs[name][nearest]).max()) for name in muscles)
+
+
+def run_analysis(
     folder: Path,
     model: str,
     analysis: object,
     states: str,
-    ends: tuple[str, ...],
+    suffixes: tuple[str, ...],
     *,
     by_opensim: bool = False,
 ) -> list[StoTable]:
-    """Tables of an analysis along the states of a file, or along the measured motion."""
+    """Run an analysis along the states of a file, or along the measured motion.
+
+    Args:
+        folder: folder with the input files.
+        model: name of the model file.
+        analysis: analysis to run.
+        states: name of the file of states; empty for the measured motion.
+        suffixes: last parts of the names of the result tables.
+        by_opensim: whether OpenSim runs it instead of osimlite.
+
+    Raises:
+        SystemExit: a result file is missing; the message ends with the output of the program.
+    """
     tool = osimlite.AnalyzeTool(
         name="gait",
         model_file=model,
@@ -103,27 +153,80 @@ def _run(
     )
     tool.AnalysisSet.objects.append(analysis)
     osimlite.write(tool, folder / "setup.xml")
-    command = ["-c", THEIRS] if by_opensim else ["-m", "osimlite", "run", "setup.xml"]
+    arguments = ["-c", OPENSIM_SCRIPT] if by_opensim else ["-m", "osimlite", "run", "setup.xml"]
     done = subprocess.run(
-        [sys.executable, *command], cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
-    files = [folder / f"results/gait_{type(analysis).__name__}_{end}.sto" for end in ends]
+    files = [folder / f"results/gait_{type(analysis).__name__}_{end}.sto" for end in suffixes]
     if not all(file.exists() for file in files):
-        raise SystemExit(f"{command}: {(done.stdout + done.stderr)[-2000:]}")
-    found = [read_sto(file) for file in files]
+        raise SystemExit(f"{arguments}: {(done.stdout + done.stderr)[-2000:]}")
+    tables = [read_sto(file) for file in files]
+    # osimlite does not overwrite results, and the next analysis has files of the same names.
     for file in files:
         file.unlink()
-    return found
+    return tables
 
 
-def _draw(names: list[str], forces: StoTable, shared: StoTable, picture: str) -> None:
+def print_table(
+    muscles: list[str],
+    solution: MocoTrajectory,
+    forces: StoTable,
+    static_activations: StoTable,
+    static_forces: StoTable,
+) -> None:
+    """Print a row for each muscle, at the times of MocoInverse.
+
+    Args:
+        muscles: names of the muscles.
+        solution: solution of MocoInverse.
+        forces: its tendon forces (N).
+        static_activations: activations of StaticOptimization.
+        static_forces: its forces (N).
+    """
+    print(
+        "| muscle | mean activation: MocoInverse | StaticOptimization "
+        "| largest force, N: MocoInverse | StaticOptimization "
+        "| rms of the difference, N | correlation |"
+    )
+    print("|---|---|---|---|---|---|---|")
+    states = solution.states
+    for name in muscles:
+        activation = states[f"/forceset/{name}/activation"]
+        force = np.interp(states.times, forces.times, forces[name])
+        static_activation = np.interp(
+            states.times, static_activations.times, static_activations[name]
+        )
+        static_force = np.interp(states.times, static_forces.times, static_forces[name])
+        rms = np.sqrt(np.mean((force - static_force) ** 2))
+        correlation = np.corrcoef(force, static_force)[0, 1]
+        print(
+            f"| {name} | {activation.mean():.3f} | {static_activation.mean():.3f} "
+            f"| {force.max():.0f} | {static_force.max():.0f} | {rms:.0f} | {correlation:.2f} |"
+        )
+
+
+def draw_forces(names: list[str], forces: StoTable, static_forces: StoTable, picture: str) -> None:
+    """Draw the forces of nine muscles (N) over time.
+
+    Args:
+        names: names of the muscles.
+        forces: forces of MocoInverse.
+        static_forces: forces of StaticOptimization.
+        picture: file to write.
+    """
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(3, 3, figsize=(9.0, 6.5), sharex=True, layout="constrained")
-    for name, own in zip(names, axes.flat, strict=True):
-        own.plot(forces.times, forces[name], color="#c0392b", label="MocoInverse")
-        own.plot(shared.times, shared[name], color="#2c3e50", ls="--", label="StaticOptimization")
-        own.set_title(name, fontsize=9)
+    for name, panel in zip(names, axes.flat, strict=True):
+        panel.plot(forces.times, forces[name], color="#c0392b", label="MocoInverse")
+        panel.plot(
+            static_forces.times,
+            static_forces[name],
+            color="#2c3e50",
+            ls="--",
+            label="StaticOptimization",
+        )
+        panel.set_title(name, fontsize=9)
     axes[0, 0].legend(fontsize=8, frameon=False)
     figure.supxlabel("time, s")
     figure.supylabel("force, N")
@@ -134,7 +237,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--core", type=Path, default=CORE)
-    parser.add_argument("--picture", default="")
-    chosen = parser.parse_args()
-    main(chosen.core, chosen.picture)
+    parser.add_argument(
+        "--core", type=Path, default=CORE, help="sources or git directory of opensim-core"
+    )
+    parser.add_argument("--picture", default="", help="file of the picture to draw")
+    options = parser.parse_args()
+    main(options.core, options.picture)

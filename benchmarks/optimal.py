@@ -1,16 +1,22 @@
-"""Studies of Moco, solved here and by Moco 4.6 itself in turn: iterations, objective, violations, time.
+"""Moco studies solved by osimlite and by Moco 4.6: iterations, objective, constraint violation, time.
 
     python benchmarks/optimal.py [--core FOLDER] [--rounds N] [STUDY ...]
 
-FOLDER: sources of opensim-core, or its git directory (``git clone --bare``), for walks and gaits.
-``benchmarks/refinement.py`` shows what meshes save that are refined where it is needed.
+FOLDER contains the sources of opensim-core, or is its git directory (``git clone --bare``); studies
+of walking and gait need it. Each study is solved in turn by Moco, by osimlite with the Hessian
+approximation that Moco uses ("as Moco"), and by osimlite with exact Hessians. Studies for which Moco
+needs most of an hour are solved by osimlite alone, and only if they are named.
 
-Seconds are those of the processor, medians of the rounds. *Set-up and solve* begins with the files,
-in a process that has loaded its libraries and solved another small study; the *process* is a whole
-one from its start, which solves one. Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do:
-more make its processor time larger. The violation is what Moco says of each solution file: its own
-largest constraint violation where it is the guess, before the first step. Studies that Moco takes
-most of an hour for are solved here alone, and only by name.
+All times are processor times, medians of the rounds. *Set-up and solve* begins with reading the
+files, in a process that has loaded its libraries and solved a small study before. *Process* is a
+complete process that solves one study. After each time, "speed-up" is Moco's time divided by it.
+Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as osimlite does; more threads would increase its
+processor time.
+
+*Violation* is the largest constraint violation that Moco computes for each solution file, by taking
+it as the guess and stopping before the first step.
+
+``benchmarks/refinement.py`` shows what is saved by refining meshes where errors are large.
 """
 
 from __future__ import annotations
@@ -22,15 +28,17 @@ import re
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
 import osimlite
 from _moco_studies import CORE, LONG, STUDIES, kept
 from osimlite.base.records import replace
 from osimlite.moco import MocoTrajectory
 
-OURS = """
+OSIMLITE_SCRIPT = """
 import json, os, sys, time
 import osimlite, osimlite.optimal.solution
 from osimlite import moco
@@ -38,7 +46,7 @@ hessian, warm = sys.argv[1:]
 if warm:
     moco.solve(warm)
 before = time.process_time()
-def more(study):
+def change_study(study):
     if hessian:
         study.solver.optim_hessian_approximation = hessian
     elif os.path.exists("inverse.xml"):
@@ -51,17 +59,19 @@ def more(study):
             setattr(study.solver, name, getattr(added.solver, name))
 if os.path.exists("study.omoco"):
     study = osimlite.read_document("study.omoco")
-    more(study)
-    found = moco.solve(study)
+    change_study(study)
+    solution = moco.solve(study)
 elif os.path.exists("track.xml"):
-    found = moco.solve_track(osimlite.read_document("track.xml"), more=more)
+    solution = moco.solve_track(osimlite.read_document("track.xml"), more=change_study)
 else:
-    found = moco.solve_inverse(osimlite.read_document("inverse.xml"), more=more)
-spent = time.process_time() - before
-found.write("ours.sto")
-print(json.dumps([found.success, found.iterations, found.objective, spent, time.process_time()]))
+    solution = moco.solve_inverse(osimlite.read_document("inverse.xml"), more=change_study)
+seconds = time.process_time() - before
+solution.write("ours.sto")
+print(json.dumps([solution.success, solution.iterations, solution.objective, seconds, time.process_time()]))
 """
-THEIRS = """
+"""Script that solves the study of its folder. Arguments: Hessian approximation, study for the warm-up."""
+
+OPENSIM_SCRIPT = """
 import json, os, sys, time
 import opensim as osim
 osim.Logger.setLevelString("Off")
@@ -79,16 +89,17 @@ solver = osim.MocoCasADiSolver.safeDownCast(study.updSolver())
 if os.path.exists("more.omoco"):
     added = osim.MocoStudy("more.omoco")
     phase = added.updProblem().updPhase(0)
-    said = json.load(open("more.json"))
-    for name in said["goals"]:
+    names = json.load(open("more.json"))
+    for name in names["goals"]:
         study.updProblem().addGoal(phase.updGoal(name).clone())
-    for name, bounds in said["states"].items():
+    for name, bounds in names["states"].items():
         study.updProblem().setStateInfo(name, bounds)
     settings = osim.MocoCasADiSolver.safeDownCast(added.updSolver())
     for name in ("optim_convergence_tolerance", "optim_constraint_tolerance", "optim_max_iterations"):
         getattr(solver, f"set_{name}")(getattr(settings, f"get_{name}")())
 if guess:
-    # Ipopt reads that it is not to move the guess away from its bounds; Simbody's, which was asked before, too.
+    # This file keeps Ipopt from moving the guess away from its bounds. Simbody's Ipopt, which solves for
+    # assemblies before, reads it too.
     with open("ipopt.opt", "w") as stream:
         stream.write("bound_push 1e-16\\nbound_frac 1e-16\\nbound_relax_factor 0\\n")
     solver.setGuessFile(guess)
@@ -97,101 +108,202 @@ if guess:
 else:
     solver.set_verbosity(0)
 solution = study.solve()
-spent = time.process_time() - before
+seconds = time.process_time() - before
 success = solution.success()
 if solution.isSealed():
     solution.unseal()
 if not guess:
     solution.write("theirs.sto")
 print()
-print(json.dumps([success, solution.getNumIterations(), solution.getObjective(), spent, time.process_time()]))
+print(json.dumps([success, solution.getNumIterations(), solution.getObjective(), seconds, time.process_time()]))
 """
+"""The same by Moco. Arguments: file of the guess to examine instead of solving, study for the warm-up."""
+
+IMPORT_SCRIPT = "import json, time, opensim\nprint(json.dumps([time.process_time()]))"
+"""Script that prints the processor time (s) in which OpenSim's libraries are loaded."""
+
+
+class Solve(NamedTuple):
+    """Numbers that a script prints at its end."""
+
+    success: float
+    iterations: float
+    objective: float
+    seconds: float
+    """Processor time of set-up and solve (s)."""
+    process_seconds: float
+    """Processor time of the process so far (s)."""
+
+
+class Solver(NamedTuple):
+    """One way of solving studies."""
+
+    script: str
+    hessian: str
+    """Hessian approximation; empty for that of the study. Moco has no such argument."""
+
+    @property
+    def is_moco(self) -> bool:
+        """Whether this is Moco."""
+        return self.script == OPENSIM_SCRIPT
+
+
+@dataclass
+class Record:
+    """Results of one solver for one study."""
+
+    solve: Solve | None = None
+    """Last solve."""
+    violation: str = ""
+    """Largest constraint violation of the last solution."""
+    solve_times: list[float] = field(default_factory=list)
+    """Processor times of set-up and solve, one for each round (s)."""
+    process_times: list[float] = field(default_factory=list)
+    """Processor times of a complete process, one for each round (s)."""
+
+
+SOLVERS = {
+    "Moco": Solver(OPENSIM_SCRIPT, ""),
+    "as Moco": Solver(OSIMLITE_SCRIPT, ""),
+    "exact": Solver(OSIMLITE_SCRIPT, "exact"),
+}
+"""Solvers by their title in the table."""
 
 
 def main(names: list[str], core: Path, rounds: int) -> None:
-    """Print a table in Markdown."""
+    """Solve studies and print a table in Markdown.
+
+    Args:
+        names: names of the studies; all except the long ones if empty.
+        core: sources or git directory of opensim-core.
+        rounds: how often each solver solves each study.
+    """
     print(
-        "| study | | iterations | objective | violation | set-up and solve, s | times | process, s | times |"
+        "| study | solver | iterations | objective | violation | set-up and solve, s | speed-up "
+        "| process, s | speed-up |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as place:
-        warm = Path(place) / "study.omoco"
-        kept("sliding-100")(Path(place), core)
-        text = warm.read_text(encoding="utf-8")
-        warm.write_text(
-            text.replace("<num_mesh_intervals>100<", "<num_mesh_intervals>5<"), encoding="utf-8"
-        )
+    with tempfile.TemporaryDirectory() as temporary:
+        warm_up = _write_warm_up(Path(temporary), core)
         for name in names or STUDIES:
-            folder = Path(place) / name.replace(" ", "_")
+            folder = Path(temporary) / name.replace(" ", "_")
             folder.mkdir()
             (STUDIES | LONG)[name](folder, core)
-            _say_more(folder)
-            _study(name, folder, str(warm), rounds)
+            _write_added_names(folder)
+            solvers = {"as Moco": SOLVERS["as Moco"]} if name in LONG else SOLVERS
+            records = _solve_study(name, folder, str(warm_up), solvers, rounds)
+            _print_rows(name, records)
 
 
-def _say_more(folder: Path) -> None:
-    """What SWIG does not show of a phase: names of goals, bounds of states."""
+def _write_warm_up(folder: Path, core: Path) -> Path:
+    """Write a small study, which a process solves before the timed one; return its file."""
+    kept("sliding-100")(folder, core)
+    file = folder / "study.omoco"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(
+        text.replace("<num_mesh_intervals>100<", "<num_mesh_intervals>5<"), encoding="utf-8"
+    )
+    return file
+
+
+def _write_added_names(folder: Path) -> None:
+    """Write the names of goals and the bounds of states that are added to a study, for Moco's script.
+
+    OpenSim's Python binding has no access to these lists of a phase.
+    """
     if not (folder / "more.omoco").exists():
         return
     phase = osimlite.read_document(folder / "more.omoco").problem.phases
-    said = {
+    names = {
         "goals": [goal.name for goal in phase.goals],
         "states": {info.name: list(info.bounds) for info in phase.state_infos},
     }
-    (folder / "more.json").write_text(json.dumps(said), encoding="utf-8")
+    (folder / "more.json").write_text(json.dumps(names), encoding="utf-8")
 
 
-def _study(name: str, folder: Path, warm: str, rounds: int) -> None:
-    """Solve one in turn, and print its rows."""
-    sides = {"Moco": (THEIRS, ""), "as Moco": (OURS, ""), "exact": (OURS, "exact")}
-    if name in LONG:
-        sides = {"as Moco": sides["as Moco"]}
-    spent: dict[str, list[float]] = {side: [] for side in sides}
-    whole: dict[str, list[float]] = {side: [] for side in sides}
-    said: dict[str, list[float]] = {}
-    missed: dict[str, str] = {}
+def _solve_study(
+    name: str, folder: Path, warm_up: str, solvers: dict[str, Solver], rounds: int
+) -> dict[str, Record]:
+    """Solve one study with each solver in turn.
+
+    Args:
+        name: name of the study.
+        folder: folder with its files.
+        warm_up: file of the study that is solved before.
+        solvers: solvers by title.
+        rounds: how often each solves it.
+
+    Returns:
+        Results by title of the solver.
+    """
+    records = {title: Record() for title in solvers}
     for _ in range(rounds):
-        for side, (code, choice) in sides.items():
-            said[side], _ = _run(code, [choice, warm], folder)
-            # The table comes late.
-            print(f"{name}, {side}: {said[side]}", file=sys.stderr)
-            spent[side].append(said[side][3])
-            if side == "Moco":
-                # A second one would take minutes; its libraries are loaded before it begins.
-                cold, _ = _run(
-                    "import json, time, opensim\nprint(json.dumps([time.process_time()]))",
-                    [],
-                    folder,
-                )
-                whole[side].append(cold[0] + said[side][3])
+        for title, solver in solvers.items():
+            record = records[title]
+            numbers, _ = _run_script(solver.script, [solver.hessian, warm_up], folder)
+            record.solve = Solve(*numbers)
+            # The rows are printed after the last round, which may be much later.
+            print(f"{name}, {title}: {numbers}", file=sys.stderr)
+            record.solve_times.append(record.solve.seconds)
+            if solver.is_moco:
+                # Solving a second time would take minutes. Moco's process is the time of loading its
+                # libraries plus that of the solve.
+                (import_seconds,), _ = _run_script(IMPORT_SCRIPT, [], folder)
+                record.process_times.append(import_seconds + record.solve.seconds)
             else:
-                whole[side].append(_run(code, [choice, ""], folder)[0][4])
-            missed[side] = (
-                "-"
-                if name in LONG
-                else _violation(folder, "theirs.sto" if side == "Moco" else "ours.sto")
-            )
-    for number, side in enumerate(sides):
-        success, iterations, objective, *_ = said[side]
-        note = "" if success else " (not solved)"
+                numbers, _ = _run_script(solver.script, [solver.hessian, ""], folder)
+                record.process_times.append(Solve(*numbers).process_seconds)
+            if name in LONG:
+                record.violation = "-"
+            else:
+                file = "theirs.sto" if solver.is_moco else "ours.sto"
+                record.violation = _compute_violation(folder, file)
+    return records
+
+
+def _print_rows(name: str, records: dict[str, Record]) -> None:
+    """Print one row of the table for each solver.
+
+    Args:
+        name: name of the study.
+        records: results by title of the solver.
+    """
+    for number, (title, record) in enumerate(records.items()):
+        assert record.solve is not None
+        note = "" if record.solve.success else " (not solved)"
         cells = [
             "" if number else name,
-            side + note,
-            f"{iterations}",
-            f"{objective:.7g}",
-            missed[side],
+            title + note,
+            f"{record.solve.iterations}",
+            f"{record.solve.objective:.7g}",
+            record.violation,
         ]
-        for kind in (spent, whole):
-            own = median(kind[side])
-            cells += [
-                f"{own:.3g}",
-                "" if side == "Moco" or name in LONG else f"{median(kind['Moco']) / own:.1f}",
-            ]
+        moco = None if title == "Moco" else records.get("Moco")
+        seconds = median(record.solve_times)
+        process_seconds = median(record.process_times)
+        cells += [
+            f"{seconds:.3g}",
+            "" if moco is None else f"{median(moco.solve_times) / seconds:.1f}",
+            f"{process_seconds:.3g}",
+            "" if moco is None else f"{median(moco.process_times) / process_seconds:.1f}",
+        ]
         print("|", *(f"{cell} |" for cell in cells), flush=True)
 
 
-def _run(code: str, arguments: list[str], folder: Path) -> tuple[list[float], str]:
-    """The numbers that a script ends with, and all that it prints."""
+def _run_script(code: str, arguments: list[str], folder: Path) -> tuple[list[float], str]:
+    """Run a script in a folder.
+
+    Args:
+        code: text of the script.
+        arguments: its arguments.
+        folder: its working folder.
+
+    Returns:
+        The numbers that it prints on its last line, and everything that it prints.
+
+    Raises:
+        SystemExit: the script fails; the message ends with what it printed.
+    """
     done = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         cwd=folder,
@@ -202,30 +314,48 @@ def _run(code: str, arguments: list[str], folder: Path) -> tuple[list[float], st
     )
     if done.returncode:
         raise SystemExit(done.stdout[-2000:] + done.stderr[-4000:])
-    found: list[float] = json.loads(done.stdout.splitlines()[-1])
-    return found, done.stdout
+    numbers: list[float] = json.loads(done.stdout.splitlines()[-1])
+    return numbers, done.stdout
 
 
-def _violation(folder: Path, solution: str) -> str:
-    """The largest one that Moco has of a solution file."""
-    found = MocoTrajectory.read(folder / solution)
+def _compute_violation(folder: Path, solution: str) -> str:
+    """Return the largest constraint violation that Moco computes for a solution file.
+
+    Args:
+        folder: folder of the study.
+        solution: name of the file.
+    """
+    trajectory = MocoTrajectory.read(folder / solution)
     if (folder / "inverse.xml").exists():
-        # What MocoInverse adds to its solution is no variable of its study.
-        own = [name for name in found.names["states"] if not name.endswith(("/value", "/speed"))]
-        found = replace(found, names=found.names | {"states": tuple(own)})
-    found.write(folder / "asked.sto")
-    _, log = _run(THEIRS, ["asked.sto", ""], folder)
+        # MocoInverse adds coordinates to its solution, which are no variables of its study.
+        states = [
+            name for name in trajectory.names["states"] if not name.endswith(("/value", "/speed"))
+        ]
+        trajectory = replace(trajectory, names=trajectory.names | {"states": tuple(states)})
+    trajectory.write(folder / "guess.sto")
+    _, log = _run_script(OPENSIM_SCRIPT, ["guess.sto", ""], folder)
+    # Later solves of the study must not use these options.
     (folder / "ipopt.opt").unlink()
-    said = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", log)
-    return f"{float(said[1]):.1e}" if said else "?"
+    match = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", log)
+    return f"{float(match[1]):.1e}" if match else "?"
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("studies", nargs="*", choices=[[], *STUDIES, *LONG], default=[])
-    parser.add_argument("--core", type=Path, default=CORE)
-    parser.add_argument("--rounds", type=int, default=1)
-    chosen = parser.parse_args()
-    main(chosen.studies, chosen.core, chosen.rounds)
+    parser.add_argument(
+        "studies",
+        nargs="*",
+        choices=[[], *STUDIES, *LONG],
+        default=[],
+        help="names of the studies to solve",
+    )
+    parser.add_argument(
+        "--core", type=Path, default=CORE, help="sources or git directory of opensim-core"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=1, help="how often each solver solves each study"
+    )
+    options = parser.parse_args()
+    main(options.studies, options.core, options.rounds)
