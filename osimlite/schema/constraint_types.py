@@ -26,7 +26,7 @@ class ConstantDistanceConstraint(Constraint):
     """Position of the second point in its frame."""
     # OpenSim has no default and rejects a constraint without a distance.
     constant_distance: Annotated[float, real("m", "> 0")] = math.nan
-    """Distance that the points keep."""
+    """Distance of the two points."""
 
 
 class CoordinateCouplerConstraint(Constraint):
@@ -61,19 +61,19 @@ class PointOnLineConstraint(Constraint):
     """Keeps a point of the follower on a line fixed in the line's body."""
 
     socket_line_body: PhysicalFrameSocket = ""
-    """The frame that the line is fixed in."""
+    """Frame in which the line is fixed."""
     socket_follower_body: PhysicalFrameSocket = ""
-    """The frame of the point that keeps to the line."""
+    """Frame of the point that stays on the line."""
     line_direction_vec: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
     """Direction of the line, along the axes of its frame; its length does not matter."""
     point_on_line: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Any point of the line, in its frame."""
     point_on_follower: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
-    """The point that keeps to the line, in the follower."""
+    """Point of the follower that stays on the line."""
 
 
 class UnilateralConstraint(Constraint, abstract=True):
-    """A constraint that can let go."""
+    """Constraint that acts in one direction only, such as a contact."""
 
 
 # OpenSim leaves these constraints off until a program turns them on.
@@ -83,16 +83,16 @@ class RollingOnSurfaceConstraint(UnilateralConstraint):
     socket_rolling_body: PhysicalFrameSocket = ""
     """The frame of the body that rolls."""
     socket_surface_body: PhysicalFrameSocket = ""
-    """The frame that the plane is fixed in."""
+    """Frame in which the plane is fixed."""
     surface_normal: Annotated[Vec3, vec3()] = (0.0, 1.0, 0.0)
     """Normal of the plane, along the axes of its frame."""
     surface_height: Number = 0.0
     """Distance of the plane from the origin of its frame, along the normal (m)."""
     friction_coefficient: Annotated[float, real(domain=">= 0")] = 0.5
-    """Friction over normal force above which the constraint against slip lets go."""
+    """Ratio of friction to normal force above which the constraint against slip is released."""
     contact_radius: Annotated[float, real(domain="> 0")] = 0.01
     """Radius (m) of the patch whose friction bears a torque about the normal."""
 
 
 class WeldConstraint(TwoFrameLinker, Constraint):
-    """Keeps two frames on each other; this is how loops are closed."""
+    """Holds two frames together; used to close loops."""

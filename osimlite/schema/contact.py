@@ -10,10 +10,10 @@ from osimlite.schema.sets import ModelComponentSet
 
 
 class ContactGeometry(ModelComponent, abstract=True):
-    """A surface that contact forces act on, fixed in a physical frame."""
+    """Surface for contact forces, fixed in a physical frame."""
 
     socket_frame: PhysicalFrameSocket = ""
-    """The frame that the surface is fixed in."""
+    """Frame in which the surface is fixed."""
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Position of the middle of the surface in that frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)

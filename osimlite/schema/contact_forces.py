@@ -30,13 +30,13 @@ class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::Co
     stiffness: Annotated[float, real("N/m^3", "> 0")] = 0.0
     """Pressure of the springs on the mesh per depth."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
-    """The c of 1 + c v, by which the approach at v raises the pressure and parting lowers it."""
+    """Coefficient c of the factor 1 + c v of the pressure, at the approach velocity v."""
     static_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force at the transition velocity."""
+    """Ratio of friction to normal force at the transition velocity."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force to which faster slip falls."""
+    """Ratio of friction to normal force at fast slip."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
+    """Ratio of friction to normal force per slip velocity (s/m), added to the others."""
 
 
 class ElasticFoundationContactParametersSet(
@@ -59,7 +59,7 @@ class ElasticFoundationForce(Force):
     )
     """The surfaces that touch each other by this force, and their materials."""
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
-    """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
+    """Slip velocity of static friction; slower slip has proportionally less and never sticks."""
 
 
 class SmoothSphereHalfSpaceForce(Force):
@@ -78,15 +78,15 @@ class SmoothSphereHalfSpaceForce(Force):
     stiffness: Annotated[float, real("N/m^2", "> 0")] = 1.0
     """Plane-strain modulus of both surfaces."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
-    """The c of 1 + 1.5 c v, by which the approach at v raises the force and parting lowers it."""
+    """Coefficient c of the factor 1 + 1.5 c v of the force, at the approach velocity v."""
     static_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force at the transition velocity."""
+    """Ratio of friction to normal force at the transition velocity."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force to which faster slip falls."""
+    """Ratio of friction to normal force at fast slip."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
+    """Ratio of friction to normal force per slip velocity (s/m), added to the others."""
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
-    """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
+    """Slip velocity of static friction; slower slip has proportionally less and never sticks."""
     constant_contact_force: Annotated[float, real("N", ">= 0")] = 1e-5
     """Small number under the roots of depth and slip, which keeps derivatives from vanishing."""
     hertz_smoothing: Annotated[float, real(domain="> 0")] = 300.0
@@ -119,9 +119,9 @@ class ExponentialContactForce(Force):
     exponential_shape_parameters: Annotated[Vec3, vec3("m, N, 1/m")] = (0.0065905, 0.5336, 1150.0)
     """d0, d1, d2 of the normal force d1 exp(-d2 (z - d0)) at height z."""
     normal_viscosity: Annotated[float, real("s/m", ">= 0")] = 0.5
-    """The c of 1 - c v, by which the speed v away from the plane lowers the normal force."""
+    """Coefficient c of the factor 1 - c v of the normal force, at velocity v along the normal."""
     max_normal_force: Annotated[float, real("N", "> 0")] = 100000.0
-    """Normal force above which it grows no further."""
+    """Largest normal force."""
     friction_elasticity: Annotated[float, real("N/m", "> 0")] = 20000.0
     """Stiffness of the spring between the station and its anchor in the plane."""
     friction_viscosity: Annotated[float, real("N*s/m", ">= 0")] = 282.842712474619
@@ -146,12 +146,12 @@ class MeyerFregly2016Force(ForceProducer):
     stiffness: Annotated[float, real("N/m", "> 0")] = 10000.0
     """Stiffness of the spring below its resting height."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.01
-    """The c of 1 - c v, by which the upward speed v lowers the force."""
+    """Coefficient c of the factor 1 - c v of the force, at the upward velocity v."""
     spring_resting_length: Annotated[float, real("m")] = 0.0
-    """Height of the station over the plane y = 0 at which the spring sets in."""
+    """Height of the station above the plane y = 0 below which the spring acts."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force at fast slip, which sets in as a hyperbolic tangent."""
+    """Ratio of friction to normal force at fast slip; it rises as a hyperbolic tangent."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 5.0
-    """Friction over normal force per slip velocity (s/m)."""
+    """Ratio of friction to normal force per slip velocity (s/m)."""
     latch_velocity: Annotated[float, real("m/s", "> 0")] = 0.05
     """Slip over which dynamic friction sets in."""

@@ -14,19 +14,19 @@ class ContactHalfSpace(ContactGeometry):
 
 
 class ContactSphere(ContactGeometry):
-    """A ball."""
+    """Sphere as contact surface or obstacle."""
 
     facts = Facts(doubts={"radius": "it touches nothing"})
 
     radius: Annotated[float, real("m", "> 0")] = 0.0
-    """Distance of the surface from the middle."""
+    """Radius of the sphere."""
 
 
 class ContactCylinder(ContactGeometry):
-    """An endless cylinder along its own Z axis, for paths to wrap around."""
+    """Infinite cylinder along its own Z axis, for paths to wrap around."""
 
     radius: Annotated[float, real("m", "> 0")] = 0.0
-    """Distance of the surface from the Z axis."""
+    """Radius of the cylinder."""
 
 
 class ContactEllipsoid(ContactGeometry):
@@ -37,12 +37,12 @@ class ContactEllipsoid(ContactGeometry):
 
 
 class ContactTorus(ContactGeometry):
-    """A ring about its own Z axis: a tube whose middle line is a circle."""
+    """Torus about its own Z axis."""
 
     torus_radius: Annotated[float, real("m", "> 0")] = 0.0
-    """Radius of the circle in the middle of the tube."""
+    """Major radius, of the circle in the middle of the tube."""
     tube_radius: Annotated[float, real("m", "> 0")] = 0.0
-    """Distance of the surface from that circle."""
+    """Minor radius, of the tube."""
 
 
 class ContactMesh(ContactGeometry):

@@ -17,19 +17,19 @@ class Control(Object, abstract=True):
     """A control over time; its name is that of an actuator, which `.excitation` may follow."""
 
     is_model_control: LegacyFlag = True
-    """Whether the model has such a control; the others do nothing."""
+    """Whether the control belongs to the model; others have no effect."""
     extrapolate: LegacyFlag = True
     """Whether straight lines continue before the first node and after the last."""
     default_min: LegacyNumber = 0.02
-    """Least value that tools choose where there are no `min_nodes`; a simulation does not clip to it."""
+    """Smallest value that tools choose without `min_nodes`; a simulation does not clip to it."""
     default_max: LegacyNumber = 1.0
-    """Greatest value that tools choose where there are no `max_nodes`; a simulation does not clip to it."""
+    """Largest value that tools choose without `max_nodes`; a simulation does not clip to it."""
     filter_on: LegacyFlag = False
     """Whether CMC smooths the control while it computes it."""
 
 
 class ControlConstant(Control):
-    """A control that stays the same."""
+    """Constant control."""
 
     is_model_control: LegacyFlag = False
     value: LegacyNumber = 0.0
@@ -53,9 +53,9 @@ class ControlLinear(Control):
     x_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
     """The nodes of the control."""
     min_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
-    """The nodes of the least value that tools choose."""
+    """Nodes of the smallest value that tools choose."""
     max_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
-    """Nodes of the greatest value that tools choose."""
+    """Nodes of the largest value that tools choose."""
     kp: LegacyNumber = 100.0
     """Gain with which CMC's smoothing follows the value."""
     kv: LegacyNumber = 20.0

@@ -26,7 +26,7 @@ class TrackingController(Controller, abstract=True):
 
 
 class CorrectionController(TrackingController):
-    """Drives every coordinate to its desired value by a force in proportion to the errors of value and speed."""
+    """Applies to every coordinate a force in proportion to the errors of its value and speed."""
 
     kp: Annotated[float, real(legacy=True)] = 100.0
     """Force per deviation of a coordinate."""
@@ -42,7 +42,7 @@ class InputController(Controller, abstract=True):
     """Computes controls from the outputs of other components."""
 
     input_controls: NumberInputs = ()
-    """The outputs that the controls are made of, each as `path|output`."""
+    """Outputs from which the controls are computed, each as `path|output`."""
 
 
 class SynergyVector(Object):
@@ -60,6 +60,6 @@ class SynergyController(InputController):
 
 
 class ControlDistributor(ModelComponent):
-    """Hands a vector of controls out as single outputs."""
+    """Makes the elements of a vector of controls available as single outputs."""
 
     facts = Facts(outputs="controls[]")

@@ -20,24 +20,24 @@ class Coordinate(ModelComponent):
     """Generalized speed at the start of a simulation; if the coordinate is locked, it starts with 0."""
     # OpenSim compares the two numbers with each other only if the coordinate is clamped.
     range: Annotated[tuple[float, float], reals("rad | m", least=2, most=2)] = (-10.0, 10.0)
-    """Lowest and highest value that a user interface offers; it limits nothing in a simulation."""
+    """Lowest and highest value that a user interface offers; a simulation ignores it."""
     # OpenSim rejects a clamped coordinate whose default value is outside of the range.
     clamped: Flag = False
-    """Whether values that are set must lie within `range`, the default also; motion may leave it all the same."""
+    """Whether values that are set must lie within `range`; motion may still leave it."""
     # OpenSim reads true, false, 1 and 0 only: after `yes` the coordinate is free, with a line in
     # the log.
     locked: Flag = False
     """Whether a constraint holds the coordinate at its default value, at speed 0."""
     prescribed_function: Optional[Function] = None
-    """The value as a function of time; its first two derivatives are used also."""
+    """Value as a function of time; its first two derivatives are used, too."""
     prescribed: Flag = False
     """Whether the coordinate follows `prescribed_function`; without a function it is free."""
     is_free_to_satisfy_constraints: Flag = False
-    """Whether assembly may move the coordinate at will; otherwise it keeps near the default value."""
+    """Whether assembly may change the coordinate freely; otherwise it stays near its default."""
 
 
 class CoordinateSet(Set):
-    """Coordinates in a document of their own."""
+    """Coordinates in a separate document."""
 
     objects: LegacyMany[Coordinate] = make_empty_list()
     """The coordinates."""

@@ -21,7 +21,7 @@ class TransformAxis(Object):
     coordinates: OwnJointCoordinates = ()
     """Coordinates of the joint that are the arguments of `function`, in this order."""
     axis: Annotated[Vec3, vec3()] = _X
-    """Direction that the motion is about or along; its length does not matter."""
+    """Direction of the axis; its length does not matter."""
     function: Single[Function] = make_default(Constant, name="function")
     """Angle (rad) or displacement (m) as a function of the coordinates."""
 

@@ -13,7 +13,7 @@ class HopperDevice(ModelComponent):
     facts = Facts(outputs="com_height height length power speed tension")
 
     actuator_name: PathActuatorPath = "cableAtoB"
-    """Path, from the device, of the actuator that its outputs speak of."""
+    """Path, from the device, of the actuator to which its outputs refer."""
 
 
 class ToyPropMyoController(Controller):
@@ -30,7 +30,7 @@ class ToyPropMyoController(Controller):
 
 
 class ToyReflexController(Controller):
-    """Drives muscles in proportion to how fast they lengthen."""
+    """Drives muscles in proportion to their lengthening speed."""
 
     gain: Number = 1.0
     """Control of a muscle that lengthens at its maximum contraction velocity."""

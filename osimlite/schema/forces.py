@@ -19,7 +19,7 @@ class Force(ModelComponent, abstract=True):
     facts = Facts(outputs="potential_energy")
 
     appliesForce: Flag = True
-    """Whether the force acts; one that does not stays in the tree and reports zeros."""
+    """Whether the force acts; a disabled one stays in the tree and reports zeros."""
 
 
 class ForceProducer(Force, abstract=True):
@@ -42,13 +42,13 @@ class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParam
     stiffness: Annotated[float, real("N/m^2", "> 0")] = 0.0
     """Plane-strain modulus: of two surfaces the softer one yields more; with 0 on both, OpenSim's force is NaN."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = 0.0
-    """The c of 1 + 1.5 c v, by which the approach at v raises the force and parting lowers it."""
+    """Coefficient c of the factor 1 + 1.5 c v of the force, at the approach velocity v."""
     static_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force at the transition velocity; two surfaces count with their harmonic mean."""
+    """Ratio of friction to normal force at the transition velocity; of two, the harmonic mean."""
     dynamic_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force to which faster slip falls; two surfaces count with their harmonic mean."""
+    """Ratio of friction to normal force at fast slip; of two surfaces, the harmonic mean."""
     viscous_friction: Annotated[float, real(domain=">= 0")] = 0.0
-    """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
+    """Ratio of friction to normal force per slip velocity (s/m), added to the others."""
 
 
 class HuntCrossleyContactParametersSet(Set, tag="HuntCrossleyForce::ContactParametersSet"):
@@ -73,7 +73,7 @@ class HuntCrossleyForce(Force):
     )
     """The surfaces that touch each other by this force, and their materials."""
     transition_velocity: Annotated[float, real("m/s", "> 0")] = 0.01
-    """Slip at which friction is static; slower slip has proportionally less, so that nothing sticks."""
+    """Slip velocity of static friction; slower slip has proportionally less and never sticks."""
 
 
 class CoordinateLimitForce(ForceProducer):
@@ -90,7 +90,7 @@ class CoordinateLimitForce(ForceProducer):
 
     # OpenSim compares it with plain names of coordinates and rejects paths.
     coordinate: CoordinateName = "UNASSIGNED"
-    """Name of the coordinate that is limited; its own `range` has no part in it."""
+    """Name of the limited coordinate; its own `range` has no effect here."""
     upper_stiffness: Annotated[float, real("N*m/deg (rotational)", "> 0")] = 1.0
     """Stiffness against values above the upper limit, beyond the transition."""
     # A limit that is left out, or misspelt, is 0 degrees, where the force acts from the start.
@@ -105,7 +105,7 @@ class CoordinateLimitForce(ForceProducer):
     transition: Annotated[float, real("deg (rotational)", "> 0")] = 0.1
     """Distance beyond a limit over which stiffness and damping rise smoothly from 0 to all."""
     compute_dissipation_energy: Flag = False
-    """Whether the energy that damping takes is a state of the simulation."""
+    """Whether the energy dissipated by damping is a state of the simulation."""
 
 
 class ForceSet(ModelComponentSet):
@@ -126,11 +126,11 @@ class Actuator(ForceProducer, abstract=True):
 
 
 class ScalarActuator(Actuator, abstract=True):
-    """A force with one control, kept between two limits."""
+    """Force with one control between two limits."""
 
     facts = Facts(outputs="actuation speed")
 
     min_control: Number = -math.inf
-    """Least control that tools choose when they solve for controls; a simulation does not clip to it."""
+    """Smallest control that tools choose; a simulation does not clip to it."""
     max_control: Number = math.inf
-    """Greatest control that tools choose when they solve for controls; a simulation does not clip to it."""
+    """Largest control that tools choose; a simulation does not clip to it."""

@@ -35,7 +35,7 @@ class Frame(ModelComponent, abstract=True):
     frame_geometry: Single[FrameGeometry] = make_default(FrameGeometry, name="frame_geometry")
     """Appearance of the frame's axes in viewers that show frames."""
     attached_geometry: Many[Geometry] = make_empty_list()
-    """Shapes drawn along the axes of this frame; they move with it and do nothing to the motion."""
+    """Shapes drawn along the axes of this frame; they move with it and do not affect the motion."""
 
     def attach(self, *shapes: Geometry) -> None:
         """Draw shapes in this frame; one without a name is called ``<frame>_geom_<number>`` as OpenSim does."""
@@ -85,7 +85,7 @@ class PhysicalOffsetFrame(PhysicalFrame):
     facts = Facts(scales={"translation": "socket_parent"})
 
     socket_parent: PhysicalFrameSocket = ""
-    """The frame that this one is fixed in."""
+    """Frame in which this one is fixed."""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Position of the origin of this frame in the parent frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
@@ -96,7 +96,7 @@ _AXES = ("+x", "-x", "x", "+y", "-y", "y", "+z", "-z", "z")
 
 
 class StationDefinedFrame(PhysicalFrame):
-    """A frame laid through stations of one body: from a to b runs `ab_axis`, across a, b and c `ab_x_ac_axis`."""
+    """Frame of stations of one body: `ab_axis` from a to b, `ab_x_ac_axis` across a, b and c."""
 
     socket_point_a: StationSocket = ""
     """Corner a of the triangle; all four stations are in one body."""
@@ -127,4 +127,4 @@ class BodySet(ModelComponentSet):
     """The bodies of a model."""
 
     objects: LegacyMany[Body] = make_empty_list()
-    """The bodies; joints say how they hang together."""
+    """Bodies, which joints connect."""

@@ -42,7 +42,7 @@ class LinearFunction(Function):
 
 
 class MultiplierFunction(Function):
-    """Another function times `scale`; what scaling a model makes of a spline."""
+    """Another function times `scale`, as scaling a model makes it from a spline."""
 
     function: LegacyOptional[Function] = None
     """The function that is multiplied."""
@@ -54,4 +54,4 @@ class FunctionSet(Set):
     """A list of functions."""
 
     objects: LegacyMany[Function] = make_empty_list()
-    """The functions; whoever owns the set says what their order means."""
+    """Functions, whose order has a meaning for the owner of the set."""

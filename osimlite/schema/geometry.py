@@ -11,7 +11,7 @@ class SurfaceProperties(Object):
     """Appearance of a surface in viewers."""
 
     representation: Annotated[int, Value("int", choices=(-1, 0, 1, 2, 3))] = 3
-    """0 is not drawn, 1 points, 2 wireframe, 3 filled, -1 as the viewer likes."""
+    """0 is hidden, 1 points, 2 wireframe, 3 filled, -1 the choice of the viewer."""
     texture: Annotated[str | None, Value("string", "optional")] = None
     """Name of a texture; viewers may ignore it."""
 
@@ -20,9 +20,9 @@ class Appearance(Object):
     """Colour, opacity and visibility."""
 
     visible: Flag = True
-    """Whether a viewer draws the thing at all."""
+    """Whether viewers draw the component."""
     opacity: Annotated[float, real(domain="0 to 1")] = 1.0
-    """0 lets everything through, 1 nothing."""
+    """Opacity from 0 (transparent) to 1 (opaque)."""
     color: Annotated[Vec3, vec3(domain="0 to 1")] = (1.0, 1.0, 1.0)
     """Red, green and blue."""
     surface_properties: Unnamed[SurfaceProperties] = make_default(SurfaceProperties)
@@ -36,9 +36,9 @@ class Geometry(Component, abstract=True):
     # OpenSim replaces it by `..` in shapes that a frame owns, so that a wrong path does no harm
     # there.
     socket_frame: FrameSocket = ""
-    """The frame that the shape is drawn in; OpenSim fills in the one that owns it."""
+    """Frame in which the shape is drawn; OpenSim sets the one that owns it."""
     input_transform: TransformInput = ""
-    """An output that places the shape in ground, in the stead of a frame."""
+    """Output that gives the pose of the shape in ground, instead of a frame."""
     scale_factors: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
     """Factors of the size along the axes X, Y and Z of the frame."""
     appearance: Unnamed[Appearance] = make_default(Appearance)
@@ -57,7 +57,7 @@ class Mesh(Geometry):
     """A surface read from a file (.vtp, .stl or .obj)."""
 
     mesh_file: FileName = ""
-    """File of the surface, sought beside the model and in folders of geometry; a missing one is only warned of."""
+    """File of the surface, searched beside the model and in geometry folders; it may be missing."""
 
 
 class ModelDisplayHints(Object):
@@ -80,11 +80,11 @@ class ModelDisplayHints(Object):
     show_frames: Flag = False
     """Whether the axes of frames are drawn."""
     show_labels: Flag = False
-    """Whether names stand beside the components."""
+    """Whether names are shown beside the components."""
     show_forces: Flag = True
     """Whether forces are drawn as arrows or lines."""
     show_debug_geometry: Flag = False
-    """Whether helpers for those who look for faults are drawn."""
+    """Whether geometry for debugging is drawn."""
 
 
 class ModelVisualPreferences(Object):

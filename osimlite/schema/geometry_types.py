@@ -7,7 +7,7 @@ from osimlite.schema.geometry import Geometry
 
 
 class AnalyticGeometry(Geometry, abstract=True):
-    """A shape with a formula."""
+    """Base class of shapes that are given by formulas."""
 
 
 class Brick(Geometry):
@@ -61,7 +61,7 @@ class Cylinder(AnalyticGeometry):
 
 
 class Cone(AnalyticGeometry):
-    """A cone: where it is, which way it points, how wide and how high."""
+    """Cone with an origin, a direction, a base radius and a height."""
 
     origin: Annotated[Vec3, vec3()] = (0.0, 0.0, 0.0)
     """Middle of the base, in the frame."""
@@ -74,4 +74,4 @@ class Cone(AnalyticGeometry):
 
 
 class Torus(AnalyticGeometry):
-    """A ring; no property gives its size, only the scale factors do."""
+    """Torus whose size only the scale factors determine."""

@@ -108,4 +108,4 @@ class ConstantCurvatureJoint(Joint):
     neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Added to the coordinates: the shape of the rod where they are 0."""
     length: Annotated[float, real("m", "> 0")] = 1.0
-    """Length of the rod along its middle line, however it is bent."""
+    """Length of the rod along its middle line, constant in any shape."""

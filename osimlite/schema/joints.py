@@ -118,7 +118,7 @@ def make_coordinates_field(count: int) -> Any:
 
 
 class WeldJoint(Joint):
-    """No motion."""
+    """Joint without motion."""
 
     moves = ""
 

@@ -10,7 +10,7 @@ from osimlite.schema.sets import ModelComponentSet
 
 
 class Point(ModelComponent, abstract=True):
-    """A point."""
+    """Base class of points."""
 
 
 class Station(Point):
@@ -22,16 +22,16 @@ class Station(Point):
     )
 
     socket_parent_frame: PhysicalFrameSocket = ""
-    """The frame that the point is fixed in."""
+    """Frame in which the point is fixed."""
     location: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Position of the point in its parent frame."""
 
 
 class Marker(Station):
-    """A station that motion capture sees."""
+    """Station whose position motion capture measures."""
 
     fixed: Flag = False
-    """Whether placing markers on a scaled model leaves this one where it is."""
+    """Whether the marker keeps its position when markers are placed on a scaled model."""
 
 
 class MarkerSet(ModelComponentSet):
@@ -49,4 +49,4 @@ class IMU(ModelComponent):
     )
 
     socket_frame: PhysicalFrameSocket = ""
-    """The frame that the sensor is fixed in, at its origin and along its axes."""
+    """Frame of the sensor, which is at its origin and along its axes."""

@@ -79,9 +79,9 @@ class Millard2012EquilibriumMuscle(Muscle):
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
     """Time constant of falling activation; high activation speeds it up."""
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
-    """Activation below which the muscle does not go; below 0.01 only with fiber damping or a rigid tendon."""
+    """Smallest activation of the muscle; below 0.01 only with fiber damping or a rigid tendon."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibers do not go beyond; it bounds their length from below."""
+    """Largest pennation angle; it bounds the fiber length from below."""
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = make_default(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve"
     )
@@ -213,13 +213,13 @@ class Millard2012AccelerationMuscle(Muscle):
     )
     """Force along the tendon that keeps fibers from standing across it."""
     tendon_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.1
-    """The c of 1 + c v, by which the normalised velocity v raises the tendon's force."""
+    """Coefficient c of the factor 1 + c v of the tendon force, at the normalised velocity v."""
     fiber_compressive_force_length_damping: Annotated[float, real(domain=">= 0")] = 1.0
-    """The c of 1 - c v, by which shortening raises the force against short fibers."""
+    """Coefficient c of the factor 1 - c v of the force against short fibers, at velocity v."""
     fiber_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.01
-    """The c of 1 + c v, by which the normalised velocity v raises the passive force."""
+    """Coefficient c of the factor 1 + c v of the passive force, at the normalised velocity v."""
     fiber_compressive_force_cos_pennation_damping: Annotated[float, real(domain=">= 0")] = 1.0
-    """The c of 1 - c v, by which shortening raises the force against steep fibers."""
+    """Coefficient c of the factor 1 - c v of the force against steep fibers, at velocity v."""
     fiber_damping: Annotated[float, real(domain=">= 0")] = 0.01
     """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     mass: Annotated[float, real(domain="> 0")] = 0.1

@@ -48,7 +48,7 @@ class Model(ModelComponent):
         name="ground",
         wrap_object_set=lambda: WrapObjectSet.build({"name": "wrapobjectset"}, set()),
     )
-    """The inertial frame: bodies hang on it, and gravity is given in it."""
+    """Inertial frame, the root of all bodies; gravity is given in it."""
     gravity: Annotated[Vec3, vec3("m/s^2")] = (0.0, -9.80665, 0.0)
     """Acceleration of free fall, along the axes of ground."""
     credits: Text = "Frank Anderson, Peter Loan, Ayman Habib, Ajay Seth, Michael Sherman"
@@ -61,9 +61,9 @@ class Model(ModelComponent):
     """Unit of all forces, in a word for readers; the mechanics assume newtons."""
     # In paths OpenSim calls each set by its class in lower case, whatever name the file gives it.
     body_set: Unnamed[BodySet] = make_default(BodySet, name="bodyset")
-    """The rigid bodies; joints say how they hang together."""
+    """Rigid bodies, which joints connect."""
     joint_set: Unnamed[JointSet] = make_default(JointSet, name="jointset")
-    """The joints: every body is the child of one, or has a free joint to ground made for it."""
+    """Joints; a body that is the child of none gets a free joint to ground."""
     controller_set: Unnamed[ControllerSet] = make_default(ControllerSet, name="controllerset")
     """Controllers, which set the controls of actuators."""
     constraint_set: Unnamed[ConstraintSet] = make_default(ConstraintSet, name="constraintset")
@@ -71,7 +71,7 @@ class Model(ModelComponent):
     force_set: Unnamed[ForceSet] = make_default(ForceSet, name="forceset")
     """All forces except gravity: forces, contact, actuators, muscles."""
     marker_set: Unnamed[MarkerSet] = make_default(MarkerSet, name="markerset")
-    """Points that motion capture sees."""
+    """Points whose positions motion capture measures."""
     contact_geometry_set: Unnamed[ContactGeometrySet] = make_default(
         ContactGeometrySet, name="contactgeometryset"
     )
@@ -79,7 +79,7 @@ class Model(ModelComponent):
     probe_set: Unnamed[ProbeSet] = make_default(ProbeSet, name="probeset")
     """Quantities that a simulation reports."""
     component_set: Unnamed[ComponentSet] = make_default(ComponentSet, name="componentset")
-    """Components of any class that no other set takes, such as reporters."""
+    """Components of any class that belong to no other set, such as reporters."""
     model_visual_preferences: Unnamed[ModelVisualPreferences] = make_default(
         ModelVisualPreferences, name="modelvisualpreferences"
     )

@@ -21,15 +21,15 @@ class ActiveForceLengthCurve(Function):
     )
 
     min_norm_active_fiber_length: Annotated[float, real(domain="> 0")] = 0.4441
-    """Length below which the force keeps to `minimum_value`."""
+    """Length below which the force is `minimum_value`."""
     transition_norm_fiber_length: Annotated[float, real(domain="> 0")] = 0.73
-    """Length at which the steep part of the rise goes over to the shallow one."""
+    """Length at which the steep part of the rise ends and the shallow part begins."""
     max_norm_active_fiber_length: Annotated[float, real(domain="> 0")] = 1.8123
-    """Length above which the force keeps to `minimum_value`."""
+    """Length above which the force is `minimum_value`."""
     shallow_ascending_slope: Annotated[float, real(domain=">= 0")] = 0.8616
     """Slope of the shallow part of the rise, just before optimal length."""
     minimum_value: Annotated[float, real(domain=">= 0")] = 0.1
-    """Least force at any length; a muscle without fiber damping needs more than 0."""
+    """Smallest force at any length; a muscle without fiber damping needs more than 0."""
 
 
 class FiberForceLengthCurve(Function):

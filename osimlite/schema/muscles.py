@@ -32,17 +32,17 @@ class MuscleFirstOrderActivationDynamicModel(ModelComponent):
     """Activation that follows excitation with one time constant up and one down."""
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
-    """Time constant of rising activation; a muscle that owns the part puts in its own."""
+    """Time constant of rising activation; a muscle that owns this object replaces it."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
-    """Time constant of falling activation; a muscle that owns the part puts in its own."""
+    """Time constant of falling activation; a muscle that owns this object replaces it."""
     # OpenSim clamps only the use of the activation, not the state: with an excitation below this
     # minimum the state falls linearly for ever.
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
-    """Activation below which the muscle does not go, whatever its control."""
+    """Smallest activation of the muscle, for any control."""
 
 
 class MuscleFixedWidthPennationModel(ModelComponent):
-    """Fibers that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
+    """Fibers of a muscle of constant width: fiber length times the sine of the pennation angle."""
 
     facts = Facts(
         domains={
@@ -59,7 +59,7 @@ class MuscleFixedWidthPennationModel(ModelComponent):
     # Fibers across the tendon would need an infinite force, since equilibrium divides by the
     # cosine.
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibers do not go beyond; it bounds their length from below."""
+    """Largest pennation angle; it bounds the fiber length from below."""
 
 
 class PathActuator(ScalarActuator):
@@ -74,7 +74,7 @@ class PathActuator(ScalarActuator):
     )
     """The line along which the actuator pulls."""
     optimal_force: Annotated[float, real("N")] = 1.0
-    """Tension at a control of 1; classes with a law of their own do without it."""
+    """Tension at a control of 1; classes with another law do not use it."""
 
 
 class Muscle(PathActuator, abstract=True):
@@ -107,11 +107,11 @@ class Muscle(PathActuator, abstract=True):
         appearance=lambda: Appearance.build({"color": (0.8, 0.1, 0.1)}, set()),
     )
     max_isometric_force: Annotated[float, real("N", "> 0")] = 1000.0
-    """Force of fully active fibers at optimal length and rest; all forces are measured by it."""
+    """Force of fully active fibers at optimal length and rest; the unit of normalized forces."""
     optimal_fiber_length: Annotated[float, real("m", "> 0")] = 0.1
     """Fiber length at which the active force is largest; the unit of normalized fiber lengths."""
     tendon_slack_length: Annotated[float, real("m", "> 0")] = 0.2
-    """Length up to which the tendon is slack; all tendon lengths are measured by it."""
+    """Length up to which the tendon is slack; the unit of normalized tendon lengths."""
     pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
     """Angle between fibers and tendon at optimal fiber length; 0 is parallel."""
     max_contraction_velocity: Annotated[float, real("optimal_fiber_length/s", "> 0")] = 10.0
@@ -195,13 +195,13 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     fv_linear_extrap_threshold: Annotated[float, real(domain="> 0")] = 0.95
     """Part of `Flen` from which force over velocity continues as a line; more than 1 / `Flen`."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
-    """Angle that the fibers do not go beyond; it bounds their length from below."""
+    """Largest pennation angle; it bounds the fiber length from below."""
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
     """Time constant of rising activation; high activation slows it down."""
     deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.05
     """Time constant of falling activation; high activation speeds it up."""
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
-    """Activation below which the muscle does not go; `min_control` must not be less."""
+    """Smallest activation of the muscle; `min_control` must not be less."""
 
     def find_contradictions(self) -> Iterator[Contradiction]:
         """Yield combinations that OpenSim rejects: simplified dynamics, a force-velocity threshold of at most 1/Flen."""

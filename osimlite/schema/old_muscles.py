@@ -44,7 +44,7 @@ class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     Vmax: Annotated[float, real("fiber_length/s", "> 0")] = 10.0
     """Shortening velocity at which fully active fibers bear no force."""
     Vmax0: Annotated[float, real("fiber_length/s", "> 0")] = 5.0
-    """Greatest shortening velocity at activation 0; in between it grows in proportion."""
+    """Maximum shortening velocity at activation 0; in between it grows in proportion."""
     FmaxTendonStrain: Annotated[float, real(domain="> 0")] = 0.033
     """Strain at which the tendon bears `max_isometric_force`."""
     FmaxMuscleStrain: Annotated[float, real(domain="> 0")] = 0.6
@@ -72,7 +72,7 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     )
 
     time_scale: Annotated[float, real(domain="> 0")] = 0.1
-    """Time (s) that the rates of activation and fiber length are divided by."""
+    """Time (s) by which the rates of activation and fiber length are divided."""
     activation1: Number = 7.667
     """Factor of the excitation u in the rate of rise (activation1 u + activation2) / time scale."""
     activation2: Number = 1.459854
@@ -104,7 +104,7 @@ class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     )
 
     time_scale: Annotated[float, real(domain="> 0", legacy=True)] = 0.1
-    """Time (s) that the rates of the states are divided by."""
+    """Time (s) by which the rates of the states are divided."""
     activation1: Annotated[float, real(legacy=True)] = 7.667
     """Factor of the excitation u in the rate of rise (activation1 u + activation2) / time scale."""
     activation2: Annotated[float, real(legacy=True)] = 1.459854

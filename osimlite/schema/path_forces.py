@@ -44,7 +44,7 @@ class PathSpring(ForceProducer):
     stiffness: Annotated[float, real("N/m", ">= 0")] = math.nan
     """Tension per stretch beyond the resting length."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = math.nan
-    """The c of 1 + c v, by which the lengthening speed v raises the tension."""
+    """Coefficient c of the factor 1 + c v of the tension, at the lengthening velocity v."""
 
 
 class ExpressionBasedPathForce(ForceProducer):
@@ -107,7 +107,7 @@ class Blankevoort1991Ligament(ForceProducer):
     linear_stiffness: Annotated[float, real("N", ">= 0")] = 1.0
     """Tension per strain beyond the transition."""
     transition_strain: Annotated[float, real("strain", ">= 0")] = 0.06
-    """Strain at which the tension goes over from a square to a line."""
+    """Strain at which the tension changes from a quadratic to a linear rise."""
     damping_coefficient: Annotated[float, real("N*s/strain", ">= 0")] = 0.003
     """Tension per rate of strain, only while the ligament is taut and lengthens."""
     slack_length: Annotated[float, real("m", ">= 0")] = 0.0
@@ -129,7 +129,7 @@ class ClutchedPathSpring(PathActuator):
     stiffness: Annotated[float, real("N/m", ">= 0")] = math.nan
     """Tension per stretch at a control of 1; less control pulls proportionally less."""
     dissipation: Annotated[float, real("s/m", ">= 0")] = math.nan
-    """The c of 1 + c v, by which the lengthening speed v raises the tension."""
+    """Coefficient c of the factor 1 + c v of the tension, at the lengthening velocity v."""
     relaxation_time_constant: Annotated[float, real("s", "> 0")] = 0.001
     """Time constant with which the stretch fades while the control is 0."""
     initial_stretch: Annotated[float, real("m")] = 0.0

@@ -40,7 +40,7 @@ class AbstractPathPoint(Point, abstract=True):
     """A point that a path runs through."""
 
     socket_parent_frame: PhysicalFrameSocket = ""
-    """The frame in which the location is given."""
+    """Frame in which the location is given."""
 
 
 class PathPoint(AbstractPathPoint):
@@ -65,7 +65,7 @@ class ConditionalPathPoint(PathPoint):
     # OpenSim adds a tolerance of 1e-5 at both ends. Where the point appears, the length of the path
     # usually jumps, by up to 2 cm in public models.
     range: Annotated[tuple[float, float], reals("rad (rotational)", least=2, most=2)] = (0.0, 0.0)
-    """Lowest and highest value of the coordinate with which the point counts, both included."""
+    """Lowest and highest value of the coordinate at which the point is in the path, inclusive."""
 
 
 class MovingPathPoint(AbstractPathPoint):
@@ -104,7 +104,7 @@ class PathWrapPoint(AbstractPathPoint, abstract=True):
 
 
 class PathWrap(ModelComponent):
-    """Says that a path wraps around a surface, and where."""
+    """Entry for a surface around which a path wraps, with the range of points."""
 
     # The two tangent points are components in OpenSim, so that their names are taken and their
     # paths exist, although no file holds them.
@@ -127,7 +127,7 @@ class PathWrapSet(Set):
 
 
 class AbstractGeometryPath(ModelComponent, abstract=True):
-    """A path, and what it looks like."""
+    """Base class of paths, with their appearance."""
 
     facts = Facts(outputs="length lengthening_speed")
 

@@ -31,7 +31,7 @@ class PrescribedForce(ForceProducer):
     forceFunctions: Single[FunctionSet] = make_default(FunctionSet, name="forceFunctions")
     """x, y and z of the force over time; empty for none."""
     pointFunctions: Single[FunctionSet] = make_default(FunctionSet, name="pointFunctions")
-    """x, y and z over time of where the force acts; empty for the origin of the frame."""
+    """x, y and z of the point of application over time; empty for the origin of the frame."""
     torqueFunctions: Single[FunctionSet] = make_default(FunctionSet, name="torqueFunctions")
     """x, y and z of the torque over time; empty for none."""
 
@@ -71,4 +71,4 @@ class ExternalLoads(ModelComponentSet):
     # OpenSim looks for it from its current folder, then from the folder of this file. It puts a
     # cubic spline through all samples, and continues it straight beyond the last one.
     datafile: Annotated[str, make_input_file("table", legacy=True, required=True)] = ""
-    """File of the columns (.sto, .mot); it replaces what the forces name as their source."""
+    """File of the columns (.sto, .mot); it replaces the data source of each force."""

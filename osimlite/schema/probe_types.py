@@ -86,7 +86,7 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
     metabolic_muscle_parameter_set: Unnamed[
         Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet
     ] = make_default(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
-    """The muscles that count, and what the probe must know of them."""
+    """Muscles that are included, with their parameters."""
 
 
 class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
@@ -164,14 +164,14 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     metabolic_muscle_parameter_set: Unnamed[
         Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet
     ] = make_default(Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
-    """The muscles that count, and what the probe must know of them."""
+    """Muscles that are included, with their parameters."""
 
 
 class Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(Component):
     """Parameters of the metabolics component for one muscle."""
 
     socket_muscle: MuscleSocket = ""
-    """The muscle that the numbers are about."""
+    """Muscle to which the numbers belong."""
     specific_tension: Annotated[float, real("Pa", "> 0")] = 250000.0
     """Force per cross-section of the fibers; it gives the mass where none is provided."""
     density: Annotated[float, real("kg/m^3", "> 0")] = 1059.7
@@ -203,7 +203,7 @@ class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
     muscle_parameters: Many[Bhargava2004SmoothedMuscleMetabolics_MuscleParameters] = (
         make_empty_list()
     )
-    """The muscles that count, and what must be known of them."""
+    """Muscles that are included, with their parameters."""
     enforce_minimum_heat_rate_per_muscle: Flag = True
     """Whether the heat of a muscle is never below 1 W/kg."""
     use_force_dependent_shortening_prop_constant: Flag = False

@@ -10,7 +10,7 @@ from osimlite.schema.references import ColumnName, FileName, NumberInputs, Vec3I
 
 
 class AbstractReporter(Component, abstract=True):
-    """Collects something along a simulation."""
+    """Base class of components that collect values along a simulation."""
 
     report_time_interval: Annotated[float, real("s", ">= 0")] = 0.0
     """Time between two rows; with 0, a row at every step of the integrator."""
@@ -58,7 +58,7 @@ class TableReporter__Vector_(VectorReporter):
 
 
 class StatesTrajectoryReporter(AbstractReporter):
-    """Collects the whole state."""
+    """Collects complete states."""
 
 
 class TableSource(Component, abstract=True):

@@ -30,18 +30,18 @@ class Set(Object, abstract=True):
 
 
 class ModelComponentSet(Set, ModelComponent, abstract=True):
-    """A set with a place in the component tree; there it is always called by its class name in lower case."""
+    """Set with a path in the component tree, which is always its class name in lower case."""
 
 
 class ComponentSet(ModelComponentSet):
     """Further components of a model."""
 
     objects: LegacyMany[ModelComponent] = make_empty_list()
-    """Components of any class that no other set takes, such as reporters."""
+    """Components of any class that belong to no other set, such as reporters."""
 
 
 class Constraint(ModelComponent, abstract=True):
-    """A condition that the motion keeps."""
+    """Condition that the motion fulfils."""
 
     isEnforced: Flag = True
     """Whether the constraint is active during a simulation."""
@@ -51,7 +51,7 @@ class ConstraintSet(ModelComponentSet):
     """The constraints of a model."""
 
     objects: LegacyMany[Constraint] = make_empty_list()
-    """The constraints; one that is not enforced does nothing."""
+    """Constraints; those that are not enforced have no effect."""
 
 
 class Controller(ModelComponent, abstract=True):
@@ -59,7 +59,7 @@ class Controller(ModelComponent, abstract=True):
 
     # OpenSim rejects a model in which a controller names an actuator twice.
     socket_actuators: ActuatorSockets = ()
-    """The actuators that are controlled; what several controllers want of one is added up."""
+    """Actuators that are controlled; the controls of several controllers are added."""
     enabled: Flag = True
     """Whether the controller adds anything to the controls."""
 
@@ -68,7 +68,7 @@ class ControllerSet(ModelComponentSet):
     """The controllers of a model."""
 
     objects: LegacyMany[Controller] = make_empty_list()
-    """The controllers; what several want of one actuator is added up."""
+    """Controllers; their controls of one actuator are added."""
 
 
 class Probe(ModelComponent, abstract=True):
@@ -86,7 +86,7 @@ class Probe(ModelComponent, abstract=True):
     initial_conditions_for_integration: Annotated[Reals, reals()] = ()
     """Initial values of the integrals, one number for each quantity of the probe."""
     gain: Number = 1.0
-    """Factor of what is reported."""
+    """Factor of the reported quantity."""
 
 
 class ProbeSet(ModelComponentSet):

@@ -25,7 +25,7 @@ class PiecewiseLinearFunction(Function):
     x: LegacyReals = ()
     """Arguments of the points, in ascending order."""
     y: LegacyReals = ()
-    """Values at the points; the outer lines go on beyond them."""
+    """Values at the points; the outer lines continue beyond them."""
 
 
 # OpenSim prints these lists of the first property system with six digits: a model that it has

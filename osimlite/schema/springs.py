@@ -38,7 +38,7 @@ class SpringGeneralizedForce(ForceProducer):
     """A damped spring on one coordinate: -`stiffness` (q - `rest_length`) - `viscosity` u."""
 
     coordinate: MaybeCoordinateName = None
-    """The coordinate that the spring acts on."""
+    """Name of the coordinate on which the spring acts."""
     # No unit: it follows from the coordinate, which is an angle or a length.
     stiffness: Annotated[float, real(domain=">= 0")] = 0.0
     """Generalized force per value of the coordinate."""
@@ -54,9 +54,9 @@ class ExpressionBasedCoordinateForce(ForceProducer):
     facts = Facts(outputs="force_magnitude")
 
     coordinate: CoordinateName = "UNASSIGNED"
-    """Name of the coordinate that the force acts on."""
+    """Name of the coordinate on which the force acts."""
     expression: Text = "0.0"
-    """Formula of the generalized force in `q` and `qdot`; positive drives the coordinate up."""
+    """Formula of the generalized force in `q` and `qdot`; positive increases the coordinate."""
 
 
 class ExpressionBasedPointToPointForce(ForceProducer):
@@ -130,7 +130,7 @@ class ExpressionBasedBushingForce(TwoFrameLinker, ForceProducer):
     force_visual_scale: Annotated[float | None, maybe()] = 1.0
     """Length drawn per force."""
     visual_aspect_ratio: Annotated[float | None, maybe()] = 1.0
-    """Length over diameter of what is drawn."""
+    """Ratio of length to diameter of the drawn forces and moments."""
 
 
 class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
@@ -157,21 +157,21 @@ class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
     force_visual_scale: Annotated[float | None, maybe()] = 1.0
     """Length drawn per force."""
     visual_aspect_ratio: Annotated[float | None, maybe()] = 1.0
-    """Length over diameter of what is drawn."""
+    """Ratio of length to diameter of the drawn forces and moments."""
 
 
 class CoordinateLinearStopForce(Force):
-    """A stop that a coordinate runs into: a linear spring with damping that grows with its compression."""
+    """Stop of a coordinate: a linear spring with damping in proportion to its compression."""
 
     # OpenSim 4.6 rejects a ForceSet with a class that it does not know.
     since: ClassVar[str] = "4.6.1"
 
     socket_coordinate: CoordinateSocket = ""
-    """The coordinate that is stopped."""
+    """Coordinate that is stopped."""
     stiffness: Annotated[float, real("N*m/rad (rotational) | N/m", ">= 0")] = 0.0
     """Generalized force per distance beyond a limit."""
     damping: Annotated[float, real("s/rad (rotational) | s/m", ">= 0")] = 0.0
-    """The d of 1 + d v, by which running on at v raises the force and running back lowers it, down to none."""
+    """Coefficient d of the factor 1 + d v of the force, at velocity v into the stop, which never pulls."""
     upper_limit: Annotated[float, real("rad (rotational) | m")] = 0.0
     """Value above which the stop pushes back."""
     lower_limit: Annotated[float, real("rad (rotational) | m")] = 0.0
@@ -190,6 +190,6 @@ class ExponentialCoordinateLimitForce(ForceProducer):
     upper_limit: Number = 0.0
     """Value at which the upper exponential has its first shape parameter."""
     lower_shape_parameters: Annotated[Vec2, Value("double", "Vec2", domain="> 0")] = (0.0, 0.0)
-    """Generalized force at the lower limit, and how steeply it grows below (per value of the coordinate)."""
+    """Generalized force at the lower limit, and its rate of growth below (per unit of value)."""
     upper_shape_parameters: Annotated[Vec2, Value("double", "Vec2", domain="> 0")] = (0.0, 0.0)
-    """Generalized force at the upper limit, and how steeply it grows above (per value of the coordinate)."""
+    """Generalized force at the upper limit, and its rate of growth above (per unit of value)."""

@@ -21,7 +21,7 @@ class WrapCylinder(WrapObject):
     )
 
     radius: Annotated[float, real("m", "> 0")] = 1.0
-    """Distance of the surface from the Z axis."""
+    """Radius of the cylinder."""
     length: Annotated[float, real("m", "> 0")] = 1.0
     """Extent along Z, half of it to either side; a path that would touch only beyond it does not wrap."""
 
@@ -38,17 +38,17 @@ class WrapEllipsoid(WrapObject):
 
 
 class WrapSphere(WrapObject):
-    """A ball."""
+    """Sphere for paths to wrap around."""
 
     facts = Facts(refused="radius", zero={"": "radius"}, scales={"radius": f"{HOLDER} {MEAN}"})
 
     radius: Annotated[float, real("m", "> 0")] = 0.05
-    """Distance of the surface from the middle."""
+    """Radius of the sphere."""
 
 
 # OpenSim wraps over a long cylinder at the point of the ring that is nearest to the path.
 class WrapTorus(WrapObject):
-    """A ring about its own Z axis; paths run through its hole."""
+    """Torus about its own Z axis; paths run through its hole."""
 
     facts = Facts(
         refused="inner_radius outer_radius",
@@ -56,9 +56,9 @@ class WrapTorus(WrapObject):
     )
 
     inner_radius: Annotated[float, real("m", "> 0")] = 0.01
-    """Radius of the tube; it must be less than the outer one."""
+    """Minor radius, of the tube; it must be less than the outer one."""
     outer_radius: Annotated[float, real("m", "> 0")] = 0.05
-    """Radius of the circle in the middle of the tube."""
+    """Major radius, of the circle in the middle of the tube."""
 
     def find_contradictions(self) -> Iterator[Contradiction]:
         """Yield radii that leave no hole: the outer one must be larger than the inner one."""

@@ -10,7 +10,7 @@ from osimlite.schema.sets import ModelComponentSet
 
 
 class WrapObject(ModelComponent, abstract=True):
-    """A surface fixed in the frame that owns it, for paths to wrap around."""
+    """Surface for paths to wrap around, fixed in the frame that owns it."""
 
     facts = Facts(scales={"translation": HOLDER})
 
@@ -23,7 +23,7 @@ class WrapObject(ModelComponent, abstract=True):
     quadrant: Annotated[
         str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")
     ] = "Unassigned"
-    """Keeps paths to the half where this coordinate of the surface has this sign; `all` leaves both."""
+    """Coordinate and sign of the half of the surface on which paths stay; `all` for both halves."""
     appearance: Unnamed[Appearance] = make_default(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
     """Appearance of the surface in viewers."""
 
@@ -32,4 +32,4 @@ class WrapObjectSet(ModelComponentSet):
     """The wrap surfaces of one frame."""
 
     objects: LegacyMany[WrapObject] = make_empty_list()
-    """The surfaces; a path names those that it wraps around."""
+    """Surfaces; a path names those that it wraps around."""

@@ -50,10 +50,10 @@ Direction = Annotated[str, word(*DIRECTIONS)]
 
 
 class MocoGoal(Object, abstract=True):
-    """A number that belongs to a motion."""
+    """Base class of costs and endpoint constraints of a motion."""
 
     enabled: Flag = True
-    """Whether the goal counts."""
+    """Whether the goal is part of the problem."""
     weight: Number = 1.0
     """Weight of a cost relative to others."""
     mode: Annotated[
@@ -65,15 +65,15 @@ class MocoGoal(Object, abstract=True):
     scale_factors: Many[MocoScaleFactor] = make_empty_list()
     """Factors that the optimization finds for reference data."""
     divide_by_displacement: Flag = False
-    """Whether the number is divided by the way of the center of mass."""
+    """Whether the value is divided by the displacement of the center of mass."""
     divide_by_duration: Flag = False
-    """Whether the number is divided by the duration."""
+    """Whether the value is divided by the duration."""
     divide_by_mass: Flag = False
-    """Whether the number is divided by the mass of the model."""
+    """Whether the value is divided by the mass of the model."""
 
 
 class MocoFinalTimeGoal(MocoGoal):
-    """The time at the end."""
+    """Final time of the motion."""
 
 
 class MocoAverageSpeedGoal(MocoGoal):
@@ -107,7 +107,7 @@ class MocoControlGoal(MocoGoal):
     )
     """Weights by patterns of paths, for controls that have none by path."""
     exponent: Annotated[int, Value("int", domain=">= 2")] = 2
-    """The power, at least two."""
+    """Power of the controls, at least two."""
     ignore_controlled_actuators: Flag = False
     """Whether controls that controllers of the model set are left out."""
     ignore_input_controls: Flag = False
@@ -120,7 +120,7 @@ class MocoSumSquaredStateGoal(MocoGoal):
     state_weights: StateWeights = make_default(MocoWeightSet, name="state_weights")
     """Weights by paths of states."""
     pattern: StatePattern = None
-    """A regular expression; only states whose paths match it count."""
+    """Regular expression for the paths of the states that are included."""
 
 
 class MocoExpressionBasedParameterGoal(MocoGoal):
@@ -129,7 +129,7 @@ class MocoExpressionBasedParameterGoal(MocoGoal):
     expression: Text = ""
     """The expression, in names of `variables`."""
     parameters: Many[MocoParameter] = make_empty_list()
-    """Parameters that stand in the expression."""
+    """Parameters in the expression."""
     variables: Strings = ()
     """The name of each parameter in the expression."""
 
@@ -179,16 +179,16 @@ class MocoJointReactionGoal(MocoGoal):
 
 
 class MocoOutputBase(MocoGoal, abstract=True):
-    """A goal made of outputs of components."""
+    """Base class of goals that are functions of outputs of components."""
 
     output_path: OutputPath = ""
     """The output, as `path|output`."""
     second_output_path: SecondOutputPath = ""
-    """Another output, which `operation` joins to the first."""
+    """Second output, which `operation` combines with the first."""
     operation: Operation = ""
     """Operation that combines the two outputs."""
     exponent: Integer = 1
-    """The power that the result is raised to."""
+    """Power to which the result is raised."""
     output_index: Integer = -1
     """Index of the component of an output of several numbers; -1 for its length."""
 
@@ -209,9 +209,9 @@ class MocoStepTimeAsymmetryGoalGroup(Object):
     """The contacts of a foot; OpenSim writes it and does not read it again."""
 
     contact_force_paths: Strings = ()
-    """Paths of the contact forces that tell when the foot is on the ground."""
+    """Paths of the contact forces that show whether the foot is on the ground."""
     foot_position_contact_force_path: Text = ""
-    """Path of the contact force whose sphere says where the foot is."""
+    """Path of the contact force whose sphere gives the position of the foot."""
 
 
 class MocoStepTimeAsymmetryGoal(MocoGoal):
@@ -253,4 +253,4 @@ class MocoStepLengthAsymmetryGoal(MocoGoal):
     target_asymmetry: Number = 0.0
     """Difference of step lengths over their sum, right less left."""
     stride_length: Annotated[float, real("m")] = -1.0
-    """Length of a stride; negative, that of the motion is taken."""
+    """Length of a stride; if negative, that of the motion."""

@@ -35,10 +35,10 @@ StatePattern = Annotated[str | None, Value("string", "optional"), PatternOfState
 
 
 class MocoBounds(Object):
-    """Least and greatest value of a variable."""
+    """Smallest and largest value of a variable."""
 
     bounds: Bounds = ()
-    """Both ends of the range, one number where the variable is fixed, none where it is free."""
+    """Both ends of the range; one number for a fixed variable, none for a free one."""
 
 
 class MocoInitialBounds(MocoBounds):
@@ -53,14 +53,14 @@ class MocoWeight(Object):
     """Weight of the state, control, marker, frame or other item with the same name."""
 
     weight: Number = 1.0
-    """Beside those of the others."""
+    """Value of the weight, relative to the others."""
 
 
 class MocoWeightSet(Set):
     """Weights by name."""
 
     objects: LegacyMany[MocoWeight] = make_empty_list()
-    """The weights; what has none counts one."""
+    """Weights; items without one have weight 1."""
 
 
 StateWeights = Annotated[Single[MocoWeightSet], OfStates]
@@ -82,7 +82,7 @@ class MocoScaleFactor(Component):
     """A factor that an optimization finds for a goal."""
 
     bounds: Bounds = ()
-    """The range that the factor is looked for in."""
+    """Range of the factor in the optimization."""
     scale_factor: Number = 1.0
     """The factor itself, which the optimization sets."""
 
@@ -93,7 +93,7 @@ class MocoVariableInfo(Object):
     name_reference = Reference("state-path", "state or control variable", required=False)
 
     bounds: Bounds = ()
-    """The range over the whole phase."""
+    """Range over the complete phase."""
     initial_bounds: Bounds = ()
     """The range at the start."""
     final_bounds: Bounds = ()
@@ -104,10 +104,10 @@ class MocoParameter(Object):
     """A property of the model that an optimization finds."""
 
     moco_bounds: Unnamed[MocoBounds] = make_default(MocoBounds)
-    """The range that the value is looked for in."""
+    """Range of the value in the optimization."""
     component_paths: Annotated[Names, Reference("model-path", "Component", "list")] = ()
     """Paths of the components that all get the value."""
     property_name: Text = ""
-    """The property of those components."""
+    """Name of the property of those components."""
     property_element: Annotated[int | None, Value("int", "optional")] = None
     """Index of the number in the property, from 0; left out for a property of one number."""

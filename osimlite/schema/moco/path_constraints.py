@@ -35,9 +35,9 @@ class MocoControlBoundConstraint(MocoPathConstraint):
     ] = ()
     """Paths of the controls."""
     lower_bound: Optional[Function] = None
-    """Least value over time."""
+    """Smallest value over time."""
     upper_bound: Optional[Function] = None
-    """Greatest value over time."""
+    """Largest value over time."""
     equality_with_lower: Flag = False
     """Whether the controls are equal to `lower_bound`."""
 
@@ -50,9 +50,9 @@ class MocoStateBoundConstraint(MocoPathConstraint):
     ] = ()
     """Paths of the states."""
     lower_bound: Optional[Function] = None
-    """Least value over time."""
+    """Smallest value over time."""
     upper_bound: Optional[Function] = None
-    """Greatest value over time."""
+    """Largest value over time."""
     equality_with_lower: Flag = False
     """Whether the states are equal to `lower_bound`."""
 
@@ -63,17 +63,17 @@ class MocoOutputBoundConstraint(MocoPathConstraint):
     output_path: OutputPath = ""
     """The output, as `path|output`."""
     second_output_path: SecondOutputPath = ""
-    """Another output, which `operation` joins to the first."""
+    """Second output, which `operation` combines with the first."""
     operation: Operation = ""
     """Operation that combines the two outputs."""
     exponent: Integer = 1
-    """The power that the result is raised to."""
+    """Power to which the result is raised."""
     output_index: Integer = -1
     """Index of the component of an output of several numbers; -1 for its length."""
     lower_bound: Optional[Function] = None
-    """Least value over time."""
+    """Smallest value over time."""
     upper_bound: Optional[Function] = None
-    """Greatest value over time."""
+    """Largest value over time."""
     equality_with_lower: Flag = False
     """Whether the output is equal to `lower_bound`."""
 

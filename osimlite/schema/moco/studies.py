@@ -44,12 +44,12 @@ from osimlite.schema.tools.processors import ModelProcessor, TableProcessor
 
 
 class MocoPhase(Object):
-    """A stretch of time in which one model moves under one set of goals."""
+    """Period in which one model moves under one set of goals."""
 
     model: Single[ModelProcessor] = make_default(
         ModelProcessor, name="model", model=lambda: Model.build({"name": "model"}, set())
     )
-    """The model."""
+    """Model that moves."""
     time_initial_bounds: Single[MocoInitialBounds] = make_default(
         MocoInitialBounds, name="time_initial_bounds"
     )
@@ -61,7 +61,7 @@ class MocoPhase(Object):
     default_speed_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="default_speed_bounds", bounds=(-50.0, 50.0)
     )
-    """Bounds of speeds that have none of their own."""
+    """Bounds of speeds without bounds of their own."""
     bound_activation_from_excitation: Flag = True
     """Whether activations without bounds have those of their excitations."""
     state_infos: Annotated[Many[MocoVariableInfo], OfStates] = make_empty_list()
@@ -77,7 +77,7 @@ class MocoPhase(Object):
     input_control_infos_pattern: Many[MocoVariableInfo] = make_empty_list()
     """Bounds of inputs of controllers by patterns of paths."""
     parameters: Many[MocoParameter] = make_empty_list()
-    """Properties of the model that are looked for."""
+    """Properties of the model that are optimized."""
     goals: Many[MocoGoal] = make_empty_list()
     """Costs and constraints at the ends."""
     path_constraints: Many[MocoPathConstraint] = make_empty_list()
@@ -96,7 +96,7 @@ class MocoProblem(Object):
     """An optimal control problem."""
 
     phases: Single[MocoPhase] = make_default(MocoPhase, name="phases")
-    """Its phases; there is one so far."""
+    """Phases of the problem; one is supported so far."""
 
 
 class MocoSolver(Object, abstract=True):
@@ -104,7 +104,7 @@ class MocoSolver(Object, abstract=True):
 
 
 class MocoDirectCollocationSolver(MocoSolver, abstract=True):
-    """Makes a problem of many variables of a motion, by values at the nodes of a mesh."""
+    """Transcribes the problem into a nonlinear program of the values at the points of a mesh."""
 
     facts = Facts(
         refused="num_mesh_intervals optim_max_iterations optim_convergence_tolerance optim_constraint_tolerance"
@@ -145,7 +145,7 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     optim_ipopt_print_level: Integer = -1
     """Amount of output of Ipopt, from 0 to 12; -1 for its own default."""
     guess_file: InputTable = ""
-    """A motion to start from."""
+    """File of the initial guess."""
     velocity_correction_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="velocity_correction_bounds", bounds=(-0.1, 0.1)
     )
@@ -172,7 +172,7 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     scale_variables_using_bounds: Flag = False
     """Whether variables are scaled by their bounds."""
     parameters_require_initsystem: Flag = True
-    """Whether the model is made anew for each value of the parameters."""
+    """Whether the model is initialized anew for each value of the parameters."""
     optim_sparsity_detection: Annotated[str, word("none", "random", "initial-guess")] = "none"
     """Method for detecting derivatives that are always zero."""
     optim_write_sparsity: Annotated[str, Value("string")] = ""
@@ -182,9 +182,9 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     )
     """Scheme of finite differences for derivatives."""
     parallel: Annotated[int | None, Value("int", "optional")] = None
-    """Number of threads: 0 for one, 1 for as many as there are processors."""
+    """Number of threads: 0 for one, 1 for the number of processors."""
     output_interval: Integer = 0
-    """Every how many iterations the motion is written; 0 for never."""
+    """Number of iterations between two written motions; 0 for none."""
     minimize_implicit_multibody_accelerations: Flag = False
     """Whether accelerations that are variables are a cost."""
     implicit_multibody_accelerations_weight: Number = 1.0
@@ -196,13 +196,13 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     enforce_path_constraint_mesh_interior_points: Flag = False
     """Whether path constraints are met within intervals too."""
     minimize_state_projection_distance: Flag = True
-    """Whether the way that states are moved onto the constraints is a cost."""
+    """Whether the distance by which states are projected onto the constraints is a cost."""
     state_projection_distance_weight: Number = 1e-6
     """Weight of that cost."""
     projection_slack_variable_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="projection_slack_variable_bounds", bounds=(-0.001, 0.001)
     )
-    """Bounds of the variables that move states onto the constraints."""
+    """Bounds of the variables that project states onto the constraints."""
 
 
 class MocoStudy(Object):
@@ -219,7 +219,7 @@ class MocoStudy(Object):
 
 
 class MocoTool(Object, abstract=True):
-    """Makes a study for a usual task."""
+    """Base class of tools that make a study for a common task."""
 
     initial_time: Annotated[float | None, maybe("s")] = None
     """Initial time of the motion; left out, that of the data."""
@@ -228,18 +228,18 @@ class MocoTool(Object, abstract=True):
     mesh_interval: Annotated[float, real("s", "> 0")] = 0.02
     """Length of an interval of the mesh."""
     clip_time_range: Flag = False
-    """Whether the times are moved a little into the data."""
+    """Whether the times are moved slightly into the data."""
     model: Single[ModelProcessor] = make_default(ModelProcessor, name="model")
-    """The model."""
+    """Model with its operators."""
 
 
 class MocoInverse(MocoTool):
-    """Finds controls of muscles for a motion that is given exactly."""
+    """Finds controls of muscles for a prescribed motion."""
 
     kinematics: Annotated[Single[TableProcessor], OfStates] = make_default(
         TableProcessor, name="kinematics"
     )
-    """The motion."""
+    """Prescribed motion."""
     kinematics_allow_extra_columns: Flag = False
     """Whether the table may have columns that are no states."""
     minimize_sum_squared_activations: Flag = False
@@ -287,11 +287,11 @@ class MocoTrack(MocoTool):
     markers_weight_set: MarkerWeights = make_default(MocoWeightSet, name="markers_weight_set")
     """Weights by names of markers."""
     allow_unused_references: Flag = False
-    """Whether tables may have columns that the model has not."""
+    """Whether tables may have columns that the model lacks."""
     guess_file: InputTable = ""
-    """A motion to start from."""
+    """File of the initial guess."""
     apply_tracked_states_to_guess: Flag = False
-    """Whether the measured states are part of what is started from."""
+    """Whether the measured states are part of the initial guess."""
     minimize_control_effort: Flag = True
     """Whether squares of controls are a cost."""
     control_effort_weight: Number = 0.001

@@ -51,7 +51,7 @@ class MocoStateTrackingGoal(MocoGoal):
     state_weights: StateWeights = make_default(MocoWeightSet, name="state_weights")
     """Weights by paths of states."""
     pattern: StatePattern = None
-    """A regular expression; only states whose paths match it count."""
+    """Regular expression for the paths of the states that are included."""
     allow_unused_references: Flag = False
     """Whether the table may have columns that are no states."""
     scale_weights_with_range: Flag = False
@@ -94,18 +94,18 @@ class MocoMarkerTrackingGoal(MocoGoal):
     )
     """The measured markers and their weights."""
     allow_unused_references: Flag = False
-    """Whether there may be measured markers that the model has not."""
+    """Whether there may be measured markers that the model lacks."""
 
 
 class MocoTranslationTrackingGoal(MocoGoal):
-    """Origins of frames follow given places."""
+    """Origins of frames follow reference positions."""
 
     states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
     )
-    """A motion of the model, from which the places are computed."""
+    """Motion of the model from which the positions are computed."""
     translation_reference_file: InputTable = ""
-    """The places themselves, a column of vectors for each frame by its path."""
+    """File of the positions, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
     translation_weights: FrameWeights = make_default(MocoWeightSet, name="translation_weights")
@@ -113,7 +113,7 @@ class MocoTranslationTrackingGoal(MocoGoal):
 
 
 class MocoOrientationTrackingGoal(MocoGoal):
-    """Frames follow given orientations."""
+    """Frames follow reference orientations."""
 
     states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
@@ -128,7 +128,7 @@ class MocoOrientationTrackingGoal(MocoGoal):
 
 
 class MocoAngularVelocityTrackingGoal(MocoGoal):
-    """Frames follow given angular velocities."""
+    """Frames follow reference angular velocities."""
 
     states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
@@ -145,7 +145,7 @@ class MocoAngularVelocityTrackingGoal(MocoGoal):
 
 
 class MocoAccelerationTrackingGoal(MocoGoal):
-    """Origins of frames follow given accelerations."""
+    """Origins of frames follow reference accelerations."""
 
     acceleration_reference_file: InputTable = ""
     """The accelerations, a column of vectors for each frame by its path."""
@@ -154,7 +154,7 @@ class MocoAccelerationTrackingGoal(MocoGoal):
     acceleration_weights: FrameWeights = make_default(MocoWeightSet, name="acceleration_weights")
     """Weights by paths of frames."""
     gravity_offset: Flag = False
-    """Whether gravity is taken from the accelerations of the model, as accelerometers measure."""
+    """Whether gravity is subtracted from the accelerations of the model, as in accelerometers."""
     express_accelerations_in_tracking_frames: Flag = False
     """Whether accelerations are along the axes of the frames; otherwise of ground."""
 
@@ -207,7 +207,7 @@ class MocoContactTrackingGoal(MocoGoal):
     external_loads: Optional[ExternalLoads] = None
     """The measured forces."""
     external_loads_file: LoadsFile = ""
-    """The measured forces in a document of their own."""
+    """Measured forces in a separate document."""
     projection: Projection = "none"
     """Whether only the part along a vector counts, or in the plane across it."""
     projection_vector: Annotated[Vec3 | None, Value("double", "Vec3", optional=True)] = None
@@ -235,6 +235,6 @@ class MocoContactImpulseTrackingGoal(MocoGoal):
     external_loads: Optional[ExternalLoads] = None
     """The measured forces."""
     external_loads_file: LoadsFile = ""
-    """The measured forces in a document of their own."""
+    """Measured forces in a separate document."""
     impulse_axis: Integer = -1
-    """The axis of ground along which the impulse counts: 0, 1 or 2."""
+    """Axis of ground along which the impulse is computed: 0, 1 or 2."""

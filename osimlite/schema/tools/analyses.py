@@ -33,7 +33,7 @@ class Actuation(Analysis):
 
 
 class BodyKinematics(Analysis):
-    """Places, velocities and accelerations of bodies."""
+    """Positions, velocities and accelerations of bodies."""
 
     # OpenSim compares with `all` in lower case here; `ALL` is an error.
     bodies: Annotated[
@@ -48,7 +48,7 @@ class ForceReporter(Analysis):
     """Table of the records of all forces."""
 
     include_constraint_forces: LegacyFlag = False
-    """Whether the forces of constraints are written too."""
+    """Whether the forces of constraints are written, too."""
 
 
 class IMUDataReporter(Analysis):
@@ -61,7 +61,7 @@ class IMUDataReporter(Analysis):
     report_accelerometer_signals: Flag = True
     """Whether accelerations, gravity included, are written."""
     compute_accelerations_without_forces: Flag = False
-    """Whether accelerations are from the motion alone; otherwise from the forces of the model."""
+    """Whether accelerations follow from the motion alone, and not from the model's forces."""
     frame_paths: Annotated[
         Names, Reference("model-path", "PhysicalFrame", "list", required=False)
     ] = ()
@@ -74,27 +74,27 @@ class InducedAccelerations(Analysis):
     coordinate_names: Annotated[
         Names, make_name_list("coordinate-name", "Coordinate", "all", any_case=True)
     ] = ()
-    """Coordinates whose accelerations are divided up, or `all`."""
+    """Coordinates whose accelerations are decomposed, or `all`."""
     body_names: Annotated[
         Names, make_name_list("body-name-or-com", "Body", "all", "center_of_mass", any_case=True)
     ] = ("center_of_mass",)
-    """Bodies whose accelerations are divided up, `all`, or center_of_mass."""
+    """Bodies whose accelerations are decomposed, `all`, or center_of_mass."""
     constraint_set: LegacyUnnamed[ConstraintSet] = make_default(ConstraintSet)
-    """Constraints that stand for the contact with the ground."""
+    """Constraints that represent the contact with the ground."""
     force_threshold: Annotated[float, real("N", legacy=True)] = 6.0
     """Measured force above which the constraints are active."""
     compute_potentials_only: LegacyFlag = False
     """Whether each force is taken as one newton."""
     report_constraint_reactions: LegacyFlag = False
-    """Whether what each force contributes to the forces of the constraints is written."""
+    """Whether contributions of each force to the forces of constraints are written."""
 
 
 class JointReaction(Analysis):
-    """Forces and torques that joints carry."""
+    """Forces and moments in joints."""
 
     # OpenSim reads as many columns as the model has actuators, and ignores those after them.
     forces_file: LegacyInputTable = ""
-    """Forces of the actuators; without it they follow from the states."""
+    """File of the actuator forces; without it they follow from the states."""
     joint_names: LegacyJointNames = ("ALL",)
     """Joints that are written, or ALL."""
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
@@ -133,7 +133,7 @@ class MuscleAnalysis(Analysis):
     ] = ("all",)
     """Coordinates about which moment arms are computed, or `all`."""
     compute_moments: LegacyFlag = True
-    """Whether moments are computed besides moment arms."""
+    """Whether moments are computed in addition to moment arms."""
 
 
 class OutputReporter(Analysis):
@@ -149,14 +149,14 @@ class OutputReporter(Analysis):
 
 # OpenSim labels the columns state_0 to state_2, whatever the name of the point.
 class PointKinematics(Analysis):
-    """Place, velocity and acceleration of a point."""
+    """Position, velocity and acceleration of a point."""
 
     # An unknown body makes OpenSim crash, while an unknown `relative_to_body_name` silently means
     # ground.
     body_name: Annotated[
         Named, Reference("frame-path-or-body-name", "PhysicalFrame", legacy=True)
     ] = "ground"
-    """The body that the point is fixed in."""
+    """Name of the body in which the point is fixed."""
     relative_to_body_name: Annotated[
         Named,
         Reference(
@@ -168,9 +168,9 @@ class PointKinematics(Analysis):
             consequence="left out",
         ),
     ] = "none"
-    """The body along whose axes the results are given; none for ground."""
+    """Name of the body along whose axes the results are given; none for ground."""
     point_name: LegacyText = "NONAME"
-    """Name of the point, which the results bear."""
+    """Name of the point, for the names of the results."""
     point: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (0.0, 0.0, 0.0)
     """Position of the point in its body."""
 
@@ -180,18 +180,18 @@ class ProbeReporter(Analysis):
 
 
 class StatesReporter(Analysis):
-    """The states."""
+    """Table of the states."""
 
 
 class StaticOptimization(Analysis):
-    """Divides the generalized forces of a motion among the actuators, at every moment for itself."""
+    """Distributes the generalized forces of a motion among the actuators, at each time separately."""
 
     # OpenSim 4.6 crashes if this is false (segmentation fault).
     use_model_force_set: LegacyFlag = True
     """Whether the actuators are those of the model."""
     # With 1 the solution is not unique, and OpenSim's optimizer fails.
     activation_exponent: LegacyNumber = 2.0
-    """Power of the activations whose sum is made as small as possible."""
+    """Power of the activations whose sum is minimized."""
     # Passive forces of fibers are left out in both cases.
     use_muscle_physiology: LegacyFlag = True
     """Whether forces of muscles depend on their lengths and speeds."""

@@ -31,10 +31,10 @@ from osimlite.schema.tools.base import AnalysisSet, Tool
 
 
 class DynamicsTool(Tool, abstract=True):
-    """A tool that works with measured loads."""
+    """Base class of tools that use measured loads."""
 
     model_file: LegacyInputModel = "Unassigned"
-    """The model, found from the folder that OpenSim runs in."""
+    """File of the model, relative to the working folder of OpenSim."""
     time_range: Annotated[Reals, reals("s", least=2, most=2, legacy=True)] = (
         float("-inf"),
         float("inf"),
@@ -60,7 +60,7 @@ class DynamicsTool(Tool, abstract=True):
 
 
 class InverseDynamicsTool(DynamicsTool):
-    """Computes the generalized forces that a measured motion takes."""
+    """Computes the generalized forces of a measured motion."""
 
     # Of the values of `inDegrees` OpenSim understands only yes and y, in lower case. After `true` it
     # takes degrees for radians: moments become enormous, and nothing is reported.
@@ -83,10 +83,10 @@ class InverseDynamicsTool(DynamicsTool):
 
 
 class AbstractTool(Object, abstract=True):
-    """Settings that all tools which simulate a model have in common."""
+    """Base class of tools that simulate a model, with their common settings."""
 
     model_file: LegacyInputModel = ""
-    """The model, found from the folder of the setup file, as are all files."""
+    """File of the model, relative to the folder of the setup file, as are all files."""
     replace_force_set: LegacyFlag = False
     """Whether the forces of `force_set_files` replace those of the model; otherwise they are added."""
     # OpenSim splits the list at blanks and knows no quotes, so that no name can contain a blank.
@@ -126,7 +126,7 @@ class AbstractTool(Object, abstract=True):
 
 
 class AnalyzeTool(AbstractTool):
-    """Runs analyses along a motion that is already known."""
+    """Runs analyses along a given motion."""
 
     states_file: LegacyInputTable = ""
     """The motion, as states."""

@@ -18,7 +18,7 @@ class IKTask(Object, abstract=True):
     """Base class of tasks to which the pose is fitted."""
 
     apply: Flag = True
-    """Whether the task counts."""
+    """Whether the task is active."""
     # OpenSim's default is 0, so that a task without a weight is not tracked, but still counts in
     # the reported error.
     weight: Number = 0.0
@@ -33,7 +33,7 @@ class IKMarkerTask(IKTask):
 
 
 class IKCoordinateTask(IKTask):
-    """A coordinate that is to have a value; the name is that of the coordinate."""
+    """Task to fit the coordinate of the same name to a value."""
 
     # Squares of radians stand beside a mean of squared metres: a weight of 1 outweighs centimetres
     # of marker errors.
@@ -45,7 +45,7 @@ class IKCoordinateTask(IKTask):
     """Source of the value: the model, this task, or the coordinate file of the tool."""
     # OpenSim accepts values in degrees silently: 10 is 10 rad.
     value: LegacyNumber = 0.0
-    """The value if `value_type` is manual_value, in radians or metres."""
+    """Target value if `value_type` is manual_value, in radians or metres."""
 
 
 class IKTaskSet(Set):

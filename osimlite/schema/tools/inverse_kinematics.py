@@ -28,10 +28,10 @@ from osimlite.schema.tools.ik_tasks import IKTaskSet
 
 
 class InverseKinematicsToolBase(Tool, abstract=True):
-    """Settings that both tools for inverse kinematics have in common."""
+    """Base class of both tools for inverse kinematics, with their common settings."""
 
     model_file: InputModel = ""
-    """The model, found from the folder that OpenSim runs in."""
+    """File of the model, relative to the working folder of OpenSim."""
     # OpenSim 4.6 never uses it: a constructor that delegates loses the number, and constraints are
     # always kept exactly (identical results for 0.001, 20 and infinity).
     constraint_weight: Annotated[float, real(domain=">= 0")] = float("inf")
@@ -42,9 +42,9 @@ class InverseKinematicsToolBase(Tool, abstract=True):
     """Accuracy of the best pose."""
     # The end of 2 s is OpenSim's default: without a range, longer trials are cut silently.
     time_range: Annotated[Reals, reals("s", least=2, most=2)] = (float("-inf"), 2.0)
-    """First and last time; outside the data they are cut to the data."""
+    """First and last time; they are limited to the range of the data."""
     output_motion_file: OutputTable = ""
-    """File for the coordinates; `results_directory` does not count for it."""
+    """File for the coordinates; `results_directory` has no effect on it."""
     report_errors: Flag = True
     """Whether deviations are written for every frame."""
 
@@ -53,7 +53,7 @@ class InverseKinematicsTool(InverseKinematicsToolBase):
     """Fits the pose of a model to measured markers and coordinates."""
 
     ik_task_set: Unnamed[IKTaskSet] = make_default(IKTaskSet)
-    """The markers and coordinates with their weights; if none applies, all markers count the same."""
+    """Tasks with weights of markers and coordinates; if none applies, all markers weigh the same."""
     # OpenSim takes 0 0 0 as a measured position, and never returns from a .trc file without rows.
     marker_file: Annotated[str, make_input_file("marker data", required=True)] = ""
     """Measured markers (.trc, .sto)."""
@@ -69,21 +69,21 @@ class OrientationWeight(Object):
     """Weight of the deviation of the sensor with the same name."""
 
     weight: Number = 1.0
-    """Beside those of the others."""
+    """Value of the weight, relative to the others."""
 
 
 class OrientationWeightSet(Set):
     """Weights of orientation sensors."""
 
     objects: LegacyMany[OrientationWeight] = make_empty_list()
-    """The weights; a sensor without one counts one."""
+    """Weights; a sensor without one has weight 1."""
 
 
 class IMUInverseKinematicsTool(InverseKinematicsToolBase):
     """Fits the pose of a model to measured orientations."""
 
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
-    """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
+    """Space-fixed angles about x, y and z from the axes of the data to OpenSim's ground."""
     orientations_file: Annotated[str, make_input_file("table", required=True)] = ""
     """Measured orientations, a column of quaternions for each sensor (.sto)."""
     orientation_weights: Single[OrientationWeightSet] = make_default(
@@ -96,7 +96,7 @@ class MarkerWeight(Object):
     """Weight of the deviation of the marker with the same name."""
 
     weight: Number = 1.0
-    """Beside those of the others."""
+    """Value of the weight, relative to the others."""
 
 
 class MarkerWeightSet(Set, tag="Set_MarkerWeight_"):
@@ -114,4 +114,4 @@ class MarkersReference(Object):
     marker_weights: Single[MarkerWeightSet] = make_default(MarkerWeightSet, name="marker_weights")
     """Weights by names of markers."""
     default_weight: Number = 1.0
-    """Weight of markers that have none."""
+    """Weight of markers without one."""

@@ -31,28 +31,28 @@ class PolynomialPathFitterBounds(Object):
 
 
 class PolynomialPathFitter(Object):
-    """Finds polynomials of the coordinates for lengths and moment arms of paths."""
+    """Fits polynomials of the coordinates to lengths and moment arms of paths."""
 
     model: Single[ModelProcessor] = make_default(ModelProcessor, name="model")
     """The model."""
     coordinate_values: Single[TableProcessor] = make_default(
         TableProcessor, name="coordinate_values"
     )
-    """The motion around which coordinates are varied."""
+    """Motion around which coordinates are varied."""
     output_directory: OutputFolder = ""
-    """Folder for the polynomials and what they were fitted to."""
+    """Folder for the polynomials and the samples."""
     use_stepwise_regression: Flag = False
-    """Whether only terms that improve the fit are taken."""
+    """Whether only terms that improve the fit are included."""
     moment_arm_threshold: Number = 0.001
-    """Moment arm below which a coordinate does not count for a path, in metres."""
+    """Moment arm below which a coordinate is ignored for a path, in metres."""
     moment_arm_tolerance: Annotated[float, real("m")] = 1e-4
     """Tolerance of moment arms."""
     path_length_tolerance: Annotated[float, real("m")] = 1e-4
     """Tolerance of path lengths."""
     minimum_polynomial_order: Integer = 2
-    """Least order that is tried."""
+    """Smallest order that is tried."""
     maximum_polynomial_order: Integer = 6
-    """Greatest order that is tried."""
+    """Largest order that is tried."""
     num_parallel_threads: Integer = 2
     """Number of threads."""
     global_coordinate_sampling_bounds: Annotated[Vec2, Value("double", "Vec2", unit="deg")] = (
@@ -67,6 +67,6 @@ class PolynomialPathFitter(Object):
     latin_hypercube_algorithm: Annotated[str, word("random", "ESEA")] = "random"
     """Algorithm that spreads the variations."""
     include_moment_arm_functions: Flag = False
-    """Whether polynomials of moment arms are written too."""
+    """Whether polynomials of moment arms are written, too."""
     include_lengthening_speed_function: Flag = False
-    """Whether polynomials of lengthening speeds are written too."""
+    """Whether polynomials of lengthening speeds are written, too."""

@@ -21,14 +21,14 @@ from osimlite.schema.sets import Set
 
 
 class ModelOperator(Object, abstract=True):
-    """A change of a model."""
+    """Change of a model."""
 
 
 class ModelProcessor(Object):
-    """A model and what is done to it before it is used."""
+    """Model with operators that change it before use."""
 
     filepath: Annotated[str, make_input_file("Model")] = ""
-    """File of the model, found from the folder that OpenSim runs in."""
+    """File of the model, relative to the working folder of OpenSim."""
     operators: Many[ModelOperator] = make_empty_list()
     """Operators that are applied in this order."""
     model: Optional[Model] = None
@@ -43,16 +43,16 @@ class ModOpAddExternalLoads(ModelOperator):
 
 
 class ModOpAddReserves(ModelOperator):
-    """Adds an actuator for each coordinate."""
+    """Adds a reserve actuator for each coordinate."""
 
     optimal_force: Number = 1.0
-    """Force or torque of each at full control."""
+    """Force or torque of each actuator at a control of 1."""
     bound: Annotated[float | None, maybe()] = None
     """Largest control in both directions; left out, there is none."""
     skip_coordinates_with_actuators: Flag = True
-    """Whether coordinates that have an actuator already get none."""
+    """Whether coordinates that have an actuator get no reserve."""
     skip_residual_coordinates: Flag = False
-    """Whether coordinates of joints to ground get none."""
+    """Whether coordinates of joints to ground get no reserve."""
 
 
 class ModOpIgnoreActivationDynamics(ModelOperator):
@@ -60,76 +60,76 @@ class ModOpIgnoreActivationDynamics(ModelOperator):
 
 
 class ModOpIgnorePassiveFiberForcesDGF(ModelOperator):
-    """Takes passive forces from muscles of DeGroote and Fregly."""
+    """Switches off passive forces of DeGrooteFregly2016Muscles."""
 
 
 class ModOpIgnoreTendonCompliance(ModelOperator):
-    """Makes tendons stiff."""
+    """Makes tendons rigid."""
 
 
 class ModOpRemoveMuscles(ModelOperator):
-    """Takes out all muscles."""
+    """Removes all muscles."""
 
 
 class ModOpReplaceJointsWithWelds(ModelOperator):
-    """Makes joints stiff."""
+    """Replaces joints by weld joints."""
 
     joint_paths: Annotated[Names, Reference("model-path", "Joint", "list", required=False)] = ()
     """Paths of the joints."""
 
 
 class ModOpReplaceMusclesWithDeGrooteFregly2016(ModelOperator):
-    """Puts muscles of DeGroote and Fregly in the places of others."""
+    """Replaces muscles by DeGrooteFregly2016Muscles."""
 
 
 class ModOpReplaceMusclesWithPathActuators(ModelOperator):
-    """Puts actuators along the same paths in the places of muscles."""
+    """Replaces muscles by actuators along the same paths."""
 
 
 class ModOpReplacePathsWithFunctionBasedPaths(ModelOperator):
-    """Puts functions in the places of paths."""
+    """Replaces paths by functions."""
 
     paths_file: Annotated[str, make_input_file("Set_FunctionBasedPath_")] = ""
     """File of the functions, each with the path of the force that it belongs to as its name."""
 
 
 class ModOpScaleActiveFiberForceCurveWidthDGF(ModelOperator):
-    """Widens the active force-length curve of muscles of DeGroote and Fregly."""
+    """Widens the active force-length curve of DeGrooteFregly2016Muscles."""
 
     scale_factor: Number = 1.0
     """Factor of the width."""
 
 
 class ModOpScaleMaxIsometricForce(ModelOperator):
-    """Makes muscles stronger."""
+    """Scales the maximum isometric forces of muscles."""
 
     scale_factor: Number = 1.0
     """Factor of their maximum isometric forces."""
 
 
 class ModOpTendonComplianceDynamicsModeDGF(ModelOperator):
-    """Says how the tendons of muscles of DeGroote and Fregly are computed."""
+    """Sets the form of the tendon dynamics of DeGrooteFregly2016Muscles."""
 
     mode: Annotated[str, word("explicit", "implicit")] = "explicit"
     """Form of the differential equation: explicit or implicit."""
 
 
 class FunctionBasedPathSet(Set, tag="Set_FunctionBasedPath_"):
-    """Paths as functions of coordinates, in a document of their own."""
+    """Paths as functions of coordinates, in a separate document."""
 
     objects: LegacyMany[FunctionBasedPath] = make_empty_list()
     """The paths, each with the path of the force that it belongs to as its name."""
 
 
 class TableOperator(Object, abstract=True):
-    """A change of a table."""
+    """Change of a table."""
 
 
 class TableProcessor(Object):
-    """A table and what is done to it before it is used."""
+    """Table with operators that change it before use."""
 
     filepath: InputTable = ""
-    """File of the table, found from the folder of the document."""
+    """File of the table, relative to the folder of the document."""
     operators: Many[TableOperator] = make_empty_list()
     """Operators that are applied in this order."""
 
@@ -138,7 +138,7 @@ class TabOpAppendCoupledCoordinateValues(TableOperator):
     """Adds columns for coordinates that others determine."""
 
     overwrite_existing_columns: Flag = True
-    """Whether columns that are there already are computed anew."""
+    """Whether existing columns are computed anew."""
 
 
 class TabOpLowPassFilter(TableOperator):
@@ -147,8 +147,8 @@ class TabOpLowPassFilter(TableOperator):
     cutoff_frequency: Annotated[float, real("Hz")] = -1.0
     """Cut-off frequency; negative for no filter."""
     trim_to_original_time_range: Flag = True
-    """Whether rows that the filter adds at both ends are taken away."""
+    """Whether rows that the filter adds at both ends are removed."""
 
 
 class TabOpUseAbsoluteStateNames(TableOperator):
-    """Gives columns of states their paths as labels."""
+    """Labels columns of states with their paths."""

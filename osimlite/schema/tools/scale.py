@@ -35,7 +35,7 @@ class GenericModelMaker(Object):
     """Reads the model that is scaled."""
 
     model_file: LegacyInputModel = "Unassigned"
-    """The model, found from the folder of the setup file."""
+    """File of the model, relative to the folder of the setup file."""
     marker_set_file: Annotated[str, make_input_file("MarkerSet", legacy=True)] = "Unassigned"
     """Markers that are added to those of the model, or replace those of the same name."""
 
@@ -59,14 +59,14 @@ class MarkerPairSet(Set):
 
 
 class BodyScale(Object):
-    """A body that a measurement scales; the name is that of the body."""
+    """Axes of the body with the same name that a measurement scales."""
 
     # OpenSim ignores the entry of an unknown body silently.
     name_reference = Reference("body-name", "Body", consequence="left out")
 
     # XY without a blank is one unknown word, and the body keeps its size.
     axes: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
-    """Axes of the body along which it is scaled: X, Y, Z; other words do nothing."""
+    """Axes of the body along which it is scaled: X, Y, Z; other words have no effect."""
 
 
 class BodyScaleSet(Set):
@@ -77,10 +77,10 @@ class BodyScaleSet(Set):
 
 
 class Measurement(Object):
-    """A length of the subject, by which bodies are scaled."""
+    """Length of the subject by which bodies are scaled."""
 
     apply: LegacyFlag = True
-    """Whether the measurement counts."""
+    """Whether the measurement is used."""
     marker_pair_set: LegacyUnnamed[MarkerPairSet] = make_default(MarkerPairSet)
     """Pairs of markers whose distances are compared, measured to model."""
     body_scale_set: LegacyUnnamed[BodyScaleSet] = make_default(BodyScaleSet)
@@ -91,7 +91,7 @@ class MeasurementSet(Set):
     """The measurements of a subject."""
 
     objects: LegacyMany[Measurement] = make_empty_list()
-    """The measurements; where two scale the same axis, the last counts."""
+    """Measurements; of two that scale the same axis, the last one wins."""
 
 
 class Scale(Object):
@@ -104,7 +104,7 @@ class Scale(Object):
     ] = "unnamed_segment"
     """Name of the body."""
     apply: LegacyFlag = True
-    """Whether the factors count."""
+    """Whether the factors are used."""
 
 
 class ScaleSet(Set):
@@ -145,7 +145,7 @@ class ModelScaler(Object):
 # OpenSim poses the model with a fixed accuracy of 1e-4. In OpenSim's own example it places markers
 # up to 9.5 mm from where the best pose puts them.
 class MarkerPlacer(Object):
-    """Poses the scaled model as the subject stood and moves its markers to where they were measured."""
+    """Poses the scaled model like the subject, and moves markers to their measured positions."""
 
     # If this is false, OpenSim reports that the tool failed, after it has written the scaled model.
     apply: LegacyFlag = True
@@ -174,7 +174,7 @@ class ScaleTool(Object):
 
     # OpenSim does not mention that it leaves the masses alone where this is not positive or NaN.
     mass: Annotated[float, real("kg", legacy=True)] = -1.0
-    """Mass of the subject; not positive, the masses are those of the scaled bodies."""
+    """Mass of the subject; if not positive, the masses are those of the scaled bodies."""
     height: Annotated[float, real("mm", legacy=True)] = -1.0
     """Height of the subject, for readers only."""
     age: Annotated[float, real("years", legacy=True)] = -1.0
@@ -182,8 +182,8 @@ class ScaleTool(Object):
     notes: LegacyText = "Unassigned"
     """Notes on the subject, for readers only."""
     generic_model_maker: LegacyUnnamed[GenericModelMaker] = make_default(GenericModelMaker)
-    """First step: the model is read."""
+    """First step, which reads the model."""
     model_scaler: LegacyUnnamed[ModelScaler] = make_default(ModelScaler)
-    """Second step: the bodies are scaled."""
+    """Second step, which scales the bodies."""
     marker_placer: LegacyUnnamed[MarkerPlacer] = make_default(MarkerPlacer)
-    """Third step: the markers are placed."""
+    """Third step, which places the markers."""

@@ -8,7 +8,7 @@ from osimlite.schema.references import InputModel, make_input_file, make_output_
 
 
 class IMUPlacer(Object):
-    """Turns the sensors of a model as they were worn, from one moment in a known pose."""
+    """Rotates the sensors of a model as they were worn, from data in a known pose."""
 
     model_file: InputModel = ""
     """The model, in the pose in which the subject stood."""
@@ -17,18 +17,18 @@ class IMUPlacer(Object):
     base_heading_axis: Annotated[str, word("", "x", "y", "z", "-x", "-y", "-z")] = ""
     """Axis of that sensor that points forwards."""
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
-    """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
+    """Space-fixed angles about x, y and z from the axes of the data to OpenSim's ground."""
     orientation_file_for_calibration: Annotated[str, make_input_file("table", required=True)] = ""
-    """Measured orientations, of which the first row counts (.sto)."""
+    """File of measured orientations, of which the first row is used (.sto)."""
     output_model_file: Annotated[str, make_output_file("Model")] = ""
     """File for the model with its sensors."""
 
 
 class ExperimentalSensor(Object):
-    """A sensor of the data; the name is its name there."""
+    """Sensor of the data with the same name."""
 
     name_in_model: Annotated[str, Reference("column", "column")] = ""
-    """Label of its column, which is the name of a frame of the model with the ending _imu."""
+    """Label of its column, which is the name of a frame of the model with the suffix _imu."""
 
 
 class APDMDataReaderSettings(Object):

@@ -57,7 +57,7 @@ class TrackingTask(Object, abstract=True):
     """Base class of quantities that a controller follows."""
 
     on: LegacyFlag = True
-    """Whether the task counts."""
+    """Whether the task is active."""
     weight: LegacyReals = (1.0, 1.0, 1.0)
     """Weights of its accelerations relative to other tasks, one number for each component."""
 
@@ -142,13 +142,13 @@ class CMCTool(AbstractTool):
     constraints_file: _ControlSetFile = ""
     """Bounds of the controls over time."""
     rra_controls_file: _ControlSetFile = ""
-    """Controls that RRA computed, around which those of the residuals are kept."""
+    """Controls that RRA computed; controls of residuals stay near them."""
     lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the motion; negative for no filter."""
     cmc_time_window: Annotated[float, real("s", "> 0", legacy=True)] = 0.01
     """Time in which muscles reach the requested force."""
     use_fast_optimization_target: LegacyFlag = True
-    """Whether accelerations must be met exactly; it is faster, and fails where they cannot be."""
+    """Whether accelerations must be met exactly, which is faster and can fail."""
     optimizer_algorithm: _Optimizer = "ipopt"
     """The optimizer."""
     numerical_derivative_step_size: LegacyNumber = 1e-4
@@ -160,11 +160,11 @@ class CMCTool(AbstractTool):
     optimizer_print_level: LegacyInteger = 0
     """Amount of output of the optimizer, from 0 to 3."""
     use_verbose_printing: LegacyFlag = False
-    """Whether the tool prints what it does."""
+    """Whether the tool prints its progress."""
 
 
 class RRATool(AbstractTool):
-    """Changes a motion and the mass distribution of a model until hardly any residual forces are left."""
+    """Changes a motion and the mass distribution of a model to reduce residual forces."""
 
     desired_points_file: LegacyInputTable = ""
     """Measured points that tasks follow."""
@@ -189,8 +189,8 @@ class RRATool(AbstractTool):
     final_time_for_com_adjustment: LegacyNumber = -1.0
     """End of the time over which residuals are averaged; -1 for the end of the run."""
     adjusted_com_body: BodyName = ""
-    """The body whose center of mass is moved, usually the heaviest."""
+    """Body whose center of mass is moved, usually the heaviest."""
     output_model_file: LegacyOutputModel = ""
     """File for the changed model; adjusted_model.osim if there is no name."""
     use_verbose_printing: LegacyFlag = False
-    """Whether the tool prints what it does."""
+    """Whether the tool prints its progress."""
