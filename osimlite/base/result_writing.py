@@ -152,7 +152,8 @@ class ResultWriter:
         real_path = self.resolve(path)
         chunks = iter(lines)
         beginning = b""
-        # The chunks of a table may be single lines, and its header says what it is.
+        # Chunks may be single lines of a table; the type of the file shows only in the whole
+        # header.
         for chunk in chunks:
             beginning += encode_text(chunk, real_path)
             if len(beginning) >= BEGINNING_BYTES:

@@ -63,7 +63,7 @@ def rule(
 
 
 def _wrap_page(page: str, columns: int) -> str:
-    """The page with its prose in lines that fit; examples stay as they are."""
+    """Return a page with its prose wrapped to `columns`; examples stay unchanged."""
     rows: list[str] = []
     prose: list[str] = []
     code = False

@@ -88,7 +88,7 @@ def translate(
         from osimlite.base.require import require
 
         require("mujoco", extra="mujoco", purpose="--check")
-        # A check needs a translation to MJCF, whatever `--to` says.
+        # A check needs a translation to MJCF, also with another value of `--to`.
         to = "mjcf"
     formats = list_exporters("translate")
     if to not in (*formats, OSIM):

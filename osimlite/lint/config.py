@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Which rules run, their severities, and their thresholds.
+    """Selection of rules, their severities, and their thresholds.
 
     `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of
     rules (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a

@@ -233,7 +233,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
         elif (
             joint.moves is not None
             and len(words := joint.moves.split()) == len(names)
-            # "r" stands for a free rotation (ball joint), which has no single axis.
+            # "r" is a rotation whose axis depends on the properties of the joint.
             and "r" not in words
         ):
             result[id(joint)] = [

@@ -260,7 +260,7 @@ LEGACY: Final = Legacy()
 
 @dataclass(frozen=True, slots=True)
 class NamesOf:
-    """What the words of a property, the names of its objects, or the labels of its table refer to.
+    """Mark of a property whose words, names of objects, or labels of a table refer to something.
 
     Classes such as sets of weights have many uses; only the property that holds them declares what
     they name.

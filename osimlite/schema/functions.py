@@ -1,4 +1,4 @@
-"""Functions of time, of coordinates, or of whatever their owner says."""
+"""Functions of time, coordinates or other variables, which the object with the function chooses."""
 
 from typing import Annotated
 

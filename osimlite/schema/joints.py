@@ -28,14 +28,16 @@ class Joint(ModelComponent, abstract=True):
     facts = Facts(outputs="power reaction_on_child:SpatialVec reaction_on_parent:SpatialVec")
 
     moves: ClassVar[str | None] = None
-    """What each coordinate in order does: r turns and t shifts, about or along an axis of the
-    parent frame, about one that is turned by those before it; a letter alone by a rule of the
-    class; None if the joint's own properties decide. The shifts come first.
+    """Motion of each coordinate in order: r for a rotation, t for a translation, and its axis.
+
+    Translations are along axes of the parent frame and applied first. Rotations are body-fixed: each
+    is about an axis of the frame that the earlier ones have turned. Without a letter for the axis the
+    class itself computes the motion. None if it depends on the properties of the joint.
     """
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
     """Motion type of each coordinate, from `moves`."""
     speeds_are_rates: ClassVar[bool] = True
-    """Whether its speeds are the rates of its coordinates; otherwise those of its rotations are an angular velocity."""
+    """Whether the speeds are the rates of the coordinates; if not, those of rotations are an angular velocity."""
 
     # OpenSim looks for a bare name among the children of the joint only; a body needs its path.
     socket_parent_frame: PhysicalFrameSocket = ""

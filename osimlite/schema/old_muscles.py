@@ -24,7 +24,7 @@ class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
     facts = Facts(states="activation fiber_length")
 
     def find_contradictions(self) -> Iterator[Contradiction]:
-        """Nothing of its dynamics can be left out.
+        """Find missing properties of the muscle's dynamics, all of which OpenSim requires.
 
         Returns:
             A contradiction for each property of the dynamics that is missing.

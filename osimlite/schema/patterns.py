@@ -73,7 +73,8 @@ class Pattern:
         """
         compiler = _Compiler(text)
         self._states, self._first, self._final = compiler.states, compiler.first, compiler.final
-        # What each character leads to from sets of states: the names of a model begin alike.
+        # Cache of the transitions between sets of states, useful as many names of a model begin
+        # alike.
         self._steps: dict[tuple[frozenset[int], str, bool], frozenset[int]] = {}
         self._looks_around = any(state.anchor not in ("", "^", "$") for state in self._states)
         self._sources: list[list[int]] = [[] for _ in self._states]

@@ -448,7 +448,7 @@ class Tree:
         return Resolution(component)
 
     def walk(self, text: str, base: str, target: str) -> Resolution:
-        """Return what is at a path.
+        """Return the component at a path, or the reason why the path does not lead to one.
 
         Args:
             text: absolute path, or path relative to `base`.

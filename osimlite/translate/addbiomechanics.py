@@ -139,7 +139,7 @@ class SubjectFolder:
         return written
 
     def _write_models(self, base: Path) -> list[Path]:
-        """Write the model of each pass as it is, and a version for OpenSim where Nimble reads it otherwise."""
+        """Write the models of the passes; also a version for OpenSim if Nimble reads one otherwise."""
         files = []
         names = UniqueNames()
         make_folder(base / "models")

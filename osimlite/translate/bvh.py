@@ -21,7 +21,7 @@ from osimlite.simulation.robot.names import UniqueNames
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
 CONTENTS = ("muscles, forces and shapes", LEFT_OUT)
-"""What a skeleton cannot say, and what is done about it."""
+"""Components that a BVH skeleton cannot hold, and their treatment."""
 
 
 @dataclass(frozen=True)

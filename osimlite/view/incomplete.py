@@ -74,7 +74,7 @@ def _take_out(model: Model, message: str) -> str | None:
 
 
 def _remove_component(model: Model, component: Component) -> bool:
-    """Remove a component from the list that holds it, whatever else names it; return whether there is such a list."""
+    """Remove a component from the list that holds it; return False if no list does."""
     for owner in model.walk():
         for spec, member in owner.list_owned_objects():
             siblings = getattr(owner, spec.name)

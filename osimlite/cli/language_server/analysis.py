@@ -96,7 +96,7 @@ class DocumentAnalysis:
         return load_settings(Path(self.file).resolve().parent).config_for(self.file, Config())
 
     def cursor(self, offset: int) -> Cursor:
-        """Return what is at an offset: a tag, an attribute or text, with the elements around it."""
+        """Return the tag, attribute or text at an offset, with the elements around it."""
         # Registered classes are global, and the file analysed before may belong to a project with
         # other plug-ins.
         activate_plugin_classes(self.config)

@@ -80,7 +80,7 @@ def get_reading_plan(cls: type[Object]) -> ReadingPlan:
             steps[tag] = ReadingStep(
                 _LIST if spec.kind.form == "list" else _WRAPPED, spec.name, str, spec
             )
-            # Only single objects are found by name; members of a list have names of their own.
+            # Only single objects are found by name; names of members of a list are free.
             if spec.kind.form == "single":
                 named[spec.tag] = spec
     return ReadingPlan(steps, named)

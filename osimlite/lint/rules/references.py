@@ -324,7 +324,7 @@ def _explain_reference(
     if lowered:
         return BrokenReference(use, text, "case", None, lowered[0])
     hint = "illegal" if resolution.failure == "illegal" else ""
-    # Nothing is meant twice in one list.
+    # A name that is already in the list is not suggested.
     current_values = getattr(use.holder, use.spec.name)
     unused_texts = (
         valid_texts
@@ -479,7 +479,7 @@ def _report_broken(
         note.owner is use.owner and note.kind in ("unknown-tag", "unknown-class")
         for note in subject.notes
     ):
-        # What OpenSim ignores here may hold what is meant.
+        # The intended object may be in an element that OpenSim ignores.
         position = None
     report(
         message,

@@ -119,7 +119,7 @@ def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
         table = setup.read_table(user.coordinate_file)
         values_by_column: dict[str, list[float]] = {}
         for index, column in enumerate(table.columns if table is not None else (), 1):
-            # Whatever the header says, this file is taken to be in degrees.
+            # OpenSim takes this file to be in degrees, even if its header says radians.
             radians_per_unit = math.pi / 180.0 if column in angles else 1.0
             rows = table.rows.samples if table is not None else []
             values_by_column[column] = [

@@ -391,7 +391,7 @@ def _is_on_body(subject: Subject, item: Object) -> bool:
     # No muscle, ligament or spring along a path is as long either.
     if owner is not None and any(is_a(owner, cls) for cls in ("Muscle", "Ligament", "PathSpring")):
         return True
-    # What is wrapped around a body stands in a set of its own in it.
+    # Wrap objects of a body are in the WrapObjectSet of the body.
     above = owner
     while above is not None and not isinstance(above, Body):
         above = subject.tree.parent_of(above)

@@ -95,7 +95,7 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
                     at=position,
                     suggestion=similar_key and key,
                     fix=fix,
-                    # What is written for the newer reader is taken by it without a version too.
+                    # A file with DataType is for the newer reader, which does not require this key.
                     severity=WARNING if "DataType" in table.entries else None,
                 )
 

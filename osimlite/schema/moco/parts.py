@@ -1,4 +1,4 @@
-"""What goals, constraints and problems of Moco are made of: bounds, weights, parameters."""
+"""Parts of the goals, constraints and problems of Moco: bounds, weights, parameters."""
 
 from typing import Annotated
 

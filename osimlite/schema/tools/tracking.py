@@ -38,7 +38,7 @@ _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
 
 
 def _make_body_reference(*words: str, consequence: Consequence = "refused") -> Reference:
-    """Marker of the name of a body, or of a word for something else.
+    """Return the mark of a property that holds the name of a body or one of some special words.
 
     Returns:
         A reference that may be absent.

@@ -150,7 +150,7 @@ def _add_argument_joint(draft: MjcfDraft, coordinate_index: int) -> Lead:
     """
     coordinate = draft.mechanism.coordinates[coordinate_index]
     name = joint_names(draft.mechanism)[coordinate_index]
-    # The driver moves joints exactly, whatever equalities make of them.
+    # The driver sets the positions of joints exactly, so that equalities do not matter.
     inertia = (
         SPECK_MASS_KG * SPECK_MASS_KG
         if draft.options.driver

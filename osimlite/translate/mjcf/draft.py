@@ -37,7 +37,7 @@ Version = Literal[3, 4]
 Contact = Literal["native", "none"]
 """Treatment of contact: MuJoCo's own law, or no contact."""
 Fit = Literal["none", "wraps", "force"]
-"""What is fitted to the model: nothing, wrap geoms of tendons, or also the forces of muscles."""
+"""Fitted parts of the model: none, wrap geoms of tendons, or also the forces of muscles."""
 Spline = Literal["quartic", "series"]
 """Form of fitted functions: a quartic, or two in series (one applied to the result of the other)."""
 Value = str | bool | int | float | Sequence[float] | Array | None

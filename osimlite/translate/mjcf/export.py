@@ -205,7 +205,7 @@ def to_mjcf(
         *SCENERY_PASSES,
     ):
         run_pass(draft)
-    # What no pass has accounted for is lost.
+    # Components that no pass has accounted for are lost.
     account_for_rest(draft.tree, fidelity)
     for section in list(draft.root):
         # Empty sections would only clutter the file.

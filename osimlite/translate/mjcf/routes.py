@@ -232,7 +232,7 @@ class Router:
             (result,) = choose(options)
             assert isinstance(result, WrapGeom)
             best[number] = result
-        # Nothing is an option too: the surface may hardly be touched.
+        # No wrap geom at all is an option too: the path may hardly touch the surface.
         options = [(), *((wrap_geom,) for wrap_geom in best.values())]
         for (first_number, first_geom), (second_number, second_geom) in combinations(
             best.items(), 2
