@@ -1,4 +1,4 @@
-"""``osimlite check-trial``: is a finished trial good enough?"""
+"""``osimlite check-trial``: compare a finished trial with published limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``osimlite convert``: files of one program as files of another, with a record of what is lost."""
+"""``osimlite convert``: convert files between programs, with a record of what is lost."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ _processes: set[subprocess.Popen[bytes]] = set()
 _stopped = Event()
 """Set after Ctrl-C: no further process is started."""
 _process_lock = Lock()
-"""Lock of both: a process is started and entered, or not started."""
+"""Lock of `_processes` and `_stopped`, so that no process is started unrecorded or after Ctrl-C."""
 
 
 class Package(NamedTuple):

@@ -1,4 +1,4 @@
-"""``osimlite inverse-dynamics``: the generalized forces that a recorded motion takes."""
+"""``osimlite inverse-dynamics``: compute the generalized forces of a recorded motion."""
 
 from __future__ import annotations
 

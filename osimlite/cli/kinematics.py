@@ -1,4 +1,4 @@
-"""``osimlite kinematics``: where bodies and markers are during a recorded motion."""
+"""``osimlite kinematics``: compute positions of bodies and markers during a recorded motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``osimlite modify``: parts of a model replaced by smoother, stiffer or simpler ones."""
+"""``osimlite modify``: replace parts of a model by smoother, stiffer or simpler ones."""
 
 from __future__ import annotations
 

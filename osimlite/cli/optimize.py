@@ -1,4 +1,4 @@
-"""``osimlite optimize``: the start, or the numbers, that serve a model best."""
+"""``osimlite optimize``: search for the initial state, controls or parameters of an optimum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``osimlite run``: what OpenSim's tools do, by their own setup files."""
+"""``osimlite run``: run OpenSim's tools by their own setup files."""
 
 from __future__ import annotations
 
@@ -207,7 +207,7 @@ def _run_alone(
     overwrite: bool,
     write_outside: bool,
 ) -> Outcome:
-    """Run a setup, and say what came out."""
+    """Run a setup, print its messages, and return its outcome."""
     import sys
 
     from osimlite.cli._console import complain, say

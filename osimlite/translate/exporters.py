@@ -1,8 +1,8 @@
 """Formats that a model can be written in, for other programs and for people.
 
 An exporter is one entry of `EXPORTERS`: the options of ``osimlite translate`` and ``osimlite view``,
-their help and their messages follow from it. What an exporter works with is imported in its
-function, because the entries are read to list what there is.
+their help and their messages follow from it. Each exporter imports its modules in its function,
+because the entries are also read to list the formats.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def write_screenshot(model_view: ModelView, path: Path, *, at: float | None) -> 
 
 
 def _megabytes(path: Path) -> str:
-    """Return the size of a file in words."""
+    """Return the size of a file as text in megabytes."""
     return f"{path.stat().st_size / 1e6:.1f} MB"
 
 

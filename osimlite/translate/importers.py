@@ -1,8 +1,8 @@
 """Formats of other programs that are converted into files of OpenSim.
 
 An importer is one entry of `IMPORTERS`: ``osimlite convert``, its help, its messages and its list of
-formats follow from it. Each function imports what it works with itself, because the entries are also
-read to list the formats.
+formats follow from it. Each importer imports its modules in its function, because the entries are
+also read to list the formats.
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
 
 
 def _rewrite_custom_joint(joint: CustomJoint) -> list[NimbleChange]:
-    """Write into the functions of a CustomJoint what Nimble makes of them."""
+    """Replace axes and functions of a CustomJoint by those with which Nimble moves it."""
     nimble_joint = classify_custom_joint(joint)
     names = [coordinate.name for coordinate in joint.coordinates]
     axes = list(joint.spatial_transform.axes().values())

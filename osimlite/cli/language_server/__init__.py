@@ -1,1 +1,1 @@
-"""A language server for model files: what the linter and the schema know, shown in an editor while somebody types."""
+"""Language server for model files: findings, descriptions and completions for editors."""

@@ -1,4 +1,4 @@
-"""Analysis of one version of an open file: its objects, findings, names and what they refer to."""
+"""Analysis of one version of an open file: its objects, findings, names and their targets."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Name(NamedTuple):
 
 
 def find_name_reference(cursor: Cursor) -> Reference | None:
-    """Return what the name of the object at the cursor refers to; None if it is a free name."""
+    """Return the reference for the name of the object at the cursor; None if the name is free."""
     cls = None if cursor.element is None else cursor.element.cls
     if cls is None:
         return None

@@ -73,8 +73,7 @@ def list_folding_ranges(analysis: DocumentAnalysis) -> list[types.FoldingRange]:
             last = analysis.text.position(markup.end).line
             if last > line:
                 result.append(types.FoldingRange(line, last, kind=types.FoldingRangeKind.Comment))
-        # A closing tag without an opening one is ignored; elements that are never closed do not fold.
-        # A closing tag without an open element is ignored; elements inside that are not closed end here.
+        # A closing tag without an element is ignored; elements without a closing tag do not fold.
         elif markup.kind == "close" and any(tag == markup.tag for tag, _ in open_lines):
             tag, first = open_lines.pop()
             while tag != markup.tag:

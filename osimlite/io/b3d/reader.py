@@ -1,7 +1,7 @@
 """Reader of AddBiomechanics' files (.b3d): the header, its version, and checks that it is plausible.
 
 The header describes the subject and how many bytes the frames of each trial take. Frames are not
-read here; :class:`osimlite.io.b3d.subject.B3dTrial` reads them when somebody asks for them.
+read here; :class:`osimlite.io.b3d.subject.B3dTrial` reads them on demand.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 A file holds a header and then the frames of all trials. A frame is a message of measurements
 followed by one message for each processing pass of its trial. Each pass has its own model, as the
-text of an .osim file. Frames are read from the file when somebody asks for them, because files can
-be larger than the memory.
+text of an .osim file. Frames are read from the file on demand, because files can be larger than
+the memory.
 """
 
 from __future__ import annotations

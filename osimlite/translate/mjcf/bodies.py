@@ -24,8 +24,8 @@ from osimlite.translate.mjcf.draft import MjcfDraft, add_element, clear_rounding
 from osimlite.translate.mjcf.scenery import FRAME_GROUP
 
 MIN_MASS = 1e-14
-"""Mass (kg) and principal moments (kg·m²) of a moving body without: MuJoCo requires more than
-1e-15.
+"""Mass (kg) and principal moments (kg·m²) of a moving body that has none: MuJoCo requires
+more than 1e-15.
 """
 
 MAX_JOINTS_PER_BODY = 6

@@ -28,8 +28,8 @@ from osimlite.translate.mjcf.scenery import CONTACT_GROUP
 _PLANE = np.array(
     ((0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 )
-"""Frame (4, 4) of a MuJoCo plane, whose outward normal is z, in that of an OpenSim half space,
-whose is -x.
+"""Frame (4, 4) of a MuJoCo plane, whose outward normal is z, in the frame of an OpenSim half
+space, whose outward normal is -x.
 """
 
 ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpaceForce

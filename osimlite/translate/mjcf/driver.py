@@ -407,7 +407,7 @@ class Driver:
                     )
                 self.model.eq_data[follower.equality, :5] = polynomial
 
-    # ------------------------------------------------------------------------------------------------ making ready
+    # ------------------------------------------------------------------------------------------------ preparation
     def _restore_inertias(self) -> None:
         """Set the inertias that MuJoCo rejects in a file but accepts in a compiled model."""
         for record in self.mjcf.fidelity:

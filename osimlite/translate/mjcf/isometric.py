@@ -36,7 +36,7 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
         Tensions (A, L) (N); NaN where a muscle has no equilibrium.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
-    # A bench: the length of the path is the position of the block.
+    # In this test setup the length of the path is the position of the block.
     block = model.add(Body(name="block", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     model.add(SliderJoint(name="slide").between(model.ground, block))
     path = GeometryPath(name="path")

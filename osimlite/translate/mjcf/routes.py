@@ -211,9 +211,9 @@ class Router:
 
     # ----------------------------------------------------------------------------------------------- options
     def _choose_obstacles(self, numbers: Sequence[int], choose: Choose) -> Tendon:
-        """Return what a tendon wraps around between two points.
+        """Return the best obstacles of a tendon between two points.
 
-        It is nothing, a surface, or two surfaces with a site between.
+        They are none, one wrap geom, or two wrap geoms with a site between them.
         """
         best: dict[int, WrapGeom] = {}
         options: list[Tendon]
@@ -253,9 +253,10 @@ class Router:
         return (np.concatenate((contact.first, contact.second)) - frame[:3, 3]) @ frame[:3, :3]
 
     def _vary_side(self, number: int, wrap_geom: WrapGeom, directions: int) -> Iterator[WrapGeom]:
-        """Yield a geom with various side sites.
+        """Yield copies of a geom with different side sites.
 
-        They are: as it is, the side of its quadrant, the touched side, and directions all around.
+        These are the present one, those on the side of the quadrant and on the touched side, and
+        those in `directions` directions all around.
         """
         yield wrap_geom
         surface = self.route.surfaces[number]

@@ -191,7 +191,7 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
 
 
 def _lines_cross(p: Array, p_end: Array, q: Array, q_end: Array) -> Mask:
-    """Return whether the segments from p to one and from q to two intersect (...)."""
+    """Return whether the segments from `p` to `p_end` and from `q` to `q_end` intersect (...)."""
     first_direction, second_direction, start_offset = p_end - p, q_end - q, q - p
     determinant = _cross(first_direction, second_direction)
     # Parallel lines have no intersection; comparisons with NaN are false.

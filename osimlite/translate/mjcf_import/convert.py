@@ -231,6 +231,6 @@ def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
 
 
 def _record_warnings(fidelity: Fidelity, texts: Iterable[str]) -> None:
-    """Record what MuJoCo warns of."""
+    """Record the warnings of MuJoCo."""
     for text in texts:
         fidelity.add("warning", "/model", "a model that MuJoCo warns of", "used as it is", text)

@@ -346,7 +346,7 @@ def _polynomial(model: object, name: str, index: int) -> tuple[float, ...]:
 
 
 def _force_expression(linear: float, nonlinear: tuple[float, ...], x: str) -> str:
-    """Return the formula of -(first x + higher_1 |x| x + higher_2 x^3 ...)."""
+    """Return the formula -(linear x + nonlinear[0] |x| x + nonlinear[1] x^3 + ...)."""
     text = ""
     for power, value in enumerate((linear, *nonlinear)):
         if value:
@@ -484,7 +484,7 @@ def compute_softness(
 
 
 def _record_special_forces(draft: ConversionDraft, joint: int) -> None:
-    """Record what a ball or free joint has besides its motion."""
+    """Record as left out the stiffness, damping, armature and friction of a ball or free joint."""
     model = draft.mj
     first = int(model.jnt_dofadr[joint])
     count = 6 if int(model.jnt_type[joint]) == FREE else 3

@@ -41,9 +41,9 @@ FITTED_LENGTHS = (0.4, 1.65)
 CLOSE = 1e-6
 """Relative change of the error, or of the numbers, at which a search ends."""
 NO_CURVE = 10.0
-"""Error in each point of properties that make no curve."""
+"""Error in each point if the properties do not define a curve."""
 SEARCHES = 1
-"""Number of starts, the best of all, from which a fit is searched; a second one finds nothing better."""
+"""Number of the best starting points from which a fit is searched; a second one changes little."""
 DIGITS = 6
 """Digits of the parameters that the cache of fitted curves distinguishes."""
 LEAST_FVMAX = 1.001

@@ -48,7 +48,7 @@ class Bench:
         return self._count - 1
 
     def find_unsolvable(self) -> set[int]:
-        """Return the numbers of the candidates that osimlite cannot lay in the default pose."""
+        """Return the numbers of the candidates that cannot be computed in the default pose."""
         builder = ElementBuilder(self.model, build_mechanism(self.model), Path())
         result = set()
         for number in range(self._count):

@@ -55,7 +55,7 @@ SAME_MEANING_M = 1e-6
 GOOD_WRAP_M = 3e-4
 """Error (rms) of a wrapped path above which a polynomial is tried."""
 TRIAL_POSES = 300
-"""Number of further poses in which a path over contact surfaces must be right."""
+"""Number of further poses in which a path over contact surfaces must have MuJoCo's length."""
 CHECK_POSES = 100
 """Number of poses in which errors are measured; none is one that decided anything."""
 ARM_POSES = 20
@@ -210,7 +210,7 @@ class _Selection:
                 )
 
     def _select_quadrants(self) -> tuple[dict[TendonSegment, Quadrant | None], set[TendonSegment]]:
-        """Return how each wrapped segment wraps, and those that only a polynomial follows."""
+        """Return the best quadrant of each wrapped segment, and segments that need a polynomial."""
         segments = sorted(
             {
                 _key(segment)
