@@ -1,17 +1,20 @@
-"""One evaluation of a model: the compiled engine beside MuJoCo's mj_forward on the MJCF that osimlite writes of it.
+"""Compare the time of one evaluation of a model: osimlite's compiled engine and MuJoCo's mj_forward.
 
     python benchmarks/beside_mujoco.py [--rounds N] [FILE ...]
 
-Without files: the built-in walker and jumper, and models of the shared folder where it is there. Both evaluate
-the same coordinates and speeds in turn, 1,000 times a round; the time is that of the processor, and the
-ratio that of each pair. Nothing of the MJCF is fitted, which does not change the time. An evaluation of ours is a
-call of Python that gives all rates; MuJoCo's includes collision detection and its constraint solver.
+MuJoCo evaluates the MJCF that osimlite writes for the model. Without FILEs, the built-in walker and
+jumper are measured, and models of the shared folder where that exists.
+
+Both programs evaluate several states in turn, 1,000 evaluations in each round. The table gives the
+processor time of an evaluation (us) and the ratio osimlite / MuJoCo of the pairs of rounds. The
+muscle parameters of the MJCF are not fitted, which does not change the time. An evaluation by
+osimlite is a call from Python that returns all rates. One by MuJoCo includes collision detection and
+the solver of its constraints.
 """
 
 from __future__ import annotations
 
 import argparse
-import gzip
 import tempfile
 import time
 from collections.abc import Callable
@@ -25,82 +28,136 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _corpus import CORPUS
+from _corpus import CORPUS, unpack_file
 from osimlite.models.source import make_model
 from osimlite.simulation import Simulation
 
 BUILT_IN = ("dynamic-walker", "jumper")
 """Built-in models that are compared."""
+
 SHARED = {
     "m0001": "arm26",
     "m0005": "gait10dof18musc",
     "m0013": "gait2392",
     "m0954": "Rajagopal2016",
 }
-"""Models of the shared folder by the names of their files."""
+"""Names of models of the shared folder, by the names of their files."""
+
 CALLS = 1000
-"""Evaluations in each round."""
-POSES = 20
-"""States that are evaluated one after the other."""
+"""Evaluations in each round, so that the clock's resolution does not matter."""
+
+STATE_COUNT = 20
+"""Number of states that are evaluated one after the other.
+
+With a single state, results that an engine saves for the last state would make it too fast.
+"""
+
+MAX_CHANGE = 0.02
+"""Largest random change of coordinates (rad, m) and speeds (rad/s, m/s)."""
+
+MUJOCO_CONTROL = 0.1
+"""Control of all actuators of the MJCF."""
 
 
-def make_ours(model: Any) -> tuple[Callable[[int], None], Any]:
-    """Return a function that evaluates a model at one of several states, and these values of its coordinates."""
+def prepare_osimlite(model: osimlite.Model) -> Callable[[int], None]:
+    """Return a function that evaluates a model with osimlite at the state of a number."""
     simulation = Simulation(model, "compiled", skip_unsupported=True)
     engine: Any = simulation.engine
+    # Before the first evaluation the rates are zero. The states are thus near zero, and states of
+    # muscles are zero; those of MuJoCo are near the default pose.
     start = np.array(engine.get_derivative())
     generator = np.random.default_rng(0)
-    states = np.tile(start, (POSES, 1))
+    states = np.tile(start, (STATE_COUNT, 1))
+    # Only coordinates and speeds vary; states of muscles stay.
     moving = 2 * len(engine.order)
-    states[:, :moving] += generator.uniform(-0.02, 0.02, (POSES, moving))
+    states[:, :moving] += generator.uniform(-MAX_CHANGE, MAX_CHANGE, (STATE_COUNT, moving))
     rows = [row.tolist() for row in states]
 
     def evaluate(number: int) -> None:
-        engine.compute_derivative(0.0, rows[number % POSES])
+        engine.compute_derivative(0.0, rows[number % STATE_COUNT])
 
-    return evaluate, states
+    return evaluate
 
 
-def make_theirs(model: Any, folder: Path) -> Callable[[int], None]:
-    """Return a function that evaluates the MJCF of a model at one of several states."""
+def prepare_mujoco(model: osimlite.Model, folder: Path) -> Callable[[int], None]:
+    """Return a function that evaluates a model with MuJoCo at the state of a number.
+
+    Args:
+        model: model to translate.
+        folder: folder for the MJCF.
+    """
     path = osimlite.to_mjcf(model, visuals=False, fit="none").write(folder)[0]
     compiled = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(compiled)
-    mujoco.mj_resetDataKeyframe(compiled, data, 0) if compiled.nkey else None
+    if compiled.nkey:
+        mujoco.mj_resetDataKeyframe(compiled, data, 0)
     generator = np.random.default_rng(0)
     start = data.qpos.copy()
-    places = start + generator.uniform(-0.02, 0.02, (POSES, len(start)))
-    speeds = generator.uniform(-0.02, 0.02, (POSES, compiled.nv))
-    data.ctrl[:] = 0.1
+    values = start + generator.uniform(-MAX_CHANGE, MAX_CHANGE, (STATE_COUNT, len(start)))
+    speeds = generator.uniform(-MAX_CHANGE, MAX_CHANGE, (STATE_COUNT, compiled.nv))
+    data.ctrl[:] = MUJOCO_CONTROL
 
     def evaluate(number: int) -> None:
-        data.qpos[:] = places[number % POSES]
-        data.qvel[:] = speeds[number % POSES]
+        data.qpos[:] = values[number % STATE_COUNT]
+        data.qvel[:] = speeds[number % STATE_COUNT]
         mujoco.mj_forward(compiled, data)
 
     return evaluate
 
 
 def measure_round(evaluate: Callable[[int], None]) -> float:
-    """Return the processor time of one evaluation, us."""
+    """Return the processor time of one evaluation (us), the mean of a round."""
     start = time.process_time()
     for number in range(CALLS):
         evaluate(number)
     return 1e6 * (time.process_time() - start) / CALLS
 
 
-def find_models(files: list[Path], folder: Path) -> dict[str, Any]:
-    """Return the models by name."""
+def find_models(files: list[Path], folder: Path) -> dict[str, osimlite.Model]:
+    """Read the models to compare.
+
+    Args:
+        files: model files; if there are none, built-in and shared models are compared.
+        folder: folder for unpacked files.
+
+    Returns:
+        The models by name.
+    """
     if files:
         return {file.stem: osimlite.read(file) for file in files}
     models = {name: make_model(name) for name in BUILT_IN}
     for key, name in SHARED.items():
         packed = CORPUS / f"{key}.osim.gz"
         if packed.exists():
-            file = folder / f"{name}.osim"
-            file.write_bytes(gzip.decompress(packed.read_bytes()))
-            models[name] = osimlite.read(file)
+            models[name] = osimlite.read(unpack_file(packed, folder / f"{name}.osim"))
     return models
+
+
+def compare_model(model: osimlite.Model, folder: Path, rounds: int) -> list[str]:
+    """Measure a model with both programs in turn.
+
+    Args:
+        model: model to evaluate.
+        folder: folder for its MJCF.
+        rounds: number of pairs of rounds that count.
+
+    Returns:
+        Cells of the table: times of osimlite and MuJoCo, and the median, least and greatest ratio.
+    """
+    ours = prepare_osimlite(model)
+    theirs = prepare_mujoco(model, folder)
+    pairs = [(measure_round(ours), measure_round(theirs)) for _ in range(1 + rounds)]
+    # The first pair is the warm-up.
+    del pairs[0]
+    ratios = [one / other for one, other in pairs]
+    numbers = (
+        median(one for one, _ in pairs),
+        median(other for _, other in pairs),
+        median(ratios),
+        min(ratios),
+        max(ratios),
+    )
+    return [f"{number:.3g}" for number in numbers]
 
 
 def main() -> None:
@@ -108,27 +165,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("files", nargs="*", type=Path, metavar="FILE")
-    parser.add_argument("--rounds", type=int, default=9, metavar="N", help="9 by default")
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="model file")
+    parser.add_argument(
+        "--rounds", type=int, default=9, metavar="N", help="number of rounds, 9 by default"
+    )
     options = parser.parse_args()
     table = Table(
-        title=f"One evaluation, beside MuJoCo {mujoco.__version__}",
-        caption="us of the processor, medians; ratio = osimlite / MuJoCo, median of the pairs",
+        title=f"One evaluation, by osimlite and by MuJoCo {mujoco.__version__}",
+        caption="median processor times; ratio = osimlite / MuJoCo of the pairs of rounds",
     )
-    table.add_column("")
-    for heading in ("osimlite", "MuJoCo", "ratio", "least", "greatest"):
+    table.add_column("model")
+    for heading in ("osimlite, us", "MuJoCo, us", "ratio", "least", "greatest"):
         table.add_column(heading, justify="right")
     with tempfile.TemporaryDirectory() as name:
-        for label, model in find_models(options.files, Path(name)).items():
-            ours, _ = make_ours(model)
-            theirs = make_theirs(model, Path(name) / label)
-            pairs = [
-                (measure_round(ours), measure_round(theirs)) for _ in range(1 + options.rounds)
-            ][1:]
-            ratios = [one / other for one, other in pairs]
-            numbers = (*(median(times) for times in zip(*pairs, strict=True)), median(ratios))
-            cells = [f"{number:.3g}" for number in (*numbers, min(ratios), max(ratios))]
-            table.add_row(label, *cells)
+        folder = Path(name)
+        for label, model in find_models(options.files, folder).items():
+            table.add_row(label, *compare_model(model, folder / label, options.rounds))
     Console(width=100).print(table)
 
 
