@@ -1,13 +1,18 @@
-"""Functions of CasADi beside the kernels: values, Jacobians, Hessians, and what each takes.
+"""Check and time the CasADi functions of models: values, Jacobians and Hessians.
 
-``python benchmarks/derivatives.py FILE.osim ...`` prints a row for each model: kind of the
-expressions, states, how many instructions the derivative of the state takes, seconds to make the
-functions; then the largest difference, at random states and controls, of that derivative from the
-kernels', of the Jacobian and of the Hessian of a random combination from those that the kernels
-have themselves when they run on numbers that carry derivatives (`tests/derivatives/jets.py`), each
-over the size of the numbers that it is made of; and microseconds of machine code, value, Jacobian
-and Hessian. With ``--opensim`` OpenSim's value, and a Jacobian by forward differences, in
-microseconds.
+    python benchmarks/derivatives.py [--opensim] FILE.osim ...
+
+A row is printed for each model, with these columns:
+
+- kind of the expressions (SX or MX) and number of states;
+- instructions in the function of the state derivative, and time to make it (s);
+- largest errors of the state derivative, of its Jacobian, and of the Hessian of a random combination,
+  at random states and controls. They are compared with the kernels, which compute derivatives with
+  dual numbers (`tests/derivatives/jets.py`), relative to the size of the terms of each number;
+- processor time (us) of the state derivative by machine code, and of the CasADi functions of value,
+  Jacobian and Hessian.
+
+With --opensim the time of OpenSim's value follows, and of a Jacobian by forward differences (us).
 """
 
 from __future__ import annotations
@@ -22,11 +27,23 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-STATES, LARGE = 3, 130
-"""How many are tried; of more states no Hessian is timed."""
-PATIENCE = 240
-"""S, for one model."""
-OPENSIM = """
+
+STATE_COUNT = 3
+"""Number of random states at which errors are measured."""
+
+STATE_CHANGE = 0.03
+"""Size of the random changes of coordinates (rad, m)."""
+
+MAX_HESSIAN_STATES = 130
+"""Number of states above which no Hessian is timed: making it takes too long."""
+
+TIME_LIMIT_S = 240
+"""Time limit of a model (s)."""
+
+MEASURE_TIME_S = 0.3
+"""Processor time (s) for which a function is called again and again."""
+
+OPENSIM_SCRIPT = """
 import sys, time, opensim
 opensim.Logger.setLevelString("Off")
 model = opensim.Model(sys.argv[1])
@@ -42,10 +59,35 @@ while time.process_time() - start < 1.0:
     count += 1
 print(1e6 * (time.process_time() - start) / count, state.getNY())
 """
+"""Program that prints the time of OpenSim's state derivative (us) and the number of states."""
+
+HEADINGS = (
+    "model",
+    "kind",
+    "states",
+    "instr.",
+    "made, s",
+    "value",
+    "Jacobian",
+    "Hessian",
+    "code, us",
+    "val., us",
+    "Jac., us",
+    "Hes., us",
+)
+
+ERROR_KEYS = ("value", "jacobian", "hessian")
+
+TIME_KEYS = ("machine code", "casadi value", "casadi jacobian", "casadi hessian")
 
 
-def measured(path: Path) -> dict[str, Any]:
-    """The numbers of one model."""
+def measure_model(path: Path) -> dict[str, Any]:
+    """Measure one model in this process.
+
+    Returns:
+        Kind, number of states, instructions, seconds to make the functions, errors by `ERROR_KEYS`,
+        and under "times" the processor times by `TIME_KEYS` (us). The Hessian may be missing.
+    """
     sys.path.insert(0, str(ROOT))
     import casadi
     import numpy as np
@@ -53,105 +95,122 @@ def measured(path: Path) -> dict[str, Any]:
     import osimlite
     from tests.derivatives.machine import Beside
 
-    before = time.perf_counter()
-    both = Beside(osimlite.read(path))
-    f = both.functions
-    dynamics = f.dynamics
+    start = time.perf_counter()
+    comparison = Beside(osimlite.read(path))
+    functions = comparison.functions
+    dynamics = functions.dynamics
     row: dict[str, Any] = {
         "kind": "SX" if dynamics.is_a("SXFunction") else "MX",
-        "states": len(f.states),
+        "states": len(functions.states),
     }
-    row["made"] = time.perf_counter() - before
-    row["size"] = dynamics.n_instructions()
-    for seed in range(STATES):
-        x = both.state(seed, 0.03)
-        found = both.errors(both.kept(x) if f.constraint_count else x, seed)
-        row |= {key: max(value, row.get(key, 0.0)) for key, value in found.items()}
-    u, symbol = f.u, casadi.MX.sym("x", len(x))
-    xdot = dynamics(both.t, symbol, u, f.p)
+    row["seconds to make"] = time.perf_counter() - start
+    row["instructions"] = dynamics.n_instructions()
+    for seed in range(STATE_COUNT):
+        x = comparison.state(seed, STATE_CHANGE)
+        # A random state violates the constraints of the model.
+        consistent = comparison.kept(x) if functions.constraint_count else x
+        errors = comparison.errors(consistent, seed)
+        row |= {key: max(error, row.get(key, 0.0)) for key, error in errors.items()}
+    t = comparison.t
+    u = functions.u
+    symbol = casadi.MX.sym("x", len(x))
+    xdot = dynamics(t, symbol, u, functions.p)
     jacobian = casadi.Function("J", [symbol], [casadi.jacobian(xdot, symbol)])
     timed: dict[str, Callable[[], Any]] = {
-        "machine": lambda: both.derivative(x),
-        "one": lambda: dynamics(both.t, x, u, f.p),
-        "all": lambda: jacobian(x),
+        "machine code": lambda: comparison.derivative(x),
+        "casadi value": lambda: dynamics(t, x, u, functions.p),
+        "casadi jacobian": lambda: jacobian(x),
     }
-    if row["kind"] == "SX" and len(x) <= LARGE:
-        push = np.random.default_rng(9).normal(size=len(x))
-        hessian = casadi.Function(
-            "H", [symbol], [casadi.hessian(casadi.dot(casadi.DM(push), xdot), symbol)[0]]
-        )
-        timed["curved"] = lambda: hessian(x)
-    for name, function in timed.items():
-        function()
-        start, count = time.process_time(), 0
-        while time.process_time() - start < 0.3:
-            function()
-            count += 1
-        row[f"us_{name}"] = 1e6 * (time.process_time() - start) / count
+    if row["kind"] == "SX" and len(x) <= MAX_HESSIAN_STATES:
+        weights = casadi.DM(np.random.default_rng(9).normal(size=len(x)))
+        second = casadi.hessian(casadi.dot(weights, xdot), symbol)[0]
+        hessian = casadi.Function("H", [symbol], [second])
+        timed["casadi hessian"] = lambda: hessian(x)
+    row["times"] = {name: measure_call(function) for name, function in timed.items()}
     return row
 
 
+def measure_call(function: Callable[[], object]) -> float:
+    """Return the mean processor time of a call (us), after a first call that does not count."""
+    function()
+    start = time.process_time()
+    count = 0
+    while time.process_time() - start < MEASURE_TIME_S:
+        function()
+        count += 1
+    return 1e6 * (time.process_time() - start) / count
+
+
+def measure_in_process(path: Path) -> tuple[dict[str, Any] | None, str]:
+    """Measure one model in a process of its own, which may fail or take too long.
+
+    Returns:
+        The result of `measure_model`, or None and the reason why there is none.
+    """
+    command = [sys.executable, __file__, "--one", str(path)]
+    try:
+        process = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT_S
+        )
+    except subprocess.TimeoutExpired:
+        return None, f"not within {TIME_LIMIT_S} s"
+    if process.returncode == 0 and process.stdout:
+        return json.loads(process.stdout.splitlines()[-1]), ""
+    last_line = (process.stderr.strip().splitlines() or ["?"])[-1]
+    return None, last_line.rpartition("Error: ")[2][:100]
+
+
+def format_row(row: dict[str, Any]) -> str:
+    """Return the cells of a model behind its name."""
+    cells = [
+        row["kind"],
+        row["states"],
+        row["instructions"],
+        f"{row['seconds to make']:.2f}",
+        *(f"{row[key]:.1e}" if key in row else "-" for key in ERROR_KEYS),
+        *(f"{row['times'][key]:.0f}" if key in row["times"] else "-" for key in TIME_KEYS),
+    ]
+    return "".join(f"{cell:>9}" for cell in cells)
+
+
+def measure_opensim(path: Path) -> str:
+    """Return the times of OpenSim in words, nothing if OpenSim fails."""
+    process = subprocess.run(
+        [sys.executable, "-c", OPENSIM_SCRIPT, str(path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if process.returncode != 0:
+        return ""
+    value, size = map(float, process.stdout.split())
+    # Forward differences need one evaluation for each state, and one at the state itself.
+    return f"   OpenSim {value:.0f} us, Jacobian by differences {value * (size + 1):.0f} us"
+
+
 def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("files", nargs="+", type=Path)
-    parser.add_argument("--opensim", action="store_true")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.osim", help="model file")
+    parser.add_argument("--opensim", action="store_true", help="time OpenSim too")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
-    chosen = parser.parse_args()
-    if chosen.one:
-        print(json.dumps(measured(chosen.files[0])))
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(measure_model(options.files[0])))
         return
-    head = (
-        "model",
-        "kind",
-        "states",
-        "graph",
-        "made s",
-        "value",
-        "Jacobian",
-        "Hessian",
-        "us code",
-        "value",
-        "Jac.",
-        "Hess.",
-    )
-    print("".join(f"{text:>9}" if k else f"{text:<34}" for k, text in enumerate(head)), flush=True)
-    for path in chosen.files:
-        command = [sys.executable, __file__, "--one", str(path)]
-        try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, check=False, timeout=PATIENCE
-            )
-            said = done.stdout.splitlines()[-1] if done.returncode == 0 and done.stdout else ""
-            reason = (done.stderr.strip().splitlines() or ["?"])[-1]
-        except subprocess.TimeoutExpired:
-            said, reason = "", f"not within {PATIENCE} s"
-        name = path.stem[:32]
-        if not said:
-            print(f"{name:<34}{reason.rpartition('Error: ')[2][:100]}", flush=True)
-            continue
-        row = json.loads(said)
-        cells = [row["kind"], row["states"], row["size"], f"{row['made']:.2f}"]
-        cells += [
-            f"{row[key]:.1e}" if key in row else "-" for key in ("value", "jacobian", "hessian")
-        ]
-        cells += [
-            f"{row[f'us_{key}']:.0f}" if f"us_{key}" in row else "-"
-            for key in ("machine", "one", "all", "curved")
-        ]
-        text = "".join(f"{cell:>9}" for cell in cells)
-        if chosen.opensim:
-            theirs = subprocess.run(
-                [sys.executable, "-c", OPENSIM, str(path)],
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            if theirs.returncode == 0:
-                value, size = map(float, theirs.stdout.split())
-                text += f"   OpenSim {value:.0f}, by differences {value * (size + 1):.0f}"
-        print(f"{name:<34}{text}", flush=True)
+    model_heading, *headings = HEADINGS
+    print(f"{model_heading:<34}" + "".join(f"{text:>9}" for text in headings), flush=True)
+    for path in options.files:
+        row, reason = measure_in_process(path)
+        if row is None:
+            text = reason
+        else:
+            text = format_row(row)
+            if options.opensim:
+                text += measure_opensim(path)
+        print(f"{path.stem[:32]:<34}{text}", flush=True)
 
 
 if __name__ == "__main__":
