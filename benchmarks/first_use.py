@@ -1,24 +1,27 @@
-"""First and later uses of commands in an environment: seconds of a user without any cache, and with it.
+"""Time the first and the later uses of commands in an environment.
 
     python benchmarks/first_use.py [--rounds N] [--without-compiler] [--first-only] PYTHON [NAME ...]
 
-PYTHON is that of an environment in which osimlite is installed. Each round gives every command a
-home folder that is empty, runs it, and runs it again twice. Byte code is there, as pip leaves it,
-but for the first command in an editable installation, which is told apart. With
---without-compiler no program but those of the environment is found. Environments:
+PYTHON is the Python of an environment in which osimlite is installed. In each round every command
+gets an empty home folder, runs once without any cache, and runs twice more. The table gives the
+medians of the rounds: wall time (processor time) of the first and of the faster later run, and the
+ratio of their processor times. With NAMEs, only commands whose names contain one of them run.
+
+Byte code exists before, as pip leaves it, except for the first command in an editable installation,
+whose time is printed separately. With --without-compiler, the search path has only the programs of
+the environment. Environments:
 
     python3.11 -m venv A && A/bin/pip install '.[all]'
     python3.11 -m venv B && B/bin/pip install -e '.[all]'
     python3.11 -m venv C && OSIMLITE_LIBRARY=no C/bin/pip install '.[all]'              numba alone
     python3.11 -m venv D && OSIMLITE_LIBRARY=no D/bin/pip install '.[sim,plot,view]'    Python alone
 
-For C and D give --without-compiler. The files are those of the reference data in the shared folder.
+C and D need --without-compiler. The models and setups are those of the shared folder.
 """
 
 from __future__ import annotations
 
 import argparse
-import gzip
 import os
 import re
 import resource
@@ -35,36 +38,63 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
+from _corpus import CORPUS, unpack_file
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
 REFERENCE = SHARED / "oracle" / "tools" / "reference"
-RAJAGOPAL = SHARED / "corpus" / "converted" / "m0954.osim.gz"
+"""Folder of setups and results of OpenSim's tools."""
+
+RAJAGOPAL = CORPUS / "m0954.osim.gz"
+
 WALKER = Path(__file__).resolve().parents[1] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
-RESIDUALS = "pelvis_tx pelvis_ty pelvis_tz pelvis_list pelvis_tilt pelvis_rotation"
+
+RESIDUAL_COORDINATES = (
+    "pelvis_tx",
+    "pelvis_ty",
+    "pelvis_tz",
+    "pelvis_list",
+    "pelvis_tilt",
+    "pelvis_rotation",
+)
+"""Coordinates of the pelvis, whose actuators RRA keeps small."""
+
+RESIDUAL_FORCE = 8
+"""Optimal force (N, N m) of the actuators of the pelvis."""
+
+JOINT_FORCE = 300
+"""Optimal force (N, N m) of all other actuators."""
+
+MAX_LISTED_PACKAGES = 8
+"""Number of the largest packages that are printed."""
+
+LATER_RUNS = 2
+"""Number of runs after the first; the faster one counts."""
 
 
-class Times(NamedTuple):
-    """Seconds of one process: of the clock and of processors."""
+class ProcessTime(NamedTuple):
+    """Time of one process.
+
+    Attributes:
+        wall: wall time (s).
+        processor: time of all processors (s).
+    """
 
     wall: float
     processor: float
 
 
-def copy_plain(source: Path, target: Path) -> None:
-    """Copy a file, uncompressed if its name ends with .gz."""
-    content = source.read_bytes()
-    target.write_bytes(gzip.decompress(content) if source.suffix == ".gz" else content)
+def write_rra_setup(folder: Path) -> None:
+    """Write a setup of RRA to the folder of inverse kinematics.
 
+    Every coordinate has an actuator and a task.
 
-def write_tracking(folder: Path) -> None:
-    """Write a setup of RRA beside the files of inverse kinematics: every coordinate has an actuator and a task."""
+    Args:
+        folder: folder with the model, the motion and the external loads.
+    """
     text = (folder / "subject01_simbody.osim").read_text(encoding="utf-8")
     names = list(dict.fromkeys(re.findall(r'<Coordinate name="([^"]+)"', text)))
-    actuators = "".join(
-        f'<CoordinateActuator name="{name}_drive"><coordinate>{name}</coordinate><min_control>-inf</min_control>'
-        f"<max_control>inf</max_control><optimal_force>{8 if name in RESIDUALS.split() else 300}</optimal_force>"
-        "</CoordinateActuator>"
-        for name in names
-    )
+    actuators = "".join(_format_actuator(name) for name in names)
     tasks = "".join(
         f'<CMC_Joint name="{name}"><on>true</on><weight>1</weight><active>true false false</active>'
         f"<kp>100 1 1</kp><kv>20 1 1</kv><ka>1 1 1</ka><coordinate>{name}</coordinate></CMC_Joint>"
@@ -78,32 +108,43 @@ def write_tracking(folder: Path) -> None:
         "<desired_kinematics_file>kinematics.mot</desired_kinematics_file>"
         "<task_set_file>tasks.xml</task_set_file><lowpass_cutoff_frequency>6</lowpass_cutoff_frequency>"
     )
-    for name, content in (
-        ("actuators", f"<ForceSet><objects>{actuators}</objects></ForceSet>"),
-        ("tasks", f"<CMC_TaskSet><objects>{tasks}</objects></CMC_TaskSet>"),
-        ("rra", f'<RRATool name="subject01">{tool}</RRATool>'),
-    ):
+    contents = {
+        "actuators": f"<ForceSet><objects>{actuators}</objects></ForceSet>",
+        "tasks": f"<CMC_TaskSet><objects>{tasks}</objects></CMC_TaskSet>",
+        "rra": f'<RRATool name="subject01">{tool}</RRATool>',
+    }
+    for name, content in contents.items():
         document = f'<OpenSimDocument Version="40600">{content}</OpenSimDocument>\n'
         (folder / f"{name}.xml").write_text(document, encoding="utf-8")
 
 
+def _format_actuator(coordinate: str) -> str:
+    """Return the XML of the actuator of a coordinate."""
+    force = RESIDUAL_FORCE if coordinate in RESIDUAL_COORDINATES else JOINT_FORCE
+    return (
+        f'<CoordinateActuator name="{coordinate}_drive"><coordinate>{coordinate}</coordinate>'
+        "<min_control>-inf</min_control><max_control>inf</max_control>"
+        f"<optimal_force>{force}</optimal_force></CoordinateActuator>"
+    )
+
+
 def prepare_files(folder: Path) -> None:
-    """Put all files that the commands read into a folder."""
+    """Write all files that the commands read to a folder."""
     for name in ("scale_gait2354", "ik_id_gait2354"):
         target = folder / name
         target.mkdir()
         for file in (REFERENCE / name).iterdir():
-            copy_plain(file, target / file.name.removesuffix(".gz"))
+            unpack_file(file, target / file.name.removesuffix(".gz"))
     walk = folder / "ik_id_gait2354"
-    copy_plain(
+    unpack_file(
         REFERENCE / "models" / "gait2354_subject01_simbody.osim.gz", walk / "subject01_simbody.osim"
     )
     # Inverse dynamics reads the file that inverse kinematics writes.
     for name in ("kinematics.mot", "subject01_walk1_ik.mot"):
         shutil.copy(walk / "ik_accuracy_1e-9.mot", walk / name)
-    write_tracking(walk)
-    copy_plain(RAJAGOPAL, folder / "Rajagopal2016.osim")
-    copy_plain(WALKER, folder / WALKER.name)
+    write_rra_setup(walk)
+    unpack_file(RAJAGOPAL, folder / "Rajagopal2016.osim")
+    unpack_file(WALKER, folder / WALKER.name)
 
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -121,33 +162,52 @@ COMMANDS: dict[str, tuple[str, str]] = {
 
 
 def measure_process(
-    command: Sequence[str], folder: Path, environment: dict[str, str], limit: float
-) -> Times:
-    """Run a process, and return the time that it took.
+    command: Sequence[str], folder: Path, environment: dict[str, str], time_limit: float
+) -> ProcessTime:
+    """Run a process and return its time.
+
+    Args:
+        command: program and arguments.
+        folder: working folder.
+        environment: environment variables.
+        time_limit: longest wall time (s).
 
     Raises:
-        RuntimeError: it failed; the message ends with what it wrote to standard error.
+        RuntimeError: the process failed; the message ends with its standard error.
     """
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run(
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    start = time.perf_counter()
+    process = subprocess.run(
         command,
         cwd=folder,
         env=environment,
         capture_output=True,
         text=True,
         check=False,
-        timeout=limit,
+        timeout=time_limit,
     )
-    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-    if done.returncode not in (0, 1):
+    wall = time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # Exit code 1 says that a command has worked and found something.
+    if process.returncode not in (0, 1):
         raise RuntimeError(
-            f"{command} ended with exit code {done.returncode}: {done.stderr.strip()}"
+            f"{command} ended with exit code {process.returncode}: {process.stderr.strip()}"
         )
-    return Times(wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return ProcessTime(wall, processor)
 
 
 def make_environment(home: Path, python: Path, without_compiler: bool) -> dict[str, str]:
-    """Return the variables of a user whose home folder is empty."""
+    """Return the environment variables of a user.
+
+    Args:
+        home: home folder, which may be empty.
+        python: Python of the environment.
+        without_compiler: whether the search path has only programs of the environment.
+
+    Returns:
+        Variables by name; no others are inherited, because they may change what commands do.
+    """
     path = str(python.parent)
     if not without_compiler:
         path = os.pathsep.join((path, os.environ.get("PATH", "")))
@@ -156,116 +216,182 @@ def make_environment(home: Path, python: Path, without_compiler: bool) -> dict[s
 
 def measure_command(
     name: str, files: Path, options: argparse.Namespace
-) -> tuple[Times, Times | None]:
-    """Return the times of the first use of a command and of a later one."""
-    place, words = COMMANDS[name]
+) -> tuple[ProcessTime, ProcessTime | None]:
+    """Measure a command once with an empty home folder.
+
+    Args:
+        name: name of the command in `COMMANDS`.
+        files: folder with the files of `prepare_files`, which is copied.
+        options: options of the command line.
+
+    Returns:
+        The time of the first use, and of the fastest later one unless that is not wanted.
+    """
+    subfolder, words = COMMANDS[name]
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder) / "home"
         home.mkdir()
         work = shutil.copytree(files, Path(folder) / "files")
         python = find_python(options)
         environment = make_environment(home, python, options.without_compiler)
-        # Beside the package, kernels that were compiled at first use would stay for the next round.
+        # Otherwise numba saves kernels in the package, where the next round finds them.
         environment["NUMBA_CACHE_DIR"] = str(home / "kernels")
         command = [str(python), "-m", "osimlite", *words.split()]
-        arguments = command, work / place, environment, options.limit
+        arguments = command, work / subfolder, environment, options.limit
         first = measure_process(*arguments)
         if options.first_only:
             return first, None
-        later = [measure_process(*arguments) for _ in range(2)]
+        later = [measure_process(*arguments) for _ in range(LATER_RUNS)]
         return first, min(later)
 
 
 def find_python(options: argparse.Namespace) -> Path:
-    """Return the absolute path of the environment's Python; its link is what tells it the environment."""
+    """Return the absolute path of the environment's Python.
+
+    Links are not resolved: Python finds its environment by the folder of the link.
+    """
     return Path(os.path.abspath(options.python))
 
 
 def print_environment(console: Console, python: Path, without_compiler: bool) -> None:
-    """Print what computes the kernels, and how large the environment is."""
+    """Print what computes the kernels, and the size of the environment.
+
+    Args:
+        console: where to print.
+        python: Python of the environment.
+        without_compiler: whether the search path has only programs of the environment.
+    """
     with tempfile.TemporaryDirectory() as home:
         environment = make_environment(Path(home), python, without_compiler)
-        where = (
+
+        def run_python(*arguments: str) -> str:
+            return subprocess.run(
+                [str(python), *arguments],
+                env=environment,
+                cwd=home,
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+
+        program = (
             "import osimlite, sysconfig; print(osimlite.__file__, sysconfig.get_path('purelib'))"
         )
-        run = [str(python), "-c", where]
-        done = subprocess.run(
-            run, env=environment, cwd=home, capture_output=True, text=True, check=True
-        )
-        package, site = done.stdout.split()
+        package, site_packages = run_python("-c", program).split()
         sizes = {
             path.name: sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-            for path in Path(site).iterdir()
+            for path in Path(site_packages).iterdir()
             if path.is_dir()
         }
-        console.print(
-            f"{package}; site-packages {sum(sizes.values()) / 1e6:.0f} MB", soft_wrap=True
-        )
-        largest = sorted(sizes.items(), key=lambda item: -item[1])[:8]
+        total = sum(sizes.values())
+        console.print(f"{package}; site-packages {total / 1e6:.0f} MB", soft_wrap=True)
+        largest = sorted(sizes.items(), key=lambda item: -item[1])[:MAX_LISTED_PACKAGES]
         words = ", ".join(f"{name} {size / 1e6:.0f}" for name, size in largest)
         console.print(f"largest, MB: {words}", soft_wrap=True)
-        version = [str(python), "-m", "osimlite", "--version", "-v"]
-        done = subprocess.run(
-            version, env=environment, cwd=home, capture_output=True, text=True, check=True
-        )
-        console.print(done.stdout.strip(), soft_wrap=True)
+        versions = run_python("-m", "osimlite", "--version", "-v")
+        console.print(versions.strip(), soft_wrap=True)
+
+
+def measure_first_command(python: Path, files: Path, options: argparse.Namespace) -> ProcessTime:
+    """Measure the first command of all, which writes the byte code of an editable installation.
+
+    Args:
+        python: Python of the environment.
+        files: folder with the files of `prepare_files`.
+        options: options of the command line.
+    """
+    home = files / "home"
+    home.mkdir()
+    environment = make_environment(home, python, options.without_compiler)
+    command = [str(python), "-m", "osimlite", "info", WALKER.name]
+    return measure_process(command, files, environment, options.limit)
+
+
+def make_row(name: str, files: Path, options: argparse.Namespace) -> list[str]:
+    """Measure a command in all rounds, and return its row of the table.
+
+    Args:
+        name: name of the command in `COMMANDS`.
+        files: folder with the files of `prepare_files`.
+        options: options of the command line.
+    """
+    try:
+        pairs = [measure_command(name, files, options) for _ in range(options.rounds)]
+    except subprocess.TimeoutExpired:
+        return [name, f"> {options.limit:g}"]
+    except RuntimeError as error:
+        print(error, file=sys.stderr)
+        return [name, "failed"]
+    cells = [_format_times([first for first, _ in pairs])]
+    later = [times for _, times in pairs if times is not None]
+    if later:
+        ratios = [first.processor / other.processor for first, other in pairs if other is not None]
+        cells += [_format_times(later), f"{median(ratios):.2f}"]
+    return [name, *cells]
+
+
+def _format_times(times: Sequence[ProcessTime]) -> str:
+    """Return the median wall time and the median processor time (s)."""
+    wall = median(one.wall for one in times)
+    processor = median(one.processor for one in times)
+    return f"{wall:.2f} ({processor:.2f})"
+
+
+def parse_options() -> argparse.Namespace:
+    """Parse the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "python", type=Path, metavar="PYTHON", help="Python of the environment to measure"
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="measure only commands whose names contain this"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=3, metavar="N", help="number of rounds, 3 by default"
+    )
+    parser.add_argument(
+        "--without-compiler",
+        action="store_true",
+        help="leave out programs that are not of the environment",
+    )
+    parser.add_argument(
+        "--first-only", action="store_true", help="do not run any command a second time"
+    )
+    parser.add_argument(
+        "--limit",
+        type=float,
+        default=600.0,
+        metavar="S",
+        help="longest time of a command in seconds, 600 by default",
+    )
+    return parser.parse_args()
 
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("python", type=Path, metavar="PYTHON")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="only commands with these words")
-    parser.add_argument("--rounds", type=int, default=3, metavar="N", help="3 by default")
-    parser.add_argument("--without-compiler", action="store_true", help="hide all other programs")
-    parser.add_argument("--first-only", action="store_true", help="do not run a command again")
-    parser.add_argument(
-        "--limit", type=float, default=600.0, metavar="S", help="longest time of a command"
-    )
-    options = parser.parse_args()
+    options = parse_options()
     python = find_python(options)
     console = Console(width=110)
     print_environment(console, python, options.without_compiler)
     table = Table(
         title=f"First and later uses with {python}",
-        caption=f"s, medians of {options.rounds}; wall (processor)",
+        caption=f"medians of {options.rounds} rounds; wall time (processor time)",
     )
-    table.add_column("")
-    for heading in ("first", "later", "first / later"):
+    table.add_column("command")
+    for heading in ("first, s", "later, s", "first / later"):
         table.add_column(heading, justify="right")
-    with tempfile.TemporaryDirectory() as name:
-        files = Path(name)
+    with tempfile.TemporaryDirectory() as folder:
+        files = Path(folder)
         prepare_files(files)
-        home = Path(name) / "home"
-        home.mkdir()
-        environment = make_environment(home, python, options.without_compiler)
-        command = [str(python), "-m", "osimlite", "info", WALKER.name]
-        took = measure_process(command, files, environment, options.limit)
-        console.print(f"the first command, osimlite info: {took.wall:.2f} s ({took.processor:.2f})")
-        for chosen in COMMANDS:
-            if options.names and not any(word in chosen for word in options.names):
-                continue
-            try:
-                pairs = [measure_command(chosen, files, options) for _ in range(options.rounds)]
-            except subprocess.TimeoutExpired:
-                table.add_row(chosen, f"> {options.limit:g}")
-                continue
-            except RuntimeError as error:
-                table.add_row(chosen, "failed")
-                print(error, file=sys.stderr)
-                continue
-            cells = [
-                f"{median(one.wall for one in times):.2f} ({median(one.processor for one in times):.2f})"
-                for times in zip(*pairs, strict=True)
-                if times[0] is not None
-            ]
-            if not options.first_only:
-                cells.append(
-                    f"{median(a.processor / b.processor for a, b in pairs if b is not None):.2f}"
-                )
-            table.add_row(chosen, *cells)
+        first = measure_first_command(python, files, options)
+        console.print(
+            f"the first command, osimlite info: {first.wall:.2f} s ({first.processor:.2f} s)"
+        )
+        for name in COMMANDS:
+            if not options.names or any(word in name for word in options.names):
+                table.add_row(*make_row(name, files, options))
     console.print(table)
 
 
