@@ -1,1 +1,1 @@
-"""Helpers that know nothing of OpenSim: text, records, options, files, quantities, optional packages."""
+"""Helpers independent of OpenSim: text, records, options, files, quantities, optional packages."""

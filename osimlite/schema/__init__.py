@@ -1,1 +1,1 @@
-"""What a model says: one class per OpenSim component, grouped by area. No XML, no numpy, no files in here."""
+"""Content of models: one class per OpenSim component, by area. No XML, numpy or files here."""

@@ -1,4 +1,4 @@
-"""Controllers: what sets the controls of actuators."""
+"""Controllers, which set the controls of actuators."""
 
 from typing import Annotated
 

@@ -60,8 +60,8 @@ class _Comparison:
     def run(self) -> Iterator[Difference]:
         """Yield the differences of two models: removed, changed, then added components."""
         assert self.old is not None and self.new is not None
-        # What only the old model has comes first, then the differences of what both have, then
-        # what only the new one has.
+        # Components of the old model alone come first, then the differences of components that both
+        # have, then components of the new model alone.
         for path in _find_missing_paths(self.old, self.new):
             yield Difference(path, "", _describe_type(self.old.by_path[path]), None)
         for path, component in self.new.by_path.items():

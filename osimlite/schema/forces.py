@@ -1,4 +1,4 @@
-"""Forces: what all have in common, contact by the Hunt-Crossley law, and the limits of joints."""
+"""Forces: their base classes, contact by the Hunt-Crossley law, and limits of coordinates."""
 
 import math
 from typing import Annotated, ClassVar

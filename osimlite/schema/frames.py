@@ -1,4 +1,4 @@
-"""Frames and bodies: what can be attached to."""
+"""Frames and bodies, to which other components are attached."""
 
 import math
 from typing import Annotated

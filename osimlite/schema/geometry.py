@@ -1,4 +1,4 @@
-"""Decorative geometry: what a frame looks like. It has no effect on the motion."""
+"""Decorative geometry: the appearance of frames. It has no effect on the motion."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Motions given beforehand, and forces that a program sets while it simulates."""
+"""Prescribed motions, and forces that a program sets while it simulates."""
 
 from osimlite.schema.base import ModelComponent, make_default
 from osimlite.schema.fields import Flag, Single

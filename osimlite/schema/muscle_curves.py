@@ -1,4 +1,4 @@
-"""The curves of the Millard muscles (Millard et al. 2013): dimensionless, smooth, given by what a person can measure.
+"""Curves of the Millard muscles (Millard et al. 2013): dimensionless, smooth, of few parameters.
 
 A `curviness` lies between 0 (straight pieces) and 1 (as round as it gets). Numbers left out are
 chosen by OpenSim.

@@ -17,10 +17,10 @@ from collections.abc import Callable, Iterable
 from osimlite.base.records import dataclass, field
 
 MAX_STATES = 2000
-"""States of one pattern. A repetition such as `x{100}` has the states of `x` a hundred times."""
+"""Largest number of states of a pattern; `x{100}` has the states of `x` a hundred times."""
 
 MAX_NESTING = 50
-"""Groups within groups."""
+"""Largest depth of nested groups."""
 
 CharacterTest = Callable[[str], bool]
 
@@ -42,11 +42,11 @@ _NAMED_CLASSES = {
 
 
 class PatternError(ValueError):
-    """A text is no regular expression, or one that is not supported."""
+    """Error for a text that is no regular expression, or one that is not supported."""
 
 
 class UnsupportedPatternError(PatternError):
-    """A regular expression that `std::regex` may take and this engine does not."""
+    """Error for a regular expression that `std::regex` may accept but this engine does not."""
 
 
 @dataclass

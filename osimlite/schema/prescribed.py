@@ -1,4 +1,4 @@
-"""Forces known beforehand: as functions of time, or as columns of a data file."""
+"""Prescribed and measured forces: functions of time, or columns of a data file."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Reporters, which collect outputs during a simulation, and sources of data to put in."""
+"""Reporters, which collect outputs during a simulation, and sources of input data."""
 
 from typing import Annotated
 

@@ -67,8 +67,8 @@ def animate(
     """Draw a motion as an animated GIF.
 
     The film shows the bodies' geometry (a stick figure for bodies without), contact surfaces, paths
-    and markers, half spaces as ground, and the contact forces as arrows; the camera follows what
-    moves.
+    and markers, half spaces as ground, and the contact forces as arrows; the camera follows the
+    moving bodies.
 
     Args:
         model: model that moves.

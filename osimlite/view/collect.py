@@ -167,7 +167,7 @@ class _SceneCollector:
 
     # ------------------------------------------------------------------------------------- kinds of components
     def _add_component(self, component: Component, path: str) -> None:
-        """Add what represents a component in the scene; components without a visible part add nothing."""
+        """Add the visible parts of a component to the scene, if it has any."""
         match component:
             # The axes of a frame belong to the layer "frames", which has its own switch.
             case geometry.FrameGeometry():

@@ -148,7 +148,7 @@ def _find_point(
     tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None
 ) -> tuple[int, Any] | None:
     """Return the body of a component and its point (3,) there, or those of the nearest owner that has a position."""
-    # 1. What is drawn of it; 2. its place in the mechanism; 3. its owner.
+    # 1. A drawn part of the component; 2. its place in the mechanism; 3. its owner.
     while component is not None:
         path = tree.path_of(component) or ""
         drawn_item = next(

@@ -96,7 +96,7 @@ def _draw_pages(
     panels: Sequence[tuple[str, str, str]],
     units: Mapping[str, str],
 ) -> Iterator[Any]:
-    """Yield pages of panels, each with abscissa, ordinate, and what the color shows."""
+    """Yield pages of panels, each with abscissa, ordinate, and the quantity of the color."""
 
     def label(name: str) -> str:
         return f"{name} ({units[name]})" if units.get(name) else name

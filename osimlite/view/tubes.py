@@ -231,7 +231,7 @@ def _unit_or_zero(a: Vector) -> Vector:
 
 
 def _find_perpendicular(a: Vector) -> Vector:
-    """Return a vector at right angles to another: across the axis from which it points away most."""
+    """Return a vector perpendicular to another, and to the axis along which that is shortest."""
     x, y, z = a
     least = min(abs(x), abs(y), abs(z))
     axis = 0 if abs(x) == least else (1 if abs(y) == least else 2)

@@ -1,4 +1,4 @@
-"""Goals of Moco: what an optimization makes small, or keeps at given values."""
+"""Goals of Moco: quantities that an optimization minimizes, or keeps at given values."""
 
 from typing import Annotated
 

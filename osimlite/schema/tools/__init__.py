@@ -1,1 +1,1 @@
-"""Setup files: the tools that OpenSim runs on models, and what they are told."""
+"""Setup files: the tools that OpenSim runs on models, and their settings."""

@@ -1,4 +1,4 @@
-"""The fit of polynomials to the paths of muscles."""
+"""Fit of polynomials to the paths of muscles."""
 
 from typing import Annotated
 

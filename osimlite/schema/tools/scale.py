@@ -1,4 +1,4 @@
-"""The scale tool: a generic model made as large and as heavy as a subject."""
+"""Scale tool: scaling of a generic model to the size and mass of a subject."""
 
 from typing import Annotated
 

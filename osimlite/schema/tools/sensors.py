@@ -1,4 +1,4 @@
-"""Inertial sensors: how they are put onto a model, and how their files are read."""
+"""Inertial sensors: their placement on a model, and settings for reading their files."""
 
 from typing import Annotated
 
