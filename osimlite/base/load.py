@@ -56,7 +56,7 @@ def import_user_module(name: str) -> ModuleType:
     """Import a module that a user names, also from the current folder.
 
     Returns:
-        The module.
+        Imported module.
 
     Raises:
         OsimliteError: the module cannot be imported.

@@ -92,7 +92,7 @@ def open_process_pool(
         cluster: address of a Dask scheduler; default local processes.
 
     Yields:
-        The pool.
+        Open pool, which accepts tasks.
 
     Raises:
         SettingError: both a cluster and a number of workers are given, or the number is below one.

@@ -37,7 +37,7 @@ def require(module: str, *, extra: str, purpose: str, alternative: str = "") -> 
         alternative: alternative that works without it, if any.
 
     Returns:
-        The module.
+        Imported module.
 
     Raises:
         MissingDependency: the package is not installed, or cannot be loaded.

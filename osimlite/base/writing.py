@@ -258,7 +258,7 @@ def find_marked_folder(folder: Path, shared_folders: set[str]) -> str | None:
     """Return the nearest of a folder and those above it that is marked as the top of a project.
 
     Args:
-        folder: absolute path.
+        folder: absolute path of the folder where the search begins.
         shared_folders: folders above projects, such as the home folder, where the search ends: a
             mark there does not make one project of all that is below.
 
@@ -399,11 +399,11 @@ def make_folder(path: str | Path) -> Path:
 def prepare_folder(path: str | Path) -> Iterator[Path]:
     """Make a folder before long work begins, and remove it if the work fails without a file.
 
-    path: folder to make, if it does not exist.
-        path: the folder.
+    Args:
+        path: folder to make, if it does not exist.
 
     Yields:
-        The folder.
+        Path of the folder.
 
     Raises:
         OsimliteError: the folder cannot be made or written to; the message says why.

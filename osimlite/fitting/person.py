@@ -348,7 +348,7 @@ class _PersonFit:
         """Fit the poses for sizes and offsets, and compute the cost.
 
         Args:
-            sizes: sizes (k,).
+            sizes: sizes of the segments (k,), see :class:`osimlite.fitting.segments.Segments`.
             offsets: offsets of the markers (m, 3), m.
             starts: initial poses (t, n).
         """

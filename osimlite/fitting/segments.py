@@ -98,7 +98,7 @@ class Segments(NamedTuple):
         """Return the factors of each body along its axes for parameters (k,).
 
         Args:
-            sizes: parameters (k,).
+            sizes: parameters (k,), the scale factors that segments share.
 
         Returns:
             Factors by name of the body.

@@ -57,7 +57,7 @@ class ScalableMarkers:
         """Scale the mechanism.
 
         Args:
-            sizes: parameters (k,).
+            sizes: parameters (k,) that determine the scale factors.
 
         Returns:
             The mechanism, and the stations of its markers.
@@ -96,7 +96,7 @@ class ScaledPoseFit:
 
     Args:
         shape: markers of the model.
-        sizes: parameters (k,).
+        sizes: parameters (k,) that determine the scale factors.
         offsets: offsets of the markers from the scaled model (m, 3), m.
         weights: weights of the markers (m,).
     """

@@ -49,7 +49,7 @@ def validate(
         config: complete configuration, instead of `select`, `ignore` and `classes`.
 
     Returns:
-        The findings.
+        Report with the findings.
 
     Raises:
         MissingFileError: the file is missing or cannot be read. Errors inside a file are findings.

@@ -109,7 +109,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
         recall: whether to run these rules where cached results exist, even without `measure`.
 
     Returns:
-        The report.
+        Report with the findings that no comment ignores.
     """
     findings: list[Finding] = []
     selected = [

@@ -38,10 +38,10 @@ def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[in
     Args:
         setup: setup of a tool.
         motion: table of coordinates.
-        time: time, s.
+        time: time of the pose, s.
 
     Returns:
-        The poses by the identity of the body.
+        Poses by the identity of the body.
     """
     angles = find_angles(setup)
     radians_per_unit = (

@@ -373,7 +373,7 @@ def all_rules(about: str = "") -> tuple[Rule, ...]:
             rules may be missing. Empty for all.
 
     Returns:
-        The rules.
+        Rules of the loaded modules.
     """
     for subject, modules in RULE_MODULES.items():
         for module in modules:

@@ -52,8 +52,8 @@ def find_nearest_name(text: str, valid_texts: list[str]) -> str | None:
     """Return the nearest valid text; paths are compared by their last names. None if none is near.
 
     Args:
-        text: wrong text.
-        valid_texts: valid texts.
+        text: text that is not valid.
+        valid_texts: candidates, among which the nearest is searched.
     """
     nearest_text = find_nearest(text, valid_texts, cutoff=70)
     last_name = text.rstrip("/").rpartition("/")[2]
@@ -70,8 +70,8 @@ def suggest_names(unknown_texts: Iterable[str], valid_texts: Iterable[str]) -> s
     """Return a question with suggestions for wrong texts, to end a message; empty without suggestions.
 
     Args:
-        unknown_texts: wrong texts.
-        valid_texts: valid texts.
+        unknown_texts: texts that are not valid.
+        valid_texts: candidates for suggestions.
     """
     sorted_texts = sorted(valid_texts)
     suggestions = [

@@ -198,7 +198,7 @@ class Object(BaseModel, metaclass=ObjectType):
             home: model that the object will belong to.
 
         Returns:
-            The instance.
+            New instance of the class.
         """
         # Default objects and lists are made on first access (see `__getattr__`), because most are never
         # used.
@@ -223,7 +223,7 @@ class Object(BaseModel, metaclass=ObjectType):
             values: values by property.
 
         Returns:
-            The instance.
+            New instance of the class.
         """
         return cls.build(values, set(values) if _fields_set is None else _fields_set)
 

@@ -41,8 +41,8 @@ def find_differences(old: Object, new: Object) -> list[Difference]:
     A property that is missing equals one with its default value.
 
     Args:
-        old: first document.
-        new: second document.
+        old: object at the top of the first document.
+        new: object at the top of the second document.
     """
     if isinstance(old, Model) and isinstance(new, Model):
         # Only models have a tree of components with paths.

@@ -1,4 +1,4 @@
-"""Curves of the Millard muscles (Millard et al. 2013): dimensionless, smooth, of few parameters.
+"""Smooth, dimensionless curves of the muscles of Millard et al. (2013), with measurable parameters.
 
 A `curviness` lies between 0 (straight pieces) and 1 (as round as it gets). Numbers left out are
 chosen by OpenSim.

@@ -158,7 +158,7 @@ class GeometryPath(AbstractGeometryPath):
             name: name of the point; by default ``<path>-P<number>``, as in OpenSim's models.
 
         Returns:
-            The point.
+            New point of the path.
         """
         points = self.path_point_set.objects
         name = name or f"{self.name}-P{len(points) + 1}"

@@ -236,7 +236,7 @@ def list_tags() -> tuple[str, ...]:
     """Return the tags of all concrete classes, sorted.
 
     Returns:
-        The tags.
+        Tags of OpenSim's classes and of registered plug-ins.
     """
     renamed = {name: tag for tag, name in _TAGS.items()}
     class_names = (renamed.get(name, name) for name in (*MODULES, *_further))
@@ -251,7 +251,7 @@ def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
     them takes a third of a second.
 
     Returns:
-        The classes.
+        Classes of these modules, then those of plug-ins.
     """
     # The word is looked for in the source text, which costs less than importing a module.
     modules = {module for module in MODULES.values() if _mentions_word(module, word)}
@@ -283,6 +283,6 @@ def list_class_tags(cls: type[Object]) -> tuple[str, ...]:
     """Return the tags of a class and of classes derived from it, sorted.
 
     Returns:
-        The tags.
+        Tags of concrete classes.
     """
     return tuple(tag for tag in list_tags() if issubclass(find_class(tag) or type(None), cls))

@@ -144,7 +144,7 @@ def _resolve_files(job: Job, setup_object: Object) -> Any:
         setup_object: object of the setup; it is changed in place.
 
     Returns:
-        The object.
+        `setup_object` itself.
     """
     for component in setup_object.walk():
         for spec in get_file_specs(type(component), "file"):

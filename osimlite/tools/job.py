@@ -98,7 +98,7 @@ class Job:
             cls: class of the object.
 
         Returns:
-            The object.
+            Object at the top of the document.
 
         Raises:
             DocumentError: the file is missing or holds another class.

@@ -55,7 +55,7 @@ def compute_quantities(records: Mapping[str, Array], muscles: Sequence[Any]) -> 
 
     Args:
         records: rows (t, m) of `LAW_RECORDS`, and of SPRING if the law records it.
-        muscles: m muscles.
+        muscles: m muscles of one class, in the order of the columns.
     """
     length = records["fiber_length"]
     cos = records["cos_pennation"]

@@ -350,7 +350,7 @@ def _draw_errors(
         limits: limits of the root mean square and of the largest error.
 
     Returns:
-        The figure.
+        Figure of matplotlib.
     """
     is_measured = np.isfinite(errors)
     known_errors = np.where(is_measured, errors, 0.0)

@@ -264,8 +264,8 @@ class TrackingTasks:
 
         Args:
             desired: values, rates, speeds and accelerations of the desired motion (4, n).
-            q: values (n,).
-            u: speeds (n,).
+            q: values of the coordinates (n,), rad or m.
+            u: generalized speeds (n,).
 
         Returns:
             Errors of the values and of the speeds, each (k,) for k tasks.
@@ -338,8 +338,8 @@ class ForceDistribution:
 
         Args:
             t: time, s.
-            q: values (n,).
-            u: speeds (n,).
+            q: values of the coordinates (n,), rad or m.
+            u: generalized speeds (n,).
 
         Returns:
             Accelerations without actuator forces (n,), by each actuator force (n, a), and by each
@@ -363,8 +363,8 @@ class ForceDistribution:
 
         Args:
             t: time, s.
-            q: values (n,).
-            u: speeds (n,).
+            q: values of the coordinates (n,), rad or m.
+            u: generalized speeds (n,).
             requested: requested accelerations (k,).
             errors: errors of the tasks (k,).
             bounds: lower and upper bounds of the forces (a,).
@@ -417,8 +417,8 @@ class ForceDistribution:
 
         Args:
             t: time, s.
-            q: values (n,).
-            u: speeds (n,).
+            q: values of the coordinates (n,), rad or m.
+            u: generalized speeds (n,).
             columns: accelerations of the tasks by each force (k, a).
             accelerations: accelerations that the forces must give (k,).
             lightness: accelerations of the tasks by each generalized force (k, k).

@@ -57,7 +57,7 @@ def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
 
     Args:
         tree: components of the model.
-        fidelity: account.
+        fidelity: account of the translation; records are added.
     """
     accounted = {record.component for record in fidelity.records} | fidelity.translated.keys()
     dropped: set[int] = set()

@@ -147,7 +147,7 @@ class ModelView:
             story: title, text and settings of the page, which may play the motion at once.
 
         Returns:
-            The path.
+            Path of the written file.
         """
         write_atomically(path, self.page_text(story))
         return Path(path)
@@ -180,7 +180,7 @@ class ModelView:
             time: time of the motion, s; the first time if None.
 
         Returns:
-            The path.
+            Path of the written file.
 
         Raises:
             OsimliteError: the time is outside of the motion, or the format is unknown.

@@ -404,7 +404,7 @@ def write_pages(figures: Iterable[Any], folder: Path, file_stem: str) -> list[Pa
         file_stem: name of the first file, without its suffix.
 
     Returns:
-        The files.
+        Paths of the written files.
 
     Raises:
         OsimliteError: a file cannot be written.

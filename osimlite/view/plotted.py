@@ -51,7 +51,7 @@ class Pages(list[tuple[str, Any]]):
             folder: folder to write into; it is made if it does not exist.
 
         Returns:
-            The files.
+            Paths of the written files.
 
         Raises:
             OsimliteError: the folder or a file cannot be written.

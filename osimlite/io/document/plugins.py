@@ -488,7 +488,7 @@ class _Declarations:
             words: words of the file that lead to it, for the line of an error.
 
         Returns:
-            The value.
+            `value` itself.
         """
         if not isinstance(value, dict):
             raise self.make_error(f"{description} must be an object of JSON, in braces", *words)

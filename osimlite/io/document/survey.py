@@ -101,7 +101,7 @@ def _read_survey_document(
         expected_class: class of the top object.
 
     Returns:
-        The survey.
+        `survey` with the document, or with one more error.
     """
     # A wrong version has its own error already; the current rules fit most documents.
     try:

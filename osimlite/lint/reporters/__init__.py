@@ -41,7 +41,7 @@ def render(
             for similar ones. The formats for programs always have every finding.
 
     Returns:
-        The text.
+        Text of the report.
 
     Raises:
         OsimliteError: the format is unknown.

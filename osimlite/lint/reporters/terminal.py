@@ -76,7 +76,7 @@ def describe_skipped(report: Report, everything: bool) -> str:
         everything: whether to name the files rather than to count them.
 
     Returns:
-        The sentence.
+        Sentence, or "" if no file was skipped.
     """
     if not report.passed:
         return ""
@@ -251,7 +251,7 @@ def render_full(
         everything: whether to show every finding instead of folding similar ones.
 
     Returns:
-        The text.
+        Text of the report with a closing line.
     """
     blocks: list[str] = []
     all_folds = fold_findings(report.findings, everything=everything)

@@ -30,7 +30,7 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
     Args:
         force: muscle or other force along a path.
         lengths: lengths of the path (L,) (m).
-        activations: activations (A,).
+        activations: activations (A,), on which only muscles depend.
 
     Returns:
         Tensions (A, L) (N); NaN where a muscle has no equilibrium.

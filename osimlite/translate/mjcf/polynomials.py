@@ -118,7 +118,7 @@ def sample_function(function: f.SmoothFunction, x: Array) -> Array:
 
     Args:
         function: function of one argument.
-        x: arguments (k,).
+        x: values of the argument (k,).
 
     Raises:
         FloatingPointError: a value is too large for a fit.

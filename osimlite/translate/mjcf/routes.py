@@ -62,7 +62,7 @@ class Router:
     """Search for the tendon nearest to a path.
 
     Args:
-        route: path.
+        route: path to which tendons are compared.
         samples: samples of the path in the poses.
         poses: poses in which tendons are compared.
         version: major version of MuJoCo.

@@ -48,7 +48,7 @@ class WrapGeom:
         body: index of the body.
         frame: frame of the surface in the body (4, 4); the axis of a cylinder is z.
         kind: "sphere" or "cylinder".
-        radius: radius (m).
+        radius: radius of the sphere or cylinder (m).
         side: side site, or None.
         length: length of the cylinder as it is drawn (m); MuJoCo wraps around an infinite one.
         name: name of the wrap object; "" for a surface that the path does not have.
@@ -81,8 +81,8 @@ class WrapGeom:
         """Return a copy with another frame and radius; the side site moves along.
 
         Args:
-            frame: frame in the body (4, 4).
-            radius: radius (m).
+            frame: new frame of the surface in the body (4, 4).
+            radius: new radius (m).
         """
         if self.side is None:
             return replace(self, frame=frame, radius=radius)

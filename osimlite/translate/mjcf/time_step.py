@@ -131,7 +131,7 @@ def _differentiate_forces(
 
     Args:
         draft: MJCF under construction.
-        elements: forces.
+        elements: force elements whose generalized forces are differentiated.
         coordinate_changes: directions of the coordinates (n, f).
         speed_changes: directions of the speeds (n, f).
 
