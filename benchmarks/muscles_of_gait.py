@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 import osimlite
-from _moco_studies import CORE, GAIT, TESTS, gait_tool, sources
+from _moco_studies import CORE, GAIT, TESTS, copy_sources, make_gait_inverse
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable, read_sto, write_sto
 from osimlite.moco import MocoTrajectory
@@ -43,7 +43,7 @@ def main(core: Path, picture: str) -> None:
     """Solve with both methods, print the table, and draw the picture if its name is not empty."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        sources(core, TESTS, GAIT, folder)
+        copy_sources(core, TESTS, GAIT, folder)
         solution = solve_moco_inverse(folder)
         states = solution.states
         write_sto(folder / "states.sto", "", states.times, states.columns, states.rows)
@@ -74,7 +74,7 @@ def main(core: Path, picture: str) -> None:
 
 def solve_moco_inverse(folder: Path) -> MocoTrajectory:
     """Solve MocoInverse with the files of a folder, and print how the solver ended."""
-    solution = osimlite.moco.solve_inverse(gait_tool(), folder=folder)
+    solution = osimlite.moco.solve_inverse(make_gait_inverse(), folder=folder)
     print(
         f"MocoInverse: {solution.status}, {solution.iterations} iterations, "
         f"objective {solution.objective:.6g}"
@@ -91,7 +91,7 @@ def write_models(folder: Path) -> list[str]:
     Returns:
         Names of the muscles.
     """
-    operators = gait_tool().model.operators
+    operators = make_gait_inverse().model.operators
     # The last operator adds external loads, which the analyses take from their setup file.
     for file, file_operators in (("moco.osim", operators[:-1]), ("millard.osim", operators[:1])):
         model = process_model(

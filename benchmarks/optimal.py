@@ -34,7 +34,7 @@ from statistics import median
 from typing import NamedTuple
 
 import osimlite
-from _moco_studies import CORE, LONG, STUDIES, kept
+from _moco_studies import CORE, LONG, STUDIES, get_saved_study
 from osimlite.base.records import replace
 from osimlite.moco import MocoTrajectory
 
@@ -197,7 +197,7 @@ def main(names: list[str], core: Path, rounds: int) -> None:
 
 def _write_warm_up(folder: Path, core: Path) -> Path:
     """Write a small study, which a process solves before the timed one; return its file."""
-    kept("sliding-100")(folder, core)
+    get_saved_study("sliding-100")(folder, core)
     file = folder / "study.omoco"
     text = file.read_text(encoding="utf-8")
     file.write_text(
