@@ -1,23 +1,25 @@
-"""OpenSim's own example of an optimisation, the walker that is to get far in ten seconds, done by both programs.
+"""OpenSim's example of an optimisation, a walker that should get far in ten seconds, with both programs.
 
-The example varies nine numbers of the start: the angles of hips and knees, the forward speed of the
-pelvis, and the angular speeds of hips and knees. It makes the distance large, less 10 times the
-square of what the forward speed lies outside 0 to 2 m/s, by cma with populations of 20, a step of
-0.5, tolerances of 1e-3 and 100 evaluations. Both programs do so on the same model with the same
-random numbers; OpenSim by a loop over its Manager, as in the example, osimlite by `optimize` with
-an objective in Python. Both ask for the same points, and put them into the same order.
+    python benchmarks/optimize.py 1 2 3        # three seeds, compared with OpenSim
+    python benchmarks/optimize.py --ours 20    # twenty seeds, osimlite only
 
-In ten seconds of contacts the last bit of a number grows to millimetres, so that no two programs
-agree on a distance more closely than one of them with itself: the table shows what OpenSim makes of
-its best start when one of the nine numbers, each in turn, is moved to the floating-point number
-next to it.
+The example varies nine variables of the initial state: the angles of hips and knees, the forward
+speed of the pelvis, and the rates of hips and knees. It maximizes the distance, less 10 times the
+square of the amount by which the forward speed is outside 0 to 2 m/s. The optimizer is CMA-ES with
+populations of 20, an initial step of 0.5, tolerances of 1e-3 and 100 evaluations. Both programs do
+this with the same model and the same random numbers: OpenSim with a loop over its Manager, as in the
+example, osimlite with `optimize` and an objective in Python. Both evaluate the same candidates and
+rank them in the same order.
 
-Then `osimlite optimize` with the numbers within bounds: with as many evaluations by sobol-cma,
-which is made for few, and with twenty times as many by cma. In turn; times by the clock are of all
-that follows once the model is read, and osimlite writes history and model within its.
+In ten seconds of contact, a change of the last bit of a number grows to millimetres. No two programs
+can agree on a distance more closely than one of them with itself. The first table therefore has the
+distances of OpenSim's best start when one of the nine variables at a time is replaced by the next
+floating-point number.
 
-    python benchmarks/optimize.py 1 2 3        # these seeds
-    python benchmarks/optimize.py --ours 20    # twenty seeds, osimlite alone
+The second table is of `osimlite optimize` with bounds of the variables: with as many evaluations by
+sobol-cma, which is made for few evaluations, and with twenty times as many by cma. The programs run
+in turn. Times are wall-clock times of everything after reading the model; osimlite's include writing
+history and model.
 """
 
 from __future__ import annotations
@@ -45,154 +47,231 @@ from osimlite.studies.sweep.variables import Floats, Range
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 JOINTS = ("LHip_rz", "RHip_rz", "LKnee_rz", "RKnee_rz")
-FORWARD = "Pelvis_tx/speed"
-NAMES = (*JOINTS, FORWARD, *(f"{name}/speed" for name in JOINTS))
-TO, BUDGET, POPULATION, STEP, TOLERANCE, FIRST_SPEED, WEIGHT = 10.0, 100, 20, 0.5, 1e-3, 0.1, 10.0
-SEEDS = (1, 2, 3, 4, 5)
-WITHIN, LONGER = 0.7, 20
-UNITS = "distance of the pelvis in m, time by the clock in s"
+FORWARD_SPEED = "Pelvis_tx/speed"
+VARIABLES = (*JOINTS, FORWARD_SPEED, *(f"{name}/speed" for name in JOINTS))
+"""Variables of the search, in the order of the example."""
+
+TO = 10.0
+"""End of each simulation (s)."""
+
+BUDGET = 100
+"""Number of evaluations of the example."""
+
+POPULATION = 20
+"""Number of candidates of a generation."""
+
+STEP = 0.5
+"""Initial step of the search (rad, m/s and rad/s)."""
+
+TOLERANCE = 1e-3
+"""Changes of variables and costs below which the search stops."""
+
+START_SPEED = 0.1
+"""Forward speed of the first candidate (m/s)."""
+
+PENALTY_WEIGHT = 10.0
+"""Weight of the squared speed outside its bounds (m per m^2/s^2)."""
+
+DEFAULT_SEEDS = (1, 2, 3, 4, 5)
+
+BOUND = 0.7
+"""Distance of the bounds from the first candidate, unless a variable has others (rad, rad/s)."""
+
+LONG_FACTOR = 20
+"""Factor of the number of evaluations in the longer search."""
+
+CAPTION = "distance of the pelvis in m, wall-clock time in s"
 T = TypeVar("T")
 
 
-def penalty(speed: float) -> float:
-    return WEIGHT * (min(speed, 0.0) ** 2 + max(speed - 2.0, 0.0) ** 2)
+def compute_penalty(speed: float) -> float:
+    """Return the cost (m) of a forward speed (m/s) outside 0 to 2 m/s."""
+    return PENALTY_WEIGHT * (min(speed, 0.0) ** 2 + max(speed - 2.0, 0.0) ** 2)
 
 
-def cost(run: Any) -> float:
-    return penalty(run.start[FORWARD]) - run.end["Pelvis_tx"]
+def compute_cost(run: Any) -> float:
+    """Return the cost (m) of a simulation, for osimlite's objective."""
+    return compute_penalty(run.start[FORWARD_SPEED]) - run.end["Pelvis_tx"]
 
 
 def main() -> None:
     console = Console(width=120)
-    first = starting_point()
+    start = read_start()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        # What of machine code is not in the cache yet.
-        as_the_example(first, 0, folder / "warm", POPULATION)
+        # Compile the machine code that is not in the cache yet, so that this is not timed.
+        optimize_as_example(start, 0, folder / "warm", POPULATION)
         if sys.argv[1:2] == ["--ours"]:
-            console.print(ours_alone(first, range(1, 1 + int(sys.argv[2])), folder))
+            console.print(compare_methods(start, range(1, 1 + int(sys.argv[2])), folder))
         else:
-            for table in side_by_side(first, [int(word) for word in sys.argv[1:]] or SEEDS, folder):
+            seeds = [int(word) for word in sys.argv[1:]] or DEFAULT_SEEDS
+            for table in compare_with_opensim(start, seeds, folder):
                 console.print(table)
 
 
-def side_by_side(first: Floats, seeds: Sequence[int], folder: Path) -> list[Table]:
+def create_table(title: str, headings: Sequence[str]) -> Table:
+    """Return an empty table; a column without heading has names."""
+    table = Table(title=title, caption=CAPTION)
+    for heading in headings:
+        table.add_column(heading, justify="right" if heading else "left")
+    return table
+
+
+def compare_with_opensim(start: Floats, seeds: Sequence[int], folder: Path) -> list[Table]:
+    """Optimize with both programs in turn.
+
+    Args:
+        start: first candidate (9,).
+        seeds: seeds of the random numbers, one row each.
+        folder: folder for osimlite's results.
+    """
     import opensim
 
     opensim.Logger.setLevelString("off")
-    example = Table(
-        title=f"The example's settings, {BUDGET} evaluations of {TO:g} s", caption=UNITS
+    example = create_table(
+        f"The example's settings, {BUDGET} evaluations of {TO:g} s",
+        (
+            "seed",
+            "OpenSim",
+            "with last bits changed: least",
+            "greatest",
+            "OpenSim, s",
+            "osimlite",
+            "osimlite, s",
+            "speed-up",
+        ),
     )
-    for heading in (
-        "seed",
-        "OpenSim",
-        "its last bits: least",
-        "most",
-        "s",
-        "osimlite",
-        "s",
-        "times as fast",
-    ):
-        example.add_column(heading, justify="right")
-    own = Table(title="osimlite's own settings, within bounds", caption=UNITS)
-    for heading in (
-        "seed",
-        f"{BUDGET} evaluations",
-        "less OpenSim's",
-        "s",
-        f"{LONGER * BUDGET} evaluations",
-        "s",
-    ):
-        own.add_column(heading, justify="right")
+    bounded = create_table(
+        "osimlite's own settings, with bounds",
+        (
+            "seed",
+            f"{BUDGET} evaluations",
+            "minus OpenSim's",
+            "s",
+            f"{LONG_FACTOR * BUDGET} evaluations",
+            "s",
+        ),
+    )
     for seed in seeds:
-        (theirs, moved), slow = timed(partial(by_opensim, opensim, first, seed))
-        slow -= moved.seconds
-        where = folder / str(seed)
-        ours, fast = timed(partial(as_the_example, first, seed, where / "same", BUDGET))
-        spread = (f"{min(moved.distances):.4f}", f"{max(moved.distances):.4f}")
+        (theirs, perturbed), their_seconds = measure(
+            partial(optimize_in_opensim, opensim, start, seed)
+        )
+        # The simulations with changed bits are no part of the optimisation.
+        their_seconds -= perturbed.seconds
+        results = folder / str(seed)
+        ours, our_seconds = measure(
+            partial(optimize_as_example, start, seed, results / "same", BUDGET)
+        )
         example.add_row(
             str(seed),
             f"{theirs:.4f}",
-            *spread,
-            f"{slow:.2f}",
+            f"{min(perturbed.distances):.4f}",
+            f"{max(perturbed.distances):.4f}",
+            f"{their_seconds:.2f}",
             f"{ours:.4f}",
-            f"{fast:.3f}",
-            f"{slow / fast:.1f}",
+            f"{our_seconds:.3f}",
+            f"{their_seconds / our_seconds:.1f}",
         )
-        few, took = timed(
-            partial(within_bounds, first, seed, where / "few", BUDGET, method="sobol-cma")
+        few, few_seconds = measure(
+            partial(optimize_with_bounds, start, seed, results / "few", BUDGET, method="sobol-cma")
         )
-        many, longer = timed(partial(within_bounds, first, seed, where / "many", LONGER * BUDGET))
-        own.add_row(
+        many, many_seconds = measure(
+            partial(optimize_with_bounds, start, seed, results / "many", LONG_FACTOR * BUDGET)
+        )
+        bounded.add_row(
             str(seed),
             f"{few:.4f}",
             f"{few - theirs:+.4f}",
-            f"{took:.3f}",
+            f"{few_seconds:.3f}",
             f"{many:.4f}",
-            f"{longer:.3f}",
+            f"{many_seconds:.3f}",
         )
-    return [example, own]
+    return [example, bounded]
 
 
-def ours_alone(first: Floats, seeds: Sequence[int], folder: Path) -> Table:
-    """How far each way of searching gets, over many seeds."""
-    ways: dict[str, Callable[[int, Path], float]] = {
-        "the example's settings": lambda seed, where: as_the_example(first, seed, where, BUDGET),
-        "cma within bounds": lambda seed, where: within_bounds(
-            first, seed, where, BUDGET, method="cma"
+def compare_methods(start: Floats, seeds: Sequence[int], folder: Path) -> Table:
+    """Return a table of the distances that each method of osimlite reaches with many seeds.
+
+    Args:
+        start: first candidate (9,).
+        seeds: seeds of the random numbers.
+        folder: folder for the results.
+    """
+    methods: dict[str, Callable[[int, Path], float]] = {
+        "the example's settings": lambda seed, results: optimize_as_example(
+            start, seed, results, BUDGET
         ),
-        "sobol-cma within bounds": lambda seed, where: within_bounds(
-            first, seed, where, BUDGET, method="sobol-cma"
+        "cma with bounds": lambda seed, results: optimize_with_bounds(
+            start, seed, results, BUDGET, method="cma"
+        ),
+        "sobol-cma with bounds": lambda seed, results: optimize_with_bounds(
+            start, seed, results, BUDGET, method="sobol-cma"
         ),
     }
-    table = Table(title=f"{BUDGET} evaluations of {TO:g} s, {len(seeds)} seeds", caption=UNITS)
-    for heading in (
-        "",
-        "least",
-        "quarter",
-        "median",
-        "three quarters",
-        "most",
-        "farther than the example's",
-        "s",
-    ):
-        table.add_column(heading, justify="right" if heading else "left")
+    table = create_table(
+        f"{BUDGET} evaluations of {TO:g} s, {len(seeds)} seeds",
+        (
+            "",
+            "least",
+            "quarter",
+            "median",
+            "three quarters",
+            "greatest",
+            "farther than the example's",
+            "s",
+        ),
+    )
+    # The first method is the one that the others are compared with, seed by seed.
     example: list[float] = []
-    for name, way in ways.items():
+    for name, method in methods.items():
         started = time.perf_counter()
-        found = [way(seed, folder / name / str(seed)) for seed in seeds]
-        took = (time.perf_counter() - started) / len(seeds)
-        example = example or found
-        farther = sum(a > b for a, b in zip(found, example, strict=True))
-        quartiles = (f"{x:.3f}" for x in np.quantile(found, (0.0, 0.25, 0.5, 0.75, 1.0)))
+        distances = [method(seed, folder / name / str(seed)) for seed in seeds]
+        seconds = (time.perf_counter() - started) / len(seeds)
+        example = example or distances
+        farther = sum(a > b for a, b in zip(distances, example, strict=True))
+        quartiles = (f"{x:.3f}" for x in np.quantile(distances, (0.0, 0.25, 0.5, 0.75, 1.0)))
         table.add_row(
             name,
             *quartiles,
-            f"{farther} of {len(seeds)}" if found is not example else "",
-            f"{took:.3f}",
+            "" if distances is example else f"{farther} of {len(seeds)}",
+            f"{seconds:.3f}",
         )
     return table
 
 
-def timed(work: Callable[[], T]) -> tuple[T, float]:
+def measure(work: Callable[[], T]) -> tuple[T, float]:
+    """Call a function.
+
+    Returns:
+        Its result, and the wall-clock time (s).
+    """
     started = time.perf_counter()
     return work(), time.perf_counter() - started
 
 
-def starting_point() -> Floats:
-    model = build_mechanism(osimlite.read(MODEL))
-    values, speeds = model.default_state()
-    places = [model.coordinate_index(name) for name in JOINTS]
-    return np.array([*values[places], FIRST_SPEED, *speeds[places]])
+def read_start() -> Floats:
+    """Return the first candidate (9,): the default state of the model, with a forward speed."""
+    mechanism = build_mechanism(osimlite.read(MODEL))
+    values, speeds = mechanism.default_state()
+    indices = [mechanism.coordinate_index(name) for name in JOINTS]
+    return np.array([*values[indices], START_SPEED, *speeds[indices]])
 
 
-def as_the_example(first: Floats, seed: int, folder: Path, budget: int) -> float:
-    # Ranges of length one, which may be left, make a fraction of the ranges the step in rad and
-    # m/s.
-    vary = {name: (x - 0.5, x + 0.5) for name, x in zip(NAMES, first.tolist(), strict=True)}
-    found = optimize(
-        plan(osimlite.read(MODEL), vary, measures=(), to=TO),
-        Objective(cost, is_maximized=False),
+def optimize_as_example(start: Floats, seed: int, folder: Path, budget: int) -> float:
+    """Optimize by osimlite with the settings of the example, and return the distance (m).
+
+    Args:
+        start: first candidate (9,).
+        seed: seed of the random numbers.
+        folder: folder for the results.
+        budget: number of evaluations.
+    """
+    # osimlite's step is a fraction of the range. Ranges of length one, which candidates may leave,
+    # make it a step in rad and m/s, as in the example.
+    ranges = {name: (x - 0.5, x + 0.5) for name, x in zip(VARIABLES, start.tolist(), strict=True)}
+    result = optimize(
+        plan(osimlite.read(MODEL), ranges, measures=(), to=TO),
+        Objective(compute_cost, is_maximized=False),
         folder,
         budget=budget,
         popsize=POPULATION,
@@ -201,37 +280,64 @@ def as_the_example(first: Floats, seed: int, folder: Path, budget: int) -> float
         is_bounded=False,
         method="cma",
         seed=seed,
-        start=first.tolist(),
+        start=start.tolist(),
     )
-    return penalty(found.values[FORWARD]) - found.value
+    return compute_penalty(result.values[FORWARD_SPEED]) - result.value
 
 
-def within_bounds(first: Floats, seed: int, folder: Path, budget: int, **choices: Any) -> float:
-    vary: dict[str, Range] = {
-        name: (x - WITHIN, x + WITHIN) for name, x in zip(NAMES, first.tolist(), strict=True)
+def optimize_with_bounds(
+    start: Floats, seed: int, folder: Path, budget: int, **options: Any
+) -> float:
+    """Optimize by osimlite with bounds of the variables, and return the distance (m).
+
+    Args:
+        start: middle of most ranges (9,).
+        seed: seed of the random numbers.
+        folder: folder for the results.
+        budget: number of evaluations.
+        **options: further options of `optimize`.
+    """
+    ranges: dict[str, Range] = {
+        name: (x - BOUND, x + BOUND) for name, x in zip(VARIABLES, start.tolist(), strict=True)
     }
-    vary |= {FORWARD: (0.0, 2.0), "LKnee_rz": (-1.0, 0.0), "RKnee_rz": (-1.0, 0.0)}
-    made = plan(osimlite.read(MODEL), vary, measures=(), to=TO)
-    return optimize(made, Objective("distance"), folder, budget=budget, seed=seed, **choices).value
+    # The penalty of the example becomes a bound, and knees cannot be hyperextended.
+    ranges |= {FORWARD_SPEED: (0.0, 2.0), "LKnee_rz": (-1.0, 0.0), "RKnee_rz": (-1.0, 0.0)}
+    bounded_plan = plan(osimlite.read(MODEL), ranges, measures=(), to=TO)
+    result = optimize(
+        bounded_plan, Objective("distance"), folder, budget=budget, seed=seed, **options
+    )
+    return result.value
 
 
-class Moved(NamedTuple):
-    """Distances of the best start with one number moved by its last bit, and the time that this took."""
+class PerturbedDistances(NamedTuple):
+    """Distances of the best start with the last bit of one variable changed."""
 
     distances: list[float]
+    """Distances, two for each variable (m)."""
     seconds: float
+    """Time of these simulations (s)."""
 
 
-def by_opensim(opensim: Any, first: Floats, seed: int) -> tuple[float, Moved]:
-    """The distance of the best evaluation, and what last bits make of it."""
+def optimize_in_opensim(opensim: Any, start: Floats, seed: int) -> tuple[float, PerturbedDistances]:
+    """Optimize by a loop over OpenSim's Manager.
+
+    Args:
+        opensim: OpenSim's module.
+        start: first candidate (9,).
+        seed: seed of the random numbers.
+
+    Returns:
+        Distance of the best evaluation (m), and the distances with changed last bits.
+    """
     model = opensim.Model(str(MODEL))
     state = model.initSystem()
     coordinates = model.getCoordinateSet()
     joints = [coordinates.get(name) for name in JOINTS]
     forward = coordinates.get("Pelvis_tx")
-    found: list[tuple[float, float, list[float]]] = []
+    # Cost, distance and candidate of each evaluation.
+    evaluations: list[tuple[float, float, list[float]]] = []
 
-    def distance(row: list[float]) -> float:
+    def simulate(row: list[float]) -> float:
         for joint, angle, rate in zip(joints, row[:4], row[5:], strict=True):
             joint.setValue(state, angle, False)
             joint.setSpeedValue(state, rate)
@@ -239,29 +345,32 @@ def by_opensim(opensim: Any, first: Floats, seed: int) -> tuple[float, Moved]:
         forward.setSpeedValue(state, row[4])
         manager = opensim.Manager(model)
         manager.initialize(state)
-        reached: float = forward.getValue(manager.integrate(TO))
-        return reached
+        distance: float = forward.getValue(manager.integrate(TO))
+        return distance
 
-    def costs(points: Floats) -> Floats:
-        if len(found) + len(points) > BUDGET:
+    def compute_costs(points: Floats) -> Floats:
+        if len(evaluations) + len(points) > BUDGET:
             raise StopIteration
-        for row in (points - 0.5 + first).tolist():
-            reached = distance(row)
-            found.append((penalty(row[4]) - reached, reached, row))
-        return np.array([price for price, _, _ in found[-len(points) :]])
+        # Points are fractions of ranges of length one around the start.
+        for row in (points - 0.5 + start).tolist():
+            distance = simulate(row)
+            evaluations.append((compute_penalty(row[4]) - distance, distance, row))
+        return np.array([cost for cost, _, _ in evaluations[-len(points) :]])
 
+    middle = np.full(len(start), 0.5)
     with suppress(StopIteration):
         run_cma(
-            costs,
-            Search(np.full(len(first), 0.5), STEP, POPULATION, seed, False, BUDGET, TOLERANCE),
+            compute_costs,
+            Search(middle, STEP, POPULATION, seed, False, BUDGET, TOLERANCE),
         )
-    _, farthest, best = min(found)
+    _, distance, best = min(evaluations)
     started = time.perf_counter()
-    moved = []
-    for place, number in enumerate(best):
-        for end in (-inf, inf):
-            moved.append(distance([*best[:place], nextafter(number, end), *best[place + 1 :]]))
-    return farthest, Moved(moved, time.perf_counter() - started)
+    distances = []
+    for index, number in enumerate(best):
+        for direction in (-inf, inf):
+            neighbor = nextafter(number, direction)
+            distances.append(simulate([*best[:index], neighbor, *best[index + 1 :]]))
+    return distance, PerturbedDistances(distances, time.perf_counter() - started)
 
 
 if __name__ == "__main__":

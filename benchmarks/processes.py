@@ -1,10 +1,12 @@
-"""Whole processes beside OpenSim's, in turn: processor seconds of each and the ratio of each pair.
+"""Processor time of complete processes, compared with OpenSim.
 
     python benchmarks/processes.py [--rounds N] [NAME ...]
 
-Processor time is that of the finished process, so that a busy machine changes it little. The files
-are those of the reference data in the shared folder; what a first run leaves (byte code, results)
-is there when the time is taken.
+Each case is a tool of OpenSim or a simulation. osimlite and OpenSim run in turn, each in a process of
+its own. The table has the median processor times (s), and the median, least and greatest ratio of
+the times of a pair. Processor time is used because a busy machine changes it little. The files are
+those of the reference data in the shared folder. One pair runs before the timed ones, so that byte
+code and results of an earlier run exist, as they do for users.
 """
 
 from __future__ import annotations
@@ -30,10 +32,12 @@ REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"
 FIXTURES = Path(__file__).resolve().parent.parent / "fixtures"
 WALKER = FIXTURES / "walker/DynamicWalkerModel.osim"
 STEPS = FIXTURES / "pipelines/walking"
-TOOL = (
+"""Setups of RRA and CMC that track steps of gait10."""
+
+TOOL_SCRIPT = (
     "import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}('{setup}').run()"
 )
-SIMULATION = """
+SIMULATION_SCRIPT = """
 import opensim
 opensim.Logger.setLevelString("off")
 model = opensim.Model("DynamicWalkerModel.osim")
@@ -50,12 +54,15 @@ class Case(NamedTuple):
 
     name: str
     folder: Path
+    """Working folder of both."""
     ours: list[str]
+    """Command of osimlite."""
     theirs: list[str]
+    """Command of OpenSim."""
 
 
 def unpack(folder: Path, source: str) -> Path:
-    """Put a folder of the reference data into another, uncompressed; return where it is."""
+    """Copy a folder of the reference data into another, uncompressed, and return the copy."""
     target = folder / source
     target.mkdir()
     for file in sorted((REFERENCE / source).iterdir()):
@@ -67,16 +74,16 @@ def unpack(folder: Path, source: str) -> Path:
 
 
 def unpack_model(name: str, target: Path) -> None:
-    """Write a model of the reference data, uncompressed."""
+    """Write a model of the reference data to a file, uncompressed."""
     target.write_bytes(gzip.decompress((REFERENCE / "models" / f"{name}.osim.gz").read_bytes()))
 
 
 def unpack_steps(folder: Path) -> Path:
-    """Put the files of the tools that track steps of gait10 into a folder; return where it is."""
+    """Copy the files of the tools that track steps of gait10 into a folder, and return it."""
     target = unpack(folder, "analyses_gait10")
     for setup in STEPS.iterdir():
         shutil.copy(setup, target)
-    # The setups have names of their own for the same files.
+    # The setups use other names for files of the reference data.
     for name, source in (("loads.xml", "grf.xml"), ("reserves.xml", "reserve.xml")):
         shutil.copy(target / source, target / name)
     unpack_model("gait10_subject01", target / "model.osim")
@@ -84,12 +91,12 @@ def unpack_steps(folder: Path) -> Path:
 
 
 def list_cases(folder: Path) -> list[Case]:
-    """Return what is timed, with its files put below a folder."""
+    """Return the cases, whose files are copied into subfolders of a folder."""
     osimlite = [sys.executable, "-m", "osimlite"]
     cases = []
     gait2354 = unpack(folder, "ik_id_gait2354")
     unpack_model("gait2354_subject01_simbody", gait2354 / "subject01_simbody.osim")
-    # Inverse dynamics reads what inverse kinematics writes; either may be chosen alone.
+    # Inverse dynamics reads the result of inverse kinematics, which may not be among the cases to run.
     shutil.copy(gait2354 / "ik_accuracy_1e-5.mot", gait2354 / "subject01_walk1_ik.mot")
     steps = unpack_steps(folder)
     for name, source, setup in (
@@ -97,7 +104,7 @@ def list_cases(folder: Path) -> list[Case]:
         ("ScaleTool", unpack(folder, "scale_gait2354"), "scale.xml"),
         ("InverseKinematicsTool", gait2354, "subject01_Setup_IK.xml"),
         ("InverseDynamicsTool", gait2354, "subject01_Setup_InverseDynamics.xml"),
-        # Static optimization
+        # This setup is of static optimization.
         (
             "AnalyzeTool",
             unpack(folder, "so_arm26_bounds"),
@@ -106,22 +113,27 @@ def list_cases(folder: Path) -> list[Case]:
         ("RRATool", steps, "rra.xml"),
         ("CMCTool", steps, "cmc.xml"),
     ):
-        theirs = [sys.executable, "-c", TOOL.format(tool=name, setup=setup)]
+        theirs = [sys.executable, "-c", TOOL_SCRIPT.format(tool=name, setup=setup)]
         cases.append(Case(name, source, [*osimlite, "run", setup, "--overwrite"], theirs))
     walker = folder / "walker"
     walker.mkdir()
     shutil.copy(WALKER, walker)
     ours = [*osimlite, "simulate", WALKER.name, "--to", "2", "-o", "results"]
-    cases.append(Case("simulate", walker, ours, [sys.executable, "-c", SIMULATION]))
+    cases.append(Case("simulate", walker, ours, [sys.executable, "-c", SIMULATION_SCRIPT]))
     return cases
 
 
 def measure_process(command: list[str], folder: Path) -> float:
-    """Return the processor time that a process took, s.
+    """Return the processor time of a process (s).
+
+    Args:
+        command: command line.
+        folder: working folder.
 
     Raises:
-        RuntimeError: it failed; the message ends with what it wrote to standard error.
+        RuntimeError: the process failed; the message ends with what it wrote to standard error.
     """
+    # With this variable Python compiles every module again, which users do not have.
     environment = {
         name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
     }
@@ -137,35 +149,49 @@ def measure_process(command: list[str], folder: Path) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def measure_case(case: Case, rounds: int) -> list[float]:
+    """Run both commands of a case in turn.
+
+    Args:
+        case: case to measure.
+        rounds: number of timed pairs.
+
+    Returns:
+        Median times of osimlite and OpenSim (s); median, least and greatest ratio.
+    """
+    pairs = []
+    for _ in range(1 + rounds):
+        ours = measure_process(case.ours, case.folder)
+        theirs = measure_process(case.theirs, case.folder)
+        pairs.append((ours, theirs))
+    # The first pair is the warm-up.
+    pairs = pairs[1:]
+    ratios = [ours / theirs for ours, theirs in pairs]
+    medians = [median(times) for times in zip(*pairs, strict=True)]
+    return [*medians, median(ratios), min(ratios), max(ratios)]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="only these cases")
     parser.add_argument(
-        "--rounds", type=int, default=5, metavar="N", help="how many pairs, 5 by default"
+        "names", nargs="*", metavar="NAME", help="names of cases to run; all by default"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=5, metavar="N", help="number of timed pairs, 5 by default"
     )
     options = parser.parse_args()
     table = Table(
-        title="Whole processes",
-        caption="processor time in s, medians; ratio = ours / OpenSim, per pair",
+        title="Complete processes",
+        caption="processor time in s, medians; ratio = osimlite / OpenSim, per pair",
     )
     table.add_column("")
-    for column in ("osimlite", "OpenSim", "ratio", "least", "greatest"):
+    for column in ("osimlite, s", "OpenSim, s", "ratio", "least", "greatest"):
         table.add_column(column, justify="right")
     with tempfile.TemporaryDirectory() as name:
         for case in list_cases(Path(name)):
             if options.names and case.name not in options.names:
                 continue
-            pairs = [
-                (measure_process(case.ours, case.folder), measure_process(case.theirs, case.folder))
-                for _ in range(1 + options.rounds)
-            ][1:]
-            ratios = [ours / theirs for ours, theirs in pairs]
-            numbers = (
-                *(median(times) for times in zip(*pairs, strict=True)),
-                median(ratios),
-                min(ratios),
-                max(ratios),
-            )
+            numbers = measure_case(case, options.rounds)
             table.add_row(case.name, *(f"{number:.3f}" for number in numbers))
     Console().print(table)
 

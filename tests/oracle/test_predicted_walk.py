@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from benchmarks.predicted_walk import forward
+from benchmarks.predicted_walk import simulate_in_opensim
 from osimlite.io.tables.storage import read_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -83,7 +83,7 @@ def test_opensim_walks_as_we_do(build):
     model = build(num_mesh_intervals=16)
     stride, step = read_sto(model.with_name("human-walks_guess.sto")), 0.25
     opensim.Logger.setLevelString("Error")
-    times, theirs = forward(opensim, model, stride, step)
+    times, theirs = simulate_in_opensim(opensim, model, stride, step)
     controls = {name: stride[name] for name in stride.columns if name.count("/") == 2}
     ours = osimlite.simulate(
         osimlite.read(model),
