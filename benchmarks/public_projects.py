@@ -1,4 +1,11 @@
-"""What the linter finds in checkouts of projects, as tables: python benchmarks/public_projects.py FOLDER..."""
+"""Findings of the linter in public projects, as two tables in Markdown.
+
+    python benchmarks/public_projects.py FOLDER...
+
+Each FOLDER is a checkout of a project. The first table has a row for each project: its commit, the
+number of files of each kind, and the number of findings of each severity. The second has a row for
+each rule: the number of its findings, and of the files and projects that have them.
+"""
 
 from __future__ import annotations
 
@@ -7,74 +14,97 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from osimlite.lint import Finding, validate
 from osimlite.lint.project_files import TABLE_SUFFIXES, find_project_files
 
-KINDS = ("models", "setups", "tables")
+FILE_KINDS = ("models", "setups", "tables")
+SEVERITIES = ("error", "warning", "info")
 
 
-def commit_of(folder: Path) -> str:
-    """The commit that a folder is a checkout of, in short; nothing if it is none."""
+class Project(NamedTuple):
+    """Files and findings of a project."""
+
+    name: str
+    commit: str
+    """Abbreviated commit; empty outside a repository."""
+    files: Counter[str]
+    """Number of files of each kind."""
+    findings: list[Finding]
+
+
+def find_commit(folder: Path) -> str:
+    """Return the abbreviated commit of a checkout; empty if the folder is no repository."""
+    # Ten digits stay unambiguous in large repositories.
     command = ["git", "-C", str(folder), "rev-parse", "--short=10", "HEAD"]
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
 
 
-def kinds_of(files: Iterable[str]) -> Counter[str]:
-    """How many of some files are models, setups, tables."""
-    return Counter(
-        "tables"
-        if file.lower().endswith(TABLE_SUFFIXES)
-        else "models"
-        if file.lower().endswith(".osim")
-        else "setups"
-        for file in files
-    )
+def get_file_kind(file: str) -> str:
+    """Return whether a project file is one of "models", "setups" and "tables"."""
+    name = file.lower()
+    if name.endswith(TABLE_SUFFIXES):
+        return "tables"
+    return "models" if name.endswith(".osim") else "setups"
 
 
-def row(*cells: object) -> str:
-    """A line of a table."""
+def count_file_kinds(files: Iterable[str]) -> Counter[str]:
+    """Return the number of files of each kind."""
+    return Counter(get_file_kind(file) for file in files)
+
+
+def format_row(*cells: object) -> str:
+    """Return a line of a table in Markdown."""
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
-def by_project(found: dict[str, tuple[str, Counter[str], list[Finding]]]) -> list[str]:
-    """The projects with their commits, their files by kind and their findings by severity."""
-    lines = [row("project", "commit", *KINDS, "errors", "warnings", "infos"), row(*["---"] * 8)]
-    for name, (commit, kinds, findings) in found.items():
-        severities = Counter(str(finding.severity) for finding in findings)
-        counts = [kinds[kind] for kind in KINDS] + [
-            severities[key] for key in ("error", "warning", "info")
-        ]
-        lines.append(row(name, commit, *counts))
+def format_projects(projects: list[Project]) -> list[str]:
+    """Return the lines of the table of projects."""
+    lines = [
+        format_row("project", "commit", *FILE_KINDS, "errors", "warnings", "infos"),
+        format_row(*["---"] * 8),
+    ]
+    for project in projects:
+        severities = Counter(str(finding.severity) for finding in project.findings)
+        counts = [project.files[kind] for kind in FILE_KINDS]
+        counts += [severities[severity] for severity in SEVERITIES]
+        lines.append(format_row(project.name, project.commit, *counts))
     return lines
 
 
-def by_rule(found: dict[str, tuple[str, Counter[str], list[Finding]]]) -> list[str]:
-    """The rules with their findings, and in how many files and projects they are."""
+def format_rules(projects: list[Project]) -> list[str]:
+    """Return the lines of the table of rules."""
     counts: Counter[tuple[str, str]] = Counter()
-    files, projects = defaultdict(set), defaultdict(set)
-    for name, (_, _, findings) in found.items():
-        for finding in findings:
+    files = defaultdict(set)
+    names = defaultdict(set)
+    for project in projects:
+        for finding in project.findings:
             rule = (finding.code, finding.name)
             counts[rule] += 1
             files[rule].add(finding.file)
-            projects[rule].add(name)
-    lines = [row("rule", "", "findings", "files", "projects"), row(*["---"] * 5)]
-    return lines + [
-        row(*rule, counts[rule], len(files[rule]), len(projects[rule])) for rule in sorted(counts)
+            names[rule].add(project.name)
+    lines = [
+        format_row("rule", "name", "findings", "files", "projects"),
+        format_row(*["---"] * 5),
     ]
+    for rule in sorted(counts):
+        lines.append(format_row(*rule, counts[rule], len(files[rule]), len(names[rule])))
+    return lines
 
 
 def main(folders: list[str]) -> None:
-    found = {}
+    projects = []
     for folder in map(Path, folders):
-        report = validate(folder)
-        found[folder.resolve().name] = (
-            commit_of(folder),
-            kinds_of(find_project_files([folder])),
-            list(report.findings),
+        projects.append(
+            Project(
+                folder.resolve().name,
+                find_commit(folder),
+                count_file_kinds(find_project_files([folder])),
+                list(validate(folder).findings),
+            )
         )
-    print("\n".join([*by_project(found), "", *by_rule(found)]))
+    print("\n".join([*format_projects(projects), "", *format_rules(projects)]))
 
 
 if __name__ == "__main__":

@@ -1,15 +1,17 @@
-"""Reading: `osimlite.read` against OpenSim's `Model(file)`, one row per real model, and whole processes.
+"""Speed of reading models: `osimlite.read` compared with OpenSim's `Model(file)`.
 
     python benchmarks/read.py [FOLDER] [--rounds N] [--processes]
 
-FOLDER holds `.osim` or `.osim.gz` files; without one the shared corpus is used. Ratios are taken
-inside each pair (see `_pair`); the last lines give the median and the worst over all files, and how
-time grows with size.
+FOLDER holds `.osim` or `.osim.gz` files; the default is the shared corpus. The two programs run in
+turn; the table has one row for each model. The last lines have the median and the greatest ratio of
+all models, the growth of osimlite's time with the size of the file, and the peak memory for the
+largest file. With `--processes`, complete processes that read the largest file are timed too.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 import tracemalloc
@@ -19,19 +21,28 @@ from statistics import median
 from _corpus import CORPUS, unpacked
 from _pair import Pair, pair, pair_commands, report
 
-
-def exponent(sizes: list[int], times: list[float]) -> float:
-    """Slope of log time over log size by least squares; 1 is linear."""
-    from math import log
-
-    xs, ys = [log(size) for size in sizes], [log(time) for time in times]
-    mean_x, mean_y = sum(xs) / len(xs), sum(ys) / len(ys)
-    above = sum((x - mean_x) * (y - mean_y) for x, y in zip(xs, ys, strict=True))
-    return above / sum((x - mean_x) ** 2 for x in xs)
+# Fixed costs dominate the time of small files, so that they say nothing about growth.
+MIN_GROWTH_SIZE = 50_000
+"""Size of the smallest file (bytes) from which the growth is computed."""
 
 
-def peak_memory(path: Path) -> float:
-    """Most memory (MB) that Python held while reading, as `tracemalloc` counts it."""
+def compute_growth(sizes: list[int], times: list[float]) -> float:
+    """Return the power of the size with which the time grows, by least squares of the logarithms.
+
+    Args:
+        sizes: sizes of files (bytes).
+        times: times of reading them (s).
+    """
+    xs = [math.log(size) for size in sizes]
+    ys = [math.log(time) for time in times]
+    mean_x = sum(xs) / len(xs)
+    mean_y = sum(ys) / len(ys)
+    covariance = sum((x - mean_x) * (y - mean_y) for x, y in zip(xs, ys, strict=True))
+    return covariance / sum((x - mean_x) ** 2 for x in xs)
+
+
+def measure_peak_memory(path: Path) -> float:
+    """Return the peak memory (MB) that Python allocates while reading, by `tracemalloc`."""
     import osimlite
 
     tracemalloc.start()
@@ -41,12 +52,74 @@ def peak_memory(path: Path) -> float:
     return peak / 1e6
 
 
+def time_models(files: list[Path], rounds: int) -> list[Pair]:
+    """Time reading of each file in turn with both programs.
+
+    Args:
+        files: model files.
+        rounds: number of timed pairs of each file.
+    """
+    import opensim
+
+    import osimlite
+
+    return [
+        pair(
+            f"{path.stem} {path.stat().st_size / 1e3:.0f} kB",
+            ours=lambda path=path: osimlite.read(path),
+            theirs=lambda path=path: opensim.Model(str(path)),
+            rounds=rounds,
+        )
+        for path in files
+    ]
+
+
+def time_processes(path: Path, rounds: int) -> Pair:
+    """Time complete processes that read a file.
+
+    Args:
+        path: model file.
+        rounds: number of timed pairs.
+    """
+    read = f"import osimlite; osimlite.read({str(path)!r})"
+    load = f"import opensim; opensim.Logger.setLevelString('off'); opensim.Model({str(path)!r})"
+    return pair_commands(
+        f"complete process, {path.stem}",
+        ours=[sys.executable, "-c", read],
+        theirs=[sys.executable, "-c", load],
+        rounds=rounds,
+    )
+
+
+def print_summary(files: list[Path], rows: list[Pair]) -> None:
+    """Print the ratios of all models, and the growth of osimlite's time with the size.
+
+    Args:
+        files: model files.
+        rows: their times.
+    """
+    ratios = [median(row.ratios) for row in rows]
+    print(f"ratio over {len(rows)} files: median {median(ratios):.2f}, greatest {max(ratios):.2f}")
+    large = [
+        (path.stat().st_size, median(row.ours))
+        for path, row in zip(files, rows, strict=True)
+        if path.stat().st_size > MIN_GROWTH_SIZE
+    ]
+    if len(large) > 2:
+        power = compute_growth([size for size, _ in large], [time for _, time in large])
+        print(f"osimlite's time grows with the size to the power {power:.2f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("folder", nargs="?", type=Path, default=CORPUS)
-    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument(
-        "--processes", action="store_true", help="also time whole processes on the largest file"
+        "folder", nargs="?", type=Path, default=CORPUS, help="folder of model files"
+    )
+    parser.add_argument("--rounds", type=int, default=5, help="number of timed pairs of each model")
+    parser.add_argument(
+        "--processes",
+        action="store_true",
+        help="also time complete processes that read the largest file",
     )
     options = parser.parse_args()
     try:
@@ -55,50 +128,20 @@ def main() -> None:
         sys.exit(
             "this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'"
         )
-    import osimlite
-
     opensim.Logger.setLevelString("off")
-    with tempfile.TemporaryDirectory() as place:
-        files = unpacked(options.folder, Path(place))
+    with tempfile.TemporaryDirectory() as temporary:
+        files = unpacked(options.folder, Path(temporary))
         if not files:
             sys.exit(f"no .osim files in {options.folder}")
-        rows: list[Pair] = []
-        for path in files:
-            name = f"{path.stem} {path.stat().st_size / 1e3:.0f} kB"
-            rows.append(
-                pair(
-                    name,
-                    ours=lambda path=path: osimlite.read(path),
-                    theirs=lambda path=path: opensim.Model(str(path)),
-                    rounds=options.rounds,
-                )
-            )
+        rows = time_models(files, options.rounds)
         report("Reading a model", rows)
-        ratios = [median(row.ratios) for row in rows]
-        print(f"ratio over {len(rows)} files: median {median(ratios):.2f}, worst {max(ratios):.2f}")
-        big = [
-            (path.stat().st_size, median(row.ours)) for path, row in zip(files, rows, strict=True)
-        ]
-        big = [(size, time) for size, time in big if size > 50_000]
-        if len(big) > 2:
-            print(
-                f"our time grows as size to the power {exponent([s for s, _ in big], [t for _, t in big]):.2f}"
-            )
+        print_summary(files, rows)
         largest = max(files, key=lambda path: path.stat().st_size)
         size = largest.stat().st_size / 1e6
-        print(
-            f"{largest.stem}: peak memory {peak_memory(largest):.1f} MB for {size:.2f} MB of text"
-        )
+        memory = measure_peak_memory(largest)
+        print(f"{largest.stem}: peak memory {memory:.1f} MB for {size:.2f} MB of text")
         if options.processes:
-            read = f"import osimlite; osimlite.read({str(largest)!r})"
-            load = f"import opensim; opensim.Logger.setLevelString('off'); opensim.Model({str(largest)!r})"
-            commands = pair_commands(
-                f"whole process, {largest.stem}",
-                ours=[sys.executable, "-c", read],
-                theirs=[sys.executable, "-c", load],
-                rounds=options.rounds,
-            )
-            report("Whole processes", [commands])
+            report("Complete processes", [time_processes(largest, options.rounds)])
 
 
 if __name__ == "__main__":
