@@ -30,7 +30,7 @@ import numpy as np
 
 import osimlite
 from osimlite.translate.mjcf.check import Check, check_mjcf
-from osimlite.translate.mjcf.draft import Version
+from osimlite.translate.mjcf.draft import Fit, Version
 
 MYOCONVERTER = "myoconverter/models"
 O2MCONVERTER = "O2MConverter/models"
@@ -60,7 +60,7 @@ TRANSLATIONS = {
 }
 """OpenSim models, and the published MuJoCo models made from them."""
 
-FITS = ("none", "wraps", "force")
+FITS: tuple[Fit, ...] = ("none", "wraps", "force")
 """Values of osimlite's option `--fit`: nothing, wrap surfaces, or also muscle forces are fitted."""
 
 HEADINGS = (

@@ -26,7 +26,7 @@ import osimlite
 from _moco_studies import CORE, GAIT, TESTS, copy_sources, make_gait_inverse
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable, read_sto, write_sto
-from osimlite.moco import MocoTrajectory
+from osimlite.moco import MocoSolution
 
 OPENSIM_SCRIPT = (
     "import opensim; opensim.Logger.setLevelString('Off'); opensim.AnalyzeTool('setup.xml').run()"
@@ -72,7 +72,7 @@ def main(core: Path, picture: str) -> None:
         draw_forces(right_muscles, forces, static_forces, picture)
 
 
-def solve_moco_inverse(folder: Path) -> MocoTrajectory:
+def solve_moco_inverse(folder: Path) -> MocoSolution:
     """Solve MocoInverse with the files of a folder, and print how the solver ended."""
     solution = osimlite.moco.solve_inverse(make_gait_inverse(), folder=folder)
     print(
@@ -169,7 +169,7 @@ def run_analysis(
 
 def print_table(
     muscles: list[str],
-    solution: MocoTrajectory,
+    solution: MocoSolution,
     forces: StoTable,
     static_activations: StoTable,
     static_forces: StoTable,

@@ -118,7 +118,7 @@ def print_trial(
     generic_names = [marker.name for marker in list_markers(generic)]
     weights = {name: float(name in compared) for name in data.find_shared_names(generic_names)}
     errors = []
-    poses = None
+    motions = []
     for model in (person.model, expert):
         model_weights = {
             name: weight for name, weight in weights.items() if has_marker(model, name)
@@ -126,15 +126,14 @@ def print_trial(
         motion = osimlite.inverse_kinematics(model, data, weights=model_weights)
         indices = [motion.markers.index(name) for name in compared]
         errors.append(compute_rms(motion.marker_errors[:, indices]))
-        if poses is None:
-            poses = motion.values
+        motions.append(motion)
     published = path.with_suffix(".mot")
     if published.exists():
         errors.append(compute_published_error(expert, data, compared, published))
     fitted_error, expert_error = errors[:2]
     note = "  WORSE" if fitted_error > expert_error else ""
     print(f"{path.stem:16} " + " ".join(f"{error:7.2f}" for error in errors) + note)
-    return poses
+    return motions[0].values
 
 
 def list_markers(model: osimlite.Model) -> list[Marker]:

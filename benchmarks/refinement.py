@@ -1,10 +1,15 @@
-"""Meshes that split where the error is large, beside equal intervals of the same error.
+"""Mesh refinement in optimal control, compared with equal intervals of the same error.
 
     python benchmarks/refinement.py [STUDY ...]
 
-STUDY: sliding, pendulum, predicted (``osimlite build human-walks``), walking (needs opensim-core's
-sources beside this repository, as tests/optimal/check_tracking.py). Each search has a process of
-its own; seconds are of the processor.
+STUDY is sliding, pendulum, predicted (``osimlite build human-walks``) or walking, which needs the
+sources of opensim-core next to this repository, as tests/optimal/check_tracking.py does. Refinement
+splits intervals where the error is large. Each study is solved with refinement, with exact and with
+limited-memory Hessians, and then with more and more equal intervals until their error is as small.
+
+The table in Markdown has the numbers of intervals (of each round of refinement), the largest error,
+the iterations of the last solve, the objective, and the processor time of the search. Each search has
+a process of its own.
 """
 
 from __future__ import annotations
@@ -15,18 +20,32 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 MOCO = ROOT.parent / "shared/oracle/moco"
-EXAMPLE = ROOT.parent / "pub-opensim-core/OpenSim/Examples/Moco/example2DWalking"
+WALKING_EXAMPLE = ROOT.parent / "pub-opensim-core/OpenSim/Examples/Moco/example2DWalking"
+
+
+class Study(NamedTuple):
+    """Meshes with which a study is solved."""
+
+    equal: tuple[int, ...]
+    """Numbers of equal intervals, in increasing order."""
+    initial: int
+    """Number of intervals with which refinement begins."""
+    tolerance: float
+    """Largest error that is allowed."""
+
+
 STUDIES = {
-    "sliding": ((10, 20, 40, 80), 10, 1e-6),
-    "pendulum": ((25, 50, 100, 200), 25, 1e-4),
-    "predicted": ((50, 100, 200, 400), 16, 1e-2),
-    "walking": ((25, 50, 100, 200), 10, 1e-2),
+    "sliding": Study((10, 20, 40, 80), 10, 1e-6),
+    "pendulum": Study((25, 50, 100, 200), 25, 1e-4),
+    "predicted": Study((50, 100, 200, 400), 16, 1e-2),
+    "walking": Study((25, 50, 100, 200), 10, 1e-2),
 }
-"""Numbers of equal intervals, of those that refinement begins with, and the error that is wanted."""
-ONE = """
+
+SOLVE_SCRIPT = """
 import json, sys, time
 from pathlib import Path
 import osimlite
@@ -45,60 +64,78 @@ if name == "walking":
         allow_unused_references=True, track_reference_position_derivatives=True, apply_tracked_states_to_guess=True,
         initial_time=0.0, final_time=0.470089, mesh_interval=0.470089 / intervals,
     )
-    def more(made):
-        phase = made.problem.phases
+    def change_study(tracking):
+        phase = tracking.problem.phases
         phase.goals[1].weight = 10.0
         phase.goals += [goal.copy_deep() for goal in study.problem.phases.goals[2:4]]
         phase.state_infos += [info.copy_deep() for info in study.problem.phases.state_infos]
-        made.solver.optim_convergence_tolerance = made.solver.optim_constraint_tolerance = 1e-4
-        made.solver.optim_max_iterations = 1000
-    problem, guess = build_track_problem(tool, folder=Path(sys.argv[5]), more=more)
+        tracking.solver.optim_convergence_tolerance = tracking.solver.optim_constraint_tolerance = 1e-4
+        tracking.solver.optim_max_iterations = 1000
+    problem, guess = build_track_problem(tool, folder=Path(sys.argv[5]), more=change_study)
 else:
     study.solver.num_mesh_intervals = intervals
     problem = build_problem(study, file.parent)
 program = Program(problem)
 before = time.process_time()
-found = solve_program(program, guess, None, refine)
-search = time.process_time() - before
-if found.rounds:
-    last = found.rounds[-1]
-    error, many = last.error, "-".join(str(each.intervals) for each in found.rounds)
+solution = solve_program(program, guess, None, refine)
+seconds = time.process_time() - before
+if solution.rounds:
+    error = solution.rounds[-1].error
+    mesh = "-".join(str(each.intervals) for each in solution.rounds)
 else:
-    error, many = float(estimate_errors(program, program.layout.guess_from_trajectory(found.trajectory)).max()), str(intervals)
-print(json.dumps([found.success, many, error, found.iterations, found.objective, search]))
+    point = program.layout.guess_from_trajectory(solution.trajectory)
+    error = float(estimate_errors(program, point).max())
+    mesh = str(intervals)
+print(json.dumps([solution.success, mesh, error, solution.iterations, solution.objective, seconds]))
 """
+"""Script that solves one study. Arguments: name, intervals, refinement, study file, folder of the walking example."""
 
 
 def main(names: list[str]) -> None:
     """Print a table in Markdown."""
-    print("| study | | intervals | largest error | iterations | objective | search, s |")
+    print(
+        "| study | mesh | intervals | largest error | iterations | objective | search, processor s |"
+    )
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for name in names or STUDIES:
-            meshes, first, wanted = STUDIES[name]
-            file = _file(name, Path(folder))
-            print(f"| {name} | error {wanted:g} | | | | | |")
+            study = STUDIES[name]
+            file = write_study(name, Path(folder))
+            print(f"| {name} | error {study.tolerance:g} | | | | | |")
             for hessian in ("exact", "limited-memory"):
-                _row(f"refined, {hessian}", name, first, f"{wanted}:{hessian}", file)
-            for count in meshes:
-                if _row("equal", name, count, "", file) <= wanted:
+                refine = f"{study.tolerance}:{hessian}"
+                solve_and_print(f"refined, {hessian}", name, study.initial, refine, file)
+            for count in study.equal:
+                # Finer meshes than the first one with a small enough error only take longer.
+                if solve_and_print("equal", name, count, "", file) <= study.tolerance:
                     break
 
 
-def _row(title: str, name: str, intervals: int, refine: str, file: Path) -> float:
-    """Solve one, and print it; the largest error."""
-    command = [sys.executable, "-c", ONE, name, str(intervals), refine, str(file), str(EXAMPLE)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    success, many, error, iterations, objective, search = json.loads(done.stdout.splitlines()[-1])
+def solve_and_print(title: str, name: str, intervals: int, refine: str, file: Path) -> float:
+    """Solve a study, print its row, and return its largest error.
+
+    Args:
+        title: name of the mesh.
+        name: name of the study.
+        intervals: number of intervals, at first if the mesh is refined.
+        refine: error and Hessian approximation of the refinement; empty for equal intervals.
+        file: file of the study.
+    """
+    arguments = [name, str(intervals), refine, str(file), str(WALKING_EXAMPLE)]
+    done = subprocess.run(
+        [sys.executable, "-c", SOLVE_SCRIPT, *arguments], capture_output=True, text=True, check=True
+    )
+    success, mesh, error, iterations, objective, seconds = json.loads(done.stdout.splitlines()[-1])
     note = "" if success else " (not solved)"
     print(
-        f"| | {title}{note} | {many} | {error:.2g} | {iterations} | {objective:.7g} | {search:.3g} |",
+        f"| | {title}{note} | {mesh} | {error:.2g} | {iterations} | {objective:.7g} | {seconds:.3g} |",
         flush=True,
     )
     return float(error)
 
 
-def _file(name: str, folder: Path) -> Path:
+def write_study(name: str, folder: Path) -> Path:
+    """Write the file of a study into a folder, and return it."""
     if name == "predicted":
         model = folder / "human-walks.osim"
         build = [sys.executable, "-m", "osimlite", "build", "human-walks", "-o", str(model)]

@@ -1,10 +1,13 @@
-"""Humans that walk by reflexes: seconds of walking per second of one core, beside OpenSim that only integrates.
+"""Speed of walking by reflexes: simulated time per processor time, compared with OpenSim's integration.
 
     python benchmarks/reflexes.py [SCENARIO.scone] [SECONDS]
 
-Without a scenario our own human walks. Each is run three times in turn; the medians of processor
-time count. OpenSim moves the model by a PrescribedController that holds what the reflexes said,
-with the same integrator and start.
+The default is osimlite's own human walker, for five seconds. osimlite walks with reflexes and
+measures, once alone and once with many candidates at a time. OpenSim only integrates: a
+PrescribedController has the excitations that the reflexes computed, and start, integrator and
+accuracy are the same. The programs run in turn; medians of the processor times count.
+
+The table in Markdown has the simulated seconds per second of one core, and their ratio to OpenSim's.
 """
 
 from __future__ import annotations
@@ -15,100 +18,143 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from osimlite.mechanics.kernels.walks import PROGRESS
 from osimlite.models.walking import write_scenario
 from osimlite.studies.reflexes.scenario import Scenario
 
-CANDIDATES, TIMES = 16, 3
-OPENSIM = """
+CANDIDATES = 16
+"""Number of candidates that walk at a time."""
+
+ROUNDS = 3
+"""Number of timed runs of each program."""
+
+# Points are slightly before the steps, so that rounding of times cannot delay an excitation by a step.
+OPENSIM_SCRIPT = """
 import json, sys, time, opensim
 opensim.Logger.setLevelString("Off")
-given = json.load(open(sys.argv[1]))
-model = opensim.Model(given["model"])
+walk = json.load(open(sys.argv[1]))
+model = opensim.Model(walk["model"])
 brain = opensim.PrescribedController()
 model.addController(brain)
-for label, values in given["excitations"].items():
+for label, values in walk["excitations"].items():
     brain.addActuator(model.getMuscles().get(label))
     function = opensim.PiecewiseConstantFunction()
     for row, value in enumerate(values):
-        function.addPoint(row * given["step"] - 1e-12, value)
+        function.addPoint(row * walk["step"] - 1e-12, value)
     brain.prescribeControlForActuator(label, function)
 state = model.initSystem()
-for name, value in given["start"].items():
+for name, value in walk["start"].items():
     model.setStateVariableValue(state, name, value)
 manager = opensim.Manager(model)
 manager.setIntegratorMethod(opensim.Manager.IntegratorMethod_SemiExplicitEuler2)
 manager.setIntegratorAccuracy(1e-3)
 manager.initialize(state)
 before = time.process_time()
-for row in range(1, given["rows"] + 1):
-    manager.integrate(row * given["step"])
+for row in range(1, walk["rows"] + 1):
+    manager.integrate(row * walk["step"])
 print(time.process_time() - before)
 """
+"""Script that integrates a walk in OpenSim and prints the processor time (s)."""
 
 
 def main(file: Path, seconds: float) -> None:
-    """Print a table in Markdown."""
+    """Print a table in Markdown.
+
+    Args:
+        file: scenario.
+        seconds: duration of the walk (s).
+    """
     scenario = Scenario(file)
     best = scenario.best()
-    walked = scenario.walk(best, duration=seconds)
-    rows, evaluations = (
-        len(walked.states.times) - 1,
-        int(scenario.get_walkers(1).progress[0, PROGRESS.FORCES]),
-    )
+    walk = scenario.walk(best, duration=seconds)
+    # Counted before the candidates walk, which have other walkers.
+    evaluations = int(scenario.get_walkers(1).progress[0, PROGRESS.FORCES])
+    # Prepare the walkers of all candidates, so that this is not timed.
     scenario.walk(best, CANDIDATES, duration=0.1)
-    alone, many, theirs = [], [], []
+    single_times = []
+    candidate_times = []
+    opensim_times = []
     with tempfile.TemporaryDirectory() as folder:
-        from osimlite.io.document.printer import write
-
-        model, given = Path(folder) / "model.osim", Path(folder) / "given.json"
-        write(scenario.model, model)
-        told = {
-            "model": str(model),
-            "step": scenario.step,
-            "rows": rows,
-            "start": {name: walked.states[name][0] for name in walked.states.columns},
-            "excitations": {
-                name: walked.excitations[name][:rows].tolist()
-                for name in walked.excitations.columns
-            },
-        }
-        given.write_text(json.dumps(told))
-        for _ in range(TIMES):
-            before = time.process_time()
-            scenario.walk(best, duration=seconds)
-            alone.append(time.process_time() - before)
-            before = time.process_time()
-            scenario.walk(best, CANDIDATES, duration=seconds)
-            many.append(time.process_time() - before)
-            done = subprocess.run(
-                [sys.executable, "-c", OPENSIM, str(given)],
-                capture_output=True,
-                text=True,
-                check=True,
+        walk_file = write_walk(Path(folder), scenario, walk)
+        for _ in range(ROUNDS):
+            single_times.append(measure(lambda: scenario.walk(best, duration=seconds)))
+            candidate_times.append(
+                measure(lambda: scenario.walk(best, CANDIDATES, duration=seconds))
             )
-            theirs.append(float(done.stdout.split()[-1]))
-    took = walked.times[0]
-    speed, each = walked.report["speed"][0], evaluations / took
+            opensim_times.append(measure_opensim(walk_file))
+    # A walk ends early if the walker falls.
+    duration = walk.times[0]
+    speed = walk.report["speed"][0]
     print(
-        f"{file.stem}: walks {took:g} s at {speed:.3f} m/s, {each:.0f} evaluations of the forces a second"
+        f"{file.stem}: walks {duration:g} s at {speed:.3f} m/s, "
+        f"{evaluations / duration:.0f} evaluations of the forces per simulated second"
     )
-    print("| | seconds of walking per second of one core | beside OpenSim |")
+    print("| program | simulated seconds per second of one core | ratio to OpenSim |")
     print("|---|---|---|")
-    opensim = statistics.median(theirs)
+    opensim_seconds = statistics.median(opensim_times)
     for name, times, count in (
-        ("OpenSim integrates", theirs, 1),
-        ("osimlite walks, with reflexes and measures", alone, 1),
-        (f"{CANDIDATES} candidates", many, CANDIDATES),
+        ("OpenSim integrates", opensim_times, 1),
+        ("osimlite walks, with reflexes and measures", single_times, 1),
+        (f"osimlite walks, {CANDIDATES} candidates", candidate_times, CANDIDATES),
     ):
-        rate = count * took / statistics.median(times)
-        print(f"| {name} | {rate:.3g} | {rate * opensim / took:.3g} |")
+        rate = count * duration / statistics.median(times)
+        print(f"| {name} | {rate:.3g} | {rate * opensim_seconds / duration:.3g} |")
+
+
+def write_walk(folder: Path, scenario: Scenario, walk: Any) -> Path:
+    """Write the model and the excitations of a walk for OpenSim.
+
+    Args:
+        folder: folder for the files.
+        scenario: scenario of the walk.
+        walk: result of the walk.
+
+    Returns:
+        File of the walk in JSON.
+    """
+    from osimlite.io.document.printer import write
+
+    model = folder / "model.osim"
+    write(scenario.model, model)
+    steps = len(walk.states.times) - 1
+    content = {
+        "model": str(model),
+        "step": scenario.step,
+        "rows": steps,
+        "start": {name: walk.states[name][0] for name in walk.states.columns},
+        "excitations": {
+            name: walk.excitations[name][:steps].tolist() for name in walk.excitations.columns
+        },
+    }
+    file = folder / "walk.json"
+    file.write_text(json.dumps(content))
+    return file
+
+
+def measure(work: Callable[[], object]) -> float:
+    """Return the processor time of a function (s)."""
+    before = time.process_time()
+    work()
+    return time.process_time() - before
+
+
+def measure_opensim(walk_file: Path) -> float:
+    """Return the processor time (s) in which OpenSim integrates a walk."""
+    done = subprocess.run(
+        [sys.executable, "-c", OPENSIM_SCRIPT, str(walk_file)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return float(done.stdout.split()[-1])
 
 
 if __name__ == "__main__":
-    chosen = sys.argv[1:]
-    with tempfile.TemporaryDirectory() as ours:
-        path = Path(chosen[0]) if chosen else write_scenario(Path(ours))
-        main(path, float(chosen[1]) if len(chosen) > 1 else 5.0)
+    arguments = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as scenario_folder:
+        path = Path(arguments[0]) if arguments else write_scenario(Path(scenario_folder))
+        main(path, float(arguments[1]) if len(arguments) > 1 else 5.0)

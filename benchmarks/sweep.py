@@ -1,15 +1,21 @@
-"""A thousand walkers from starts apart: `osimlite sweep` beside a loop over OpenSim's Manager, in one run.
+"""Speed of `osimlite sweep`, compared with a loop over OpenSim's Manager: a thousand walkers.
 
-Both simulate two seconds at accuracy 1e-3 from the same starts, and keep the distance. OpenSim's
-model and state are made once, and each walker has a manager of its own, as in OpenSim's examples.
-osimlite's time is that of the whole
-sweep: samples, simulations, measures and the file. Times of processors are compared, per walker,
-since other programs may run beside; the walkers per second of one and of two workers are by the
-clock, in turn, beside those of one and of two processes that share nothing: what more the machine
-does with two at a time.
+    python benchmarks/sweep.py               all tables
+    python benchmarks/sweep.py --workers     only the first table
+    python benchmarks/sweep.py --many        only memory and speed of a hundred thousand walkers
 
-With `--workers`, only that. With `--many`, a hundred thousand walkers, and the memory that this
-takes.
+The walkers are simulated for two seconds at accuracy 1e-3 from different starts, and their distance
+is recorded. The tables are:
+
+- *workers*: walkers per second of wall-clock time with one and with two workers of a sweep, which
+  run in turn, and of one and two separate processes that share nothing. The latter show how much more
+  the machine does with two processes.
+- *Dynamic Walkers*: processor time of osimlite and OpenSim, which run in turn. osimlite's time is that
+  of the complete sweep: samples, simulations, measures and the results file. OpenSim's model and
+  state are made once, and each walker has a manager of its own, as in OpenSim's examples.
+- *Processor time per walker*: for several kinds of variables, in ms.
+
+The last line has the differences of the distances between the programs.
 """
 
 from __future__ import annotations
@@ -38,10 +44,34 @@ from osimlite.studies.sweep.runner import Runner
 from osimlite.studies.sweep.sampling import choose_samples
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
-VARY = {"RHip_rz": "20deg:40deg", "LHip_rz": "-20deg:0deg", "Pelvis_tx/speed": "0:1"}
-STIFFNESS = {**VARY, "/forceset/*Foot*/contact_parameters/stiffness": "1e5:1e7:log"}
-MASS = {**VARY, "/bodyset/Pelvis/mass": "1:3"}
-TO, WALKERS, TURNS, ROUNDS, BY_BULLET, MANY = 2.0, 1000, 9, 2, 30, 100_000
+
+START_RANGES = {"RHip_rz": "20deg:40deg", "LHip_rz": "-20deg:0deg", "Pelvis_tx/speed": "0:1"}
+"""Variables of the start and their ranges."""
+
+STIFFNESS_RANGES = {**START_RANGES, "/forceset/*Foot*/contact_parameters/stiffness": "1e5:1e7:log"}
+"""The same with the stiffness of the feet."""
+
+MASS_RANGES = {**START_RANGES, "/bodyset/Pelvis/mass": "1:3"}
+"""The same with the mass of the pelvis."""
+
+TO = 2.0
+"""End of each simulation (s)."""
+
+WALKERS = 1000
+"""Number of walkers of a sweep."""
+
+WORKER_ROUNDS = 9
+"""Number of rounds in which one and two workers are timed."""
+
+ROUNDS = 2
+"""Number of timed pairs with OpenSim."""
+
+# PyBullet is slower, and its time per walker varies little.
+BULLET_WALKERS = 30
+"""Number of walkers that are simulated with PyBullet."""
+
+MANY_WALKERS = 100_000
+"""Number of walkers with `--many`."""
 
 
 def main() -> None:
@@ -49,193 +79,251 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results.parquet"
         if "--many" in sys.argv:
-            console.print(many(path))
+            console.print(measure_many_walkers(path))
             return
-        starts = plan(osimlite.read(MODEL), VARY, to=TO)
-        # What is made once, and what of machine code is not in the cache yet.
-        Runner(starts).run(choose_samples(starts.variables, "sobol", 8).make_block(0, 8))
-        console.print(workers(starts, path))
+        starts = plan(osimlite.read(MODEL), START_RANGES, to=TO)
+        warm_up(Runner(starts))
+        console.print(compare_workers(starts, path))
         if "--workers" in sys.argv:
             return
-        import opensim
-
-        opensim.Logger.setLevelString("off")
-        rows = choose_samples(starts.variables, "sobol", WALKERS).make_block(0, WALKERS)
-        theirs = run_opensim(opensim, rows)
-        name = f"{WALKERS} walkers, processor time"
-        report(
-            f"Dynamic Walkers, {TO:g} s, accuracy 1e-3",
-            [
-                pair(
-                    name,
-                    ours=by_sweep(starts, path),
-                    theirs=theirs,
-                    rounds=ROUNDS,
-                    warmup=0,
-                    clock=time.process_time,
-                )
-            ],
-            console=console,
-        )
-        console.print(kinds(path))
-        ours = Runner(starts).run(rows).measures["distance"]
-        apart = np.abs(ours - np.array(theirs()))
-        console.print(
-            f"distances differ by {np.median(apart):.2g} m in the middle, {apart.max():.2g} m at most"
-        )
+        compare_with_opensim(starts, path, console)
 
 
-def by_sweep(
-    made: Plan, path: Path, count: int = WALKERS, workers: int = 1
+def warm_up(runner: Runner) -> None:
+    """Run a few walkers, so that everything is made and compiled before the timed runs."""
+    runner.run(choose_samples(runner.plan.variables, "sobol", 8).make_block(0, 8))
+
+
+def compare_with_opensim(starts: Plan, path: Path, console: Console) -> None:
+    """Print the times and the differences of the distances.
+
+    Args:
+        starts: plan of the sweep.
+        path: results file.
+        console: console to print to.
+    """
+    import opensim
+
+    opensim.Logger.setLevelString("off")
+    rows = choose_samples(starts.variables, "sobol", WALKERS).make_block(0, WALKERS)
+    theirs = prepare_opensim_runs(opensim, rows)
+    times = pair(
+        f"{WALKERS} walkers, processor time",
+        ours=prepare_sweep(starts, path),
+        theirs=theirs,
+        rounds=ROUNDS,
+        warmup=0,
+        clock=time.process_time,
+    )
+    report(f"Dynamic Walkers, {TO:g} s, accuracy 1e-3", [times], console=console)
+    console.print(compare_variables())
+    ours = Runner(starts).run(rows).measures["distance"]
+    differences = np.abs(ours - np.array(theirs()))
+    console.print(
+        f"difference of the distances: median {np.median(differences):.2g} m, "
+        f"greatest {differences.max():.2g} m"
+    )
+
+
+def prepare_sweep(
+    sweep_plan: Plan, path: Path, count: int = WALKERS, workers: int = 1
 ) -> Callable[[], object]:
-    chosen = choose_samples(made.variables, "sobol", count)
-    return lambda: sweep(made, chosen, path, workers=workers)
+    """Return a function that runs a sweep.
+
+    Args:
+        sweep_plan: plan of the sweep.
+        path: results file.
+        count: number of walkers.
+        workers: number of worker processes.
+    """
+    samples = choose_samples(sweep_plan.variables, "sobol", count)
+    return lambda: sweep(sweep_plan, samples, path, workers=workers)
 
 
-def run_opensim(opensim: Any, rows: Any) -> Callable[[], list[float]]:
+def prepare_opensim_runs(opensim: Any, rows: Any) -> Callable[[], list[float]]:
+    """Return a function that simulates all walkers in OpenSim and returns their distances (m).
+
+    Args:
+        opensim: OpenSim's module.
+        rows: angles of the hips (rad) and speed of the pelvis (m/s) of each walker (walkers, 3).
+    """
     model = opensim.Model(str(MODEL))
     state = model.initSystem()
     coordinates = model.getCoordinateSet()
-    hips = [coordinates.get(name) for name in ("RHip_rz", "LHip_rz")]
+    right_hip = coordinates.get("RHip_rz")
+    left_hip = coordinates.get("LHip_rz")
     forward = coordinates.get("Pelvis_tx")
-    beginning = opensim.State(state)
+    default = opensim.State(state)
 
     def run() -> list[float]:
-        found = []
+        distances = []
         for right, left, speed in rows.tolist():
-            start = opensim.State(beginning)
-            hips[0].setValue(start, right, False)
-            hips[1].setValue(start, left, False)
+            start = opensim.State(default)
+            right_hip.setValue(start, right, False)
+            left_hip.setValue(start, left, False)
             forward.setSpeedValue(start, speed)
             manager = opensim.Manager(model)
             manager.setIntegratorAccuracy(1e-3)
             manager.initialize(start)
-            found.append(forward.getValue(manager.integrate(TO)))
-        return found
+            distances.append(forward.getValue(manager.integrate(TO)))
+        return distances
 
     return run
 
 
-def workers(made: Plan, path: Path) -> Table:
-    """Walkers per second by the clock, one worker and two in turn, and what the machine itself allows."""
+def compare_workers(sweep_plan: Plan, path: Path) -> Table:
+    """Return a table of walkers per second with one and with two processes.
+
+    Args:
+        sweep_plan: plan of the sweep.
+        path: results file.
+    """
     table = Table(
-        title=f"{WALKERS} walkers", caption="median of the rounds; speed-up within each round"
+        title=f"{WALKERS} walkers, walkers per second of wall-clock time",
+        caption="median of the rounds; speed-up within each round",
     )
-    for heading in ("", "one", "two", "speed-up", "least", "most"):
+    for heading in ("", "one", "two", "speed-up", "least", "greatest"):
         table.add_column(heading, justify="right" if heading else "left")
-    alone, swept = [], []
-    with separate_processes(made) as together:
-        for _ in range(TURNS):
-            alone.append([together(count) for count in (1, 2)])
-            swept.append(
-                [WALKERS / elapsed(by_sweep(made, path, workers=count)) for count in (1, 2)]
+    separate_rates = []
+    sweep_rates = []
+    with start_separate_processes(sweep_plan) as measure_rate:
+        for _ in range(WORKER_ROUNDS):
+            separate_rates.append([measure_rate(count) for count in (1, 2)])
+            sweep_rates.append(
+                [
+                    WALKERS / measure_seconds(prepare_sweep(sweep_plan, path, workers=count))
+                    for count in (1, 2)
+                ]
             )
-    for name, rows in (
-        ("workers of a sweep", swept),
-        ("separate processes, the machine's bound", alone),
+    for name, rates in (
+        ("workers of a sweep", sweep_rates),
+        ("separate processes, the machine's bound", separate_rates),
     ):
-        one, two = zip(*rows, strict=True)
-        gains = [b / a for a, b in rows]
-        speed = (f"{walkers:.0f}/s" for walkers in (median(one), median(two)))
+        one, two = zip(*rates, strict=True)
+        gains = [rate_two / rate_one for rate_one, rate_two in rates]
         table.add_row(
-            name, *speed, *(f"{gain:.2f}" for gain in (median(gains), min(gains), max(gains)))
+            name,
+            f"{median(one):.0f}/s",
+            f"{median(two):.0f}/s",
+            f"{median(gains):.2f}",
+            f"{min(gains):.2f}",
+            f"{max(gains):.2f}",
         )
     return table
 
 
-def elapsed(work: Callable[[], object]) -> float:
+def measure_seconds(work: Callable[[], object]) -> float:
+    """Return the wall-clock time of a function (s)."""
     started = time.perf_counter()
     work()
     return time.perf_counter() - started
 
 
 @contextmanager
-def separate_processes(made: Plan) -> Iterator[Callable[[int], float]]:
-    """What makes one process or two, which share nothing, walk all walkers each; how many walk per second together."""
+def start_separate_processes(sweep_plan: Plan) -> Iterator[Callable[[int], float]]:
+    """Start two processes that share nothing, each of which can simulate all walkers.
+
+    Args:
+        sweep_plan: plan of the sweep.
+
+    Yields:
+        Function that lets one or two of them simulate at a time, and returns the walkers per second
+        of both together.
+    """
+    # A forked process would share memory with this one.
     context = get_context("spawn")
-    ends = [context.Pipe() for _ in range(2)]
-    others = [
-        context.Process(target=walk_when_told, args=(made.pack(), end), daemon=True)
-        for _, end in ends
+    pipes = [context.Pipe() for _ in range(2)]
+    processes = [
+        context.Process(target=serve_walkers, args=(sweep_plan.pack(), end), daemon=True)
+        for _, end in pipes
     ]
 
-    def together(count: int) -> float:
-        told = [end for end, _ in ends[:count]]
-        for end in told:
+    def measure_rate(count: int) -> float:
+        ends = [end for end, _ in pipes[:count]]
+        for end in ends:
             end.send(WALKERS)
-        return count * WALKERS / max(end.recv() for end in told)
+        return count * WALKERS / max(end.recv() for end in ends)
 
-    for process in others:
+    for process in processes:
         process.start()
     try:
-        for end, _ in ends:
+        # Wait until each process has finished its warm-up.
+        for end, _ in pipes:
             end.recv()
-        yield together
+        yield measure_rate
     finally:
-        for end, _ in ends:
+        for end, _ in pipes:
             end.send(0)
-        for process in others:
+        for process in processes:
             process.join()
 
 
-def walk_when_told(packed: bytes, end: Any) -> None:
-    """In a process of its own: walk as many as it is told, and tell the time that this took, until it is told none."""
-    made = Plan.unpack(packed)
-    runner = Runner(made)
-    runner.run(choose_samples(made.variables, "sobol", 8).make_block(0, 8))
+def serve_walkers(packed_plan: bytes, end: Any) -> None:
+    """Simulate walkers in a process of its own, until the number zero is received.
+
+    Args:
+        packed_plan: plan of the sweep.
+        end: end of a pipe, which receives numbers of walkers and sends the time of each (s).
+    """
+    sweep_plan = Plan.unpack(packed_plan)
+    runner = Runner(sweep_plan)
+    warm_up(runner)
     end.send(0.0)
     while count := end.recv():
-        rows = choose_samples(made.variables, "sobol", count).make_block(0, count)
-        end.send(elapsed(partial(runner.run, rows)))
+        rows = choose_samples(sweep_plan.variables, "sobol", count).make_block(0, count)
+        end.send(measure_seconds(partial(runner.run, rows)))
 
 
-def kinds(path: Path) -> Table:
-    """What it costs to vary what: processor time per walker."""
+def compare_variables() -> Table:
+    """Return a table of the processor time per walker for several kinds of variables."""
     table = Table(title="Processor time per walker")
-    for heading in ("", "walkers", "ms"):
-        table.add_column(heading, justify="left" if not heading else "right")
-    for name, vary, count, engine in (
-        ("starts", VARY, WALKERS, "compiled"),
-        ("starts and a stiffness", STIFFNESS, WALKERS, "compiled"),
-        ("starts and a mass", MASS, WALKERS, "compiled"),
-        ("starts, PyBullet", VARY, BY_BULLET, "bullet"),
+    for heading in ("variables", "walkers", "ms"):
+        table.add_column(heading, justify="left" if heading == "variables" else "right")
+    for name, ranges, count, engine in (
+        ("starts", START_RANGES, WALKERS, "compiled"),
+        ("starts and a stiffness", STIFFNESS_RANGES, WALKERS, "compiled"),
+        ("starts and a mass", MASS_RANGES, WALKERS, "compiled"),
+        ("starts, PyBullet", START_RANGES, BULLET_WALKERS, "bullet"),
     ):
-        made = plan(osimlite.read(MODEL), vary, to=TO, engine=engine)
-        runner, rows = (
-            Runner(made),
-            choose_samples(made.variables, "sobol", count).make_block(0, count),
-        )
+        sweep_plan = plan(osimlite.read(MODEL), ranges, to=TO, engine=engine)
+        runner = Runner(sweep_plan)
+        rows = choose_samples(sweep_plan.variables, "sobol", count).make_block(0, count)
+        # The first rows are the warm-up.
         runner.run(rows[:2])
         started = time.process_time()
         runner.run(rows)
-        table.add_row(name, str(count), f"{(time.process_time() - started) / count * 1e3:.3g}")
+        seconds = time.process_time() - started
+        table.add_row(name, str(count), f"{seconds / count * 1e3:.3g}")
     return table
 
 
-def many(path: Path) -> Table:
-    """Memory while very many walkers walk."""
-    table = Table(title=f"{MANY} walkers")
+def measure_many_walkers(path: Path) -> Table:
+    """Return a table of memory and time during a very large sweep, whose results go to a file."""
+    table = Table(title=f"{MANY_WALKERS} walkers")
     for heading in ("runs", "memory, MB", "seconds"):
         table.add_column(heading, justify="right")
-    made = plan(osimlite.read(MODEL), VARY, to=TO)
-    started, marks = (
-        time.perf_counter(),
-        [MANY // 100, MANY // 10, MANY // 4, MANY // 2, MANY * 3 // 4, MANY],
-    )
+    sweep_plan = plan(osimlite.read(MODEL), START_RANGES, to=TO)
+    started = time.perf_counter()
+    marks = [int(MANY_WALKERS * fraction) for fraction in (0.01, 0.1, 0.25, 0.5, 0.75, 1.0)]
 
-    def progress(done: float, of: float) -> None:
+    def report_progress(done: float, _total: float) -> None:
         if marks and done >= marks[0]:
             marks.pop(0)
-            table.add_row(f"{done:.0f}", f"{memory():.0f}", f"{time.perf_counter() - started:.0f}")
+            seconds = time.perf_counter() - started
+            table.add_row(f"{done:.0f}", f"{read_memory():.0f}", f"{seconds:.0f}")
 
-    outcome = sweep(made, choose_samples(made.variables, "lhs", MANY), path, progress=progress)
+    samples = choose_samples(sweep_plan.variables, "lhs", MANY_WALKERS)
+    outcome = sweep(sweep_plan, samples, path, progress=report_progress)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    table.caption = f"{MANY / outcome.seconds:.0f} walkers/s; at most {peak:.0f} MB; {path.stat().st_size / 1e6:.1f} MB on disk"
+    table.caption = (
+        f"{MANY_WALKERS / outcome.seconds:.0f} walkers/s; at most {peak:.0f} MB; "
+        f"{path.stat().st_size / 1e6:.1f} MB on disk"
+    )
     return table
 
 
-def memory() -> float:
-    """Of this process, MB."""
+def read_memory() -> float:
+    """Return the resident memory of this process (MB); Linux only."""
     text = Path("/proc/self/status").read_text(encoding="utf-8")
     return float(text.partition("VmRSS:")[2].split()[0]) / 1024.0
 
