@@ -30,6 +30,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -221,11 +222,11 @@ class Trials:
         changed = before[: mutant.start] + mutant.new.encode() + before[mutant.end :]
         while True:
             tests = [test for test in tests if test not in self.failing]
-            path.write_bytes(changed)
+            _replace_source(path, changed)
             try:
                 outcome, failed = self.call(tests)
             finally:
-                path.write_bytes(before)
+                _replace_source(path, before)
             if outcome != "killed" or not failed or self._passes(failed):
                 return outcome, failed
             if failed not in tests:
@@ -259,6 +260,16 @@ class Trials:
         # 0: all pass. 5: pytest has collected no test.
         outcome = {0: "survived", 5: "untested"}.get(done.returncode, "killed")
         return outcome, failed.group(1) if failed else ""
+
+
+def _replace_source(path: Path, content: bytes) -> None:
+    """Write a module, and remove its byte code.
+
+    Python takes byte code as current if the size of the source and the second of its last change
+    agree, which a mutant of the same length within a second does not alter.
+    """
+    path.write_bytes(content)
+    Path(cache_from_source(str(path))).unlink(missing_ok=True)
 
 
 RECORDING = """[run]

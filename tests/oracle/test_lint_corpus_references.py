@@ -27,6 +27,8 @@ SECONDS = 90 if "OSIMLITE_BREAKAGES" not in os.environ else 3600
 # Errors that OpenSim passes over in silence, and computes something other than what the text says.
 SILENT = {"OSIM108", "OSIM311", "OSIM322", "OSIM406", "OSIM410", "OSIM414", "OSIM607"}
 SILENTLY = ("OpenSim disables the whole probe", "OpenSim welds a hidden body between them")
+# OpenSim then computes with whatever its memory contains, so that its verdict changes from run to run.
+UNDEFINED = ("OpenSim reads beyond the end of the list", "OpenSim reads memory that it has not set")
 # Said by Simbody when a model whose references all lead somewhere cannot take its first pose:
 # constraints that cannot be met, a cable with no way around its obstacles.
 ASSEMBLY = ("projectQ", "CableSpan")
@@ -125,6 +127,8 @@ def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(
             f for f in report.errors if f.code not in SILENT and not f.message.endswith(SILENTLY)
         ]
         refused += message is not None
+        if errors and all(error.message.endswith(UNDEFINED) for error in errors):
+            continue
         if bool(errors) != (message is not None):
             ours = "; ".join(map(str, errors[:3])) or "no error"
             wrong.append(

@@ -81,7 +81,7 @@ def test_euler_names_what_is_no_number():
         names=["hip", "hip_speed"],
     )
     with pytest.raises(
-        IntegrationError, match=r"derivative of hip_speed is nan.*control is above 0"
+        IntegrationError, match=r"derivative of hip_speed is nan.*a control above 0"
     ) as caught:
         list(stepper.iterate_steps(1.0))
     assert caught.value.time == pytest.approx(0.6)
