@@ -145,7 +145,7 @@ def compute_costs(motion: FittedMotion, tasks: Any, poses: Array) -> Array:
     # As in OpenSim, a marker without a measured position has no weight in that frame.
     weights = np.where(np.isfinite(squares), marker_weights, 0.0)
     costs = np.sum(weights * np.nan_to_num(squares), axis=1) / weights.sum(axis=1)
-    for goal, wanted in zip(targets.goals, targets.wanted.T, strict=True):
+    for goal, wanted in zip(targets.goals, targets.target_values.T, strict=True):
         if not infos[goal.coordinate].locked:
             costs += goal.weight * (poses[:, goal.coordinate] - wanted) ** 2
     return np.asarray(0.5 * costs)

@@ -67,7 +67,8 @@ def describe_fit(
         )
     if result["partly_unseen"]:
         unseen_shares = [
-            f"{name} ({100.0 * share:.3g} %)" for name, share in result["partly_unseen"].items()
+            f"{name} ({100.0 * unseen_fraction:.3g} %)"
+            for name, unseen_fraction in result["partly_unseen"].items()
         ]
         yield f"unseen in some frames: {join_words(unseen_shares)}"
     if result["frames_unseen"]:

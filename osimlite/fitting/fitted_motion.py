@@ -99,8 +99,10 @@ class FittedMotion(Movement):
             is_measured = np.isfinite(errors)
             if is_measured.any():
                 # Errors are not negative, so that -1 is never the largest.
-                known_errors = np.where(is_measured, errors, -1.0)
-                frame, column = np.unravel_index(int(known_errors.argmax()), known_errors.shape)
+                measured_errors = np.where(is_measured, errors, -1.0)
+                frame, column = np.unravel_index(
+                    int(measured_errors.argmax()), measured_errors.shape
+                )
                 noun, time = (
                     ("marker", "worst_time")
                     if quantity == "marker"
@@ -108,14 +110,16 @@ class FittedMotion(Movement):
                 )
                 result |= {
                     f"rms_{quantity}_error": float(np.sqrt(np.mean(errors[is_measured] ** 2))),
-                    f"largest_{quantity}_error": float(known_errors.max()),
+                    f"largest_{quantity}_error": float(measured_errors.max()),
                     f"worst_{noun}": names[int(column)],
                     time: float(self.times[int(frame)]),
                 }
             missing = (1.0 - is_measured.mean(axis=0)).tolist()
             # Only markers that are unseen in some frame are named.
             partly |= {
-                name: round(share, 4) for name, share in zip(names, missing, strict=True) if share
+                name: round(unseen_fraction, 4)
+                for name, unseen_fraction in zip(names, missing, strict=True)
+                if unseen_fraction
             }
         result["partly_unseen"] = partly
         result["frames_unseen"], result["frames_unsettled"] = len(self.unseen), len(self.unsettled)

@@ -36,7 +36,7 @@ class FitTargets(NamedTuple):
     # Weights of the markers that are fitted or reported, in the order of the data.
     weights: dict[str, float]
     goals: list[CoordinateTarget]  # coordinates with target values
-    wanted: Array  # target values (t, k), rad or m
+    target_values: Array  # target values (t, k), rad or m
 
 
 def collect_targets(
@@ -135,7 +135,7 @@ def run_inverse_kinematics(
     frames = data.select_times(start, end)
     mechanism = build_mechanism(model)
     tasks = collect_targets(model, mechanism, tool.ik_task_set.objects, frames, coordinates)
-    return fit_motion(model, mechanism, frames, tasks.weights, tasks.goals, tasks.wanted)
+    return fit_motion(model, mechanism, frames, tasks.weights, tasks.goals, tasks.target_values)
 
 
 def create_motion_table(motion: FittedMotion) -> StoTable:

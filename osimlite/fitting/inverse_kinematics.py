@@ -196,11 +196,11 @@ def fit_motion(
         compute_first_pose(mechanism, float(data.times[0]), constraints),
     )
     # A marker with one missing component counts as unseen.
-    is_seen = np.asarray(np.isfinite(marker_positions).all(axis=2))
+    is_measured = np.asarray(np.isfinite(marker_positions).all(axis=2))
     undetermined = find_undetermined(
         mechanism,
         poses.values,
-        is_seen,
+        is_measured,
         marker_targets,
         sensor_targets,
         goals,

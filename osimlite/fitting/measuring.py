@@ -39,7 +39,7 @@ class ScaleFactorFinder:
 
     Attributes:
         mechanism: mechanism of the model.
-        found: scale factors so far.
+        result: scale factors so far.
         frames: names of the physical frames.
     """
 
@@ -50,7 +50,7 @@ class ScaleFactorFinder:
         self._state = self.mechanism.at(_compute_default_pose(self.mechanism))
         # OpenSim's scale set has all physical frames, not only bodies.
         names = [frame.name for frame in model.components(PhysicalFrame)]
-        self.found = ScaleFactors({name: [1.0, 1.0, 1.0] for name in names}, {}, [])
+        self.result = ScaleFactors({name: [1.0, 1.0, 1.0] for name in names}, {}, [])
         self.frames = names
 
     def apply_factors(self, scales: Iterable[Scale]) -> None:
@@ -59,8 +59,8 @@ class ScaleFactorFinder:
             if scale.apply:
                 # A segment is a name in files, and may be an object in Python.
                 name = str(getattr(scale.segment, "name", scale.segment))
-                if self._is_known(name, "the scale factors set by hand"):
-                    self.found.factors[name] = [float(factor) for factor in scale.scales]
+                if self._check_name(name, "the scale factors set by hand"):
+                    self.result.factors[name] = [float(factor) for factor in scale.scales]
 
     def apply_measurements(
         self, measurements: Iterable[Measurement], data: MarkerData, start: float, end: float
@@ -83,14 +83,16 @@ class ScaleFactorFinder:
             name = measurement.name or f"number {number}"
             ratio, reason = self._compute_ratio(measurement, data, frames)
             if reason:
-                self.found.notes.append(f"measurement '{name}' is left out: {reason}")
+                self.result.notes.append(f"measurement '{name}' is left out: {reason}")
                 continue
-            self.found.ratios[name] = ratio
+            self.result.ratios[name] = ratio
             for body in measurement.body_scale_set.objects:
-                for axis in body.axes if self._is_known(body.name, f"measurement '{name}'") else ():
+                for axis in (
+                    body.axes if self._check_name(body.name, f"measurement '{name}'") else ()
+                ):
                     # Other letters are ignored.
                     if axis.lower() in ("x", "y", "z"):
-                        self.found.factors[body.name]["xyz".index(axis.lower())] = ratio
+                        self.result.factors[body.name]["xyz".index(axis.lower())] = ratio
 
     def _compute_ratio(
         self, measurement: Measurement, data: MarkerData, frames: slice
@@ -131,13 +133,13 @@ class ScaleFactorFinder:
             ratios.append(measured_length / model_length)
         return (float(np.mean(ratios)), "") if ratios else (0.0, "it has no pairs of markers")
 
-    def _is_known(self, name: str, user_description: str) -> bool:
+    def _check_name(self, name: str, user_description: str) -> bool:
         """Return whether the model has a frame of a name; add a note if not."""
-        if name not in self.found.factors:
-            self.found.notes.append(
-                f"body '{name}' of {user_description}: the model has no such body{suggest_name(name, self.found.factors)}"
+        if name not in self.result.factors:
+            self.result.notes.append(
+                f"body '{name}' of {user_description}: the model has no such body{suggest_name(name, self.result.factors)}"
             )
-        return name in self.found.factors
+        return name in self.result.factors
 
 
 def create_scale_set(frames: Iterable[str], scale_factors: ScaleFactors) -> ScaleSet:

@@ -277,22 +277,22 @@ class _PersonFit:
         self, shape: ScalableMarkers, selected: SelectedFrames, is_movable: Sequence[bool]
     ) -> None:
         self._shape = shape
-        self._chosen = selected
-        self._free = np.flatnonzero(is_movable)
+        self._selected = selected
+        self._movable_markers = np.flatnonzero(is_movable)
         self._sizes = len(shape.segments.parts)
-        self._moved = 3 * len(self._free)
+        self._offset_count = 3 * len(self._movable_markers)
         frames = len(selected.times)
         # Errors of neighbouring frames are correlated: many frames must not outweigh the prior.
         self._unit = min(1.0, INDEPENDENT_FRAMES / frames) / SKIN_MOTION_M**2
-        self._prior, self._wanted = shape.segments.compute_prior(
+        self._prior, self._prior_rhs = shape.segments.compute_prior(
             FIRST_SIZE_DEVIATION, NEIGHBOUR_DEVIATION, AXIS_DEVIATION
         )
 
     def start_from_model(self, mechanism: Mechanism) -> _Estimate:
         """Return the estimate for the unscaled model."""
-        starts = np.tile(compute_first_pose(mechanism, 0.0, True), (len(self._chosen.times), 1))
+        starts = np.tile(compute_first_pose(mechanism, 0.0, True), (len(self._selected.times), 1))
         return self._evaluate_estimate(
-            np.ones(self._sizes), np.zeros((len(self._chosen.markers), 3)), starts
+            np.ones(self._sizes), np.zeros((len(self._selected.markers), 3)), starts
         )
 
     def run(self, start: _Estimate, tolerance: float) -> _Estimate:
@@ -317,7 +317,7 @@ class _PersonFit:
                     step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
                     sizes = np.clip(estimate.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
                     offsets = estimate.offsets.copy()
-                    offsets[self._free] += step[self._sizes :].reshape(-1, 3)
+                    offsets[self._movable_markers] += step[self._sizes :].reshape(-1, 3)
                     trial_estimate = self._evaluate_estimate(sizes, offsets, estimate.values)
                     if trial_estimate.cost <= estimate.cost or np.abs(step).max() < tolerance:
                         break
@@ -352,14 +352,14 @@ class _PersonFit:
             offsets: offsets of the markers (m, 3), m.
             starts: initial poses (t, n).
         """
-        posed = ScaledPoseFit(self._shape, sizes, offsets, self._chosen.weights)
-        values, positions = posed.fit_poses(self._chosen.measured, starts)
-        errors = positions - self._chosen.measured
-        squares = self._unit * float(np.nansum(self._chosen.weights[:, None] * errors**2))
-        prior_residuals = self._prior @ sizes - self._wanted
+        posed = ScaledPoseFit(self._shape, sizes, offsets, self._selected.weights)
+        values, positions = posed.fit_poses(self._selected.measured, starts)
+        errors = positions - self._selected.measured
+        squares = self._unit * float(np.nansum(self._selected.weights[:, None] * errors**2))
+        prior_residuals = self._prior @ sizes - self._prior_rhs
         # Negative logarithm of a Cauchy density, up to a constant.
         offset_penalty = float(
-            np.log1p((offsets[self._free] ** 2).sum(axis=1) / MARKER_OFFSET_M**2).sum()
+            np.log1p((offsets[self._movable_markers] ** 2).sum(axis=1) / MARKER_OFFSET_M**2).sum()
         )
         return _Estimate(
             sizes,
@@ -378,21 +378,21 @@ class _PersonFit:
         """
         values = estimate.values
         columns, rotations = self._shape.compute_derivatives(values)
-        errors = estimate.places - self._chosen.measured
+        errors = estimate.places - self._selected.measured
         is_measured = np.asarray(np.isfinite(errors).all(axis=2))
-        roots = np.sqrt(self._unit * self._chosen.weights)
-        size = self._sizes + self._moved
+        roots = np.sqrt(self._unit * self._selected.weights)
+        size = self._sizes + self._offset_count
         # Derivatives of the marker positions: by sizes first, then by offsets.
         derivatives = np.zeros((*errors.shape, size))
         derivatives[..., : self._sizes] = columns
-        for number, index in enumerate(self._free):
+        for number, index in enumerate(self._movable_markers):
             first_column = self._sizes + 3 * number
             derivatives[:, index, :, first_column : first_column + 3] = rotations[:, index]
         matrix = np.zeros((size, size))
         slope = np.zeros(size)
         matrix[: self._sizes, : self._sizes] = self._prior.T @ self._prior
-        slope[: self._sizes] = self._prior.T @ (self._prior @ estimate.sizes - self._wanted)
-        movable_offsets = estimate.offsets[self._free]
+        slope[: self._sizes] = self._prior.T @ (self._prior @ estimate.sizes - self._prior_rhs)
+        movable_offsets = estimate.offsets[self._movable_markers]
         # Cauchy prior as iteratively reweighted least squares.
         prior_weights = np.repeat(1.0 / (MARKER_OFFSET_M**2 + (movable_offsets**2).sum(axis=1)), 3)
         np.fill_diagonal(matrix[self._sizes :, self._sizes :], prior_weights)

@@ -83,12 +83,12 @@ def place_markers(
         data.names, np.array((start,)), data.positions[is_in_range].mean(axis=0)[None], data.file
     )
     averaged = data.positions[select_frames(data.times, start, end)]
-    is_seen = np.asarray(np.isfinite(averaged).all(axis=2))
-    selected = np.where(is_seen[..., None], averaged, 0.0)
+    is_measured = np.asarray(np.isfinite(averaged).all(axis=2))
+    selected = np.where(is_measured[..., None], averaged, 0.0)
     # A marker that is never seen has NaN as its mean, and stays.
     with np.errstate(invalid="ignore"):
         target = dict(
-            zip(data.names, selected.sum(axis=0) / is_seen.sum(axis=0)[:, None], strict=True)
+            zip(data.names, selected.sum(axis=0) / is_measured.sum(axis=0)[:, None], strict=True)
         )
     # Before markers are removed, so that the error names those of the model.
     mean.find_shared_names([marker.name for marker in model.components(Marker)])
@@ -98,7 +98,9 @@ def place_markers(
         model.remove(marker)
     mechanism = build_mechanism(model)
     requested = collect_targets(model, mechanism, tasks, mean, coordinates)
-    pose = fit_motion(model, mechanism, mean, requested.weights, requested.goals, requested.wanted)
+    pose = fit_motion(
+        model, mechanism, mean, requested.weights, requested.goals, requested.target_values
+    )
     state = mechanism.at(pose.values[0])
     move_distances = dict[str, float]()
     for marker in model.components(Marker):

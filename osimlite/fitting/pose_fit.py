@@ -69,7 +69,7 @@ class PoseFit:
         order: indices in the mechanism of the coordinates to find.
         width: count of the numbers of a frame: positions, orientations, targets, and values of
             locked and prescribed coordinates.
-        found: count of the numbers in a result: values, marker positions, rotation vectors of the
+        result_size: count of the numbers in a result: values, marker positions, rotation vectors of the
             sensors, cost, steps and status.
 
     Raises:
@@ -90,13 +90,13 @@ class PoseFit:
         self.markers = len(markers)
         self.measured = 3 * len(markers) + 9 * len(sensors)
         infos = list(mechanism.coordinates)
-        self._held: dict[int, SmoothFunction | None] = {}
+        self._input_coordinates: dict[int, SmoothFunction | None] = {}
         free_coordinates = set(find_free_coordinates(mechanism))
         for index, info in enumerate(infos):
             # Their values change from frame to frame or from fit to fit; as inputs they need no new
             # kernel.
             if index in free_coordinates and (info.locked or info.prescribed is not None):
-                self._held[index] = None if info.locked else info.prescribed
+                self._input_coordinates[index] = None if info.locked else info.prescribed
                 infos[index] = replace(info, locked=False, prescribed=None)
         active_constraints = [
             constraint
@@ -106,7 +106,7 @@ class PoseFit:
         fixed_coordinates = {
             index
             for index in range(len(infos))
-            if index not in free_coordinates or index in self._held
+            if index not in free_coordinates or index in self._input_coordinates
         }
         self._couplers, other_constraints = separate_couplers(active_constraints, fixed_coordinates)
         # A target of a coordinate that cannot move has no effect.
@@ -128,13 +128,13 @@ class PoseFit:
             markers,
             sensors,
             active_goals,
-            list(self._held),
+            list(self._input_coordinates),
             self._couplers,
         )
         self._history = self.layout.work[self.layout.ints[FIT.HISTORY] :]
-        self.width = self.measured + len(active_goals) + len(self._held)
+        self.width = self.measured + len(active_goals) + len(self._input_coordinates)
         self.sensors = len(sensors)
-        self.found = len(self.order) + 3 * (len(markers) + len(sensors)) + 3
+        self.result_size = len(self.order) + 3 * (len(markers) + len(sensors)) + 3
 
     def set_pose(self, q: Array) -> None:
         """Start from the values (n,) of all coordinates."""
@@ -163,7 +163,7 @@ class PoseFit:
         free_count = len(self.order)
         measured_rows = measured.reshape(count, -1)
         frames = np.empty((count, self.width))
-        result = np.empty((count, self.found))
+        result = np.empty((count, self.result_size))
         frames[:, : self.measured] = measured_rows[:, : self.measured]
         frames[:, self.measured : self.measured + len(self._goals)] = measured_rows[
             :, self.measured :
@@ -206,8 +206,8 @@ class PoseFit:
             frames: frames (t, width), changed in place.
             moments: times (t,), s.
         """
-        columns = frames[:, self.width - len(self._held) :]
-        for column, (index, function) in enumerate(self._held.items()):
+        columns = frames[:, self.width - len(self._input_coordinates) :]
+        for column, (index, function) in enumerate(self._input_coordinates.items()):
             if function is None:
                 columns[:, column] = self.mechanism.coordinates[index].default_value
             else:
@@ -256,14 +256,14 @@ class SingleFrameFit:
         self._fit = fit
         self._values = fit.mechanism.values({}).copy()
         self._row = np.empty(fit.width)
-        self._found = np.empty(fit.found)
-        self._run = fit.bind_arrays(self._row, self._found)
+        self._result = np.empty(fit.result_size)
+        self._run = fit.bind_arrays(self._row, self._result)
         free_count = len(fit.order)
         end = len(fit.order) + 3 * fit.markers
-        self._given = self._row[: fit.measured]
-        self._q = self._found[:free_count]
-        self.places: Array = self._found[free_count:end].reshape(-1, 3)
-        self.turns: Array = self._found[end:-3].reshape(-1, 3)
+        self._measured_values = self._row[: fit.measured]
+        self._q = self._result[:free_count]
+        self.places: Array = self._result[free_count:end].reshape(-1, 3)
+        self.turns: Array = self._result[end:-3].reshape(-1, 3)
 
     def __call__(self, measured: Array, time: float) -> Array:
         """Return the values (n,) of all coordinates that fit one frame.
@@ -272,10 +272,10 @@ class SingleFrameFit:
             measured: positions of the markers, m, then rotation matrices of the sensors by rows.
             time: time, s.
         """
-        self._given[:] = measured
+        self._measured_values[:] = measured
         self._fit.fill_prescribed(self._row[None], np.array((time,)))
         self._run(1)
-        if self._found[-1] == APART:
+        if self._result[-1] == APART:
             raise self._fit.create_constraint_error(0)
         values = self._values.copy()
         values[self._fit.order] = self._q

@@ -80,9 +80,9 @@ def separate_couplers(
         ]
         if not determined:
             # The couplers depend on each other in a circle; move one of them to the constraints.
-            moved_coupler = pending.pop(0)
-            other_constraints.append(moved_coupler)
-            dependent_coordinates.discard(moved_coupler.dependent)
+            rejected_coupler = pending.pop(0)
+            other_constraints.append(rejected_coupler)
+            dependent_coordinates.discard(rejected_coupler.dependent)
             continue
         couplers += determined
         dependent_coordinates -= {constraint.dependent for constraint in determined}
@@ -99,7 +99,7 @@ class FitLayout:
         markers: points with measured positions.
         sensors: frames with measured orientations.
         goals: coordinates with target values.
-        held_coordinates: indices of locked and prescribed coordinates.
+        input_coordinates: indices of locked and prescribed coordinates.
         couplers: couplers that determine a coordinate.
     """
 
@@ -110,7 +110,7 @@ class FitLayout:
         markers: Sequence[MarkerTarget],
         sensors: Sequence[SensorTarget],
         goals: Sequence[CoordinateTarget],
-        held_coordinates: Sequence[int],
+        input_coordinates: Sequence[int],
         couplers: Sequence[Coupler],
     ) -> None:
         structure = system.structure
@@ -142,7 +142,7 @@ class FitLayout:
             [placements.freedom(goal.coordinate) for goal in goals],
         )
         self._append_list(
-            ints, FIT.HELD, FIT.HELD_AT, [placements.freedom(index) for index in held_coordinates]
+            ints, FIT.HELD, FIT.HELD_AT, [placements.freedom(index) for index in input_coordinates]
         )
         ints[FIT.RANGES_AT] = len(numbers)
         for lower, upper in compute_ranges(system.mechanism, system.order, couplers):
@@ -163,12 +163,12 @@ class FitLayout:
         self._append_list(ints, FIT.COUPLERS, FIT.COUPLER_AT, records)
         self._append_axes(ints, structure, system.numbers, links)
         ints[FIT.RESOLVED_AT] = len(ints)
-        known_freedoms = dict.fromkeys(map(placements.freedom, held_coordinates), FREEDOM.GIVEN)
-        known_freedoms |= {
+        freedom_types = dict.fromkeys(map(placements.freedom, input_coordinates), FREEDOM.GIVEN)
+        freedom_types |= {
             placements.freedom(coupler_with_record.dependent): FREEDOM.DEPENDENT
             for coupler_with_record in couplers
         }
-        ints += [known_freedoms.get(k, FREEDOM.VARIABLE) for k in range(size)]
+        ints += [freedom_types.get(k, FREEDOM.VARIABLE) for k in range(size)]
         ints[FIT.FREE_AT] = len(ints)
         ints += [0] * size
         # The sum of all scratch vectors that the kernel uses at one time.
@@ -176,7 +176,7 @@ class FitLayout:
             2 * size + factor_size(equations, size) + 2 * equations + 3 * size * size + 4 * size
         )
         lengths = {
-            FIT.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held_coordinates),
+            FIT.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(input_coordinates),
             FIT.WEIGHTS: len(markers) + len(sensors) + len(goals),
             FIT.SLOPE: size,
             FIT.STIFFNESS: size * size,

@@ -140,7 +140,7 @@ def scale(
             raise SettingError(f"expected positive factors of '{name}', found {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, axis_factors))))
     measuring.apply_factors(by_hand)
-    results = measuring.found
+    results = measuring.result
     mechanism = measuring.mechanism
     scale_model(
         copy,
@@ -149,7 +149,7 @@ def scale(
         preserve_mass_distribution=preserve_mass_distribution,
         mechanism=mechanism,
     )
-    result = ScaledModel(copy, measuring.found, unknown=describe_unknown(model, UNSCALED))
+    result = ScaledModel(copy, measuring.result, unknown=describe_unknown(model, UNSCALED))
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
     return result
@@ -250,7 +250,7 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
                 f"scaling_order has '{step}'; expected {MEASUREMENTS} or {MANUAL_SCALE}{suggestion}"
             )
     keeps_distribution = scaler.preserve_mass_distribution
-    result = measuring.found
+    result = measuring.result
     mechanism = measuring.mechanism
     scale_model(
         model,

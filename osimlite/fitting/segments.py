@@ -29,7 +29,7 @@ class Segments(NamedTuple):
 
     parts: tuple[Segment, ...]  # segment of each parameter
     # Neighbouring segments: pairs of lists of parameters whose means are similar.
-    alike: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+    neighbours: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
     # Pairs of a parameter and the list of all parameters of its segment.
     sides: tuple[tuple[int, tuple[int, ...]], ...]
 
@@ -133,7 +133,7 @@ class Segments(NamedTuple):
                     self._create_mean_row(inner, neighbour_deviation)
                     - self._create_mean_row(outer, neighbour_deviation)
                 )
-                for inner, outer in self.alike
+                for inner, outer in self.neighbours
             ),
         ]
         rows += [

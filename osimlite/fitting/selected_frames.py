@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.spatial import Array
 
 STATIC_TRIAL = "static"
 """Name of the trial in which the subject stands."""
-STATIC_SHARE = 0.05
+STATIC_FRAME_FRACTION = 0.05
 """Share of the frames that come from the static trial."""
 MIN_MARKERS = 3
 """Smallest number of markers in a frame that is used."""
@@ -75,8 +75,8 @@ class SelectedFrames:
             len(trial.times) for name, trial in trials.items() if name != STATIC_TRIAL
         )
         for name, trial in trials.items():
-            frame_share = (
-                STATIC_SHARE
+            frame_fraction = (
+                STATIC_FRAME_FRACTION
                 if name == STATIC_TRIAL and moving_frame_count
                 else len(trial.times) / max(moving_frame_count, 1)
             )
@@ -88,7 +88,7 @@ class SelectedFrames:
             # Fewer markers than three do not determine the pose of any segment.
             usable_frames = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= MIN_MARKERS)
             # Each trial contributes at least one frame.
-            selected_count = max(1, round(count * min(frame_share, 1.0)))
+            selected_count = max(1, round(count * min(frame_fraction, 1.0)))
             for frame in (
                 usable_frames[
                     np.unique(

@@ -29,7 +29,7 @@ AXES = "xyz"
 """Names of the axes."""
 
 
-class PlacedSensors(NamedTuple):
+class SensorPlacement(NamedTuple):
     """Sensors that were placed on a model."""
 
     names: tuple[str, ...]  # names of the sensors
@@ -77,7 +77,7 @@ def find_sensor_frames(
 
 def place_sensors(
     model: Model, data: OrientationData, base: str = "", axis: str = ""
-) -> PlacedSensors:
+) -> SensorPlacement:
     """Place sensors on a model in its default pose, in which the subject stood.
 
     The name of a sensor is the name of a frame with the suffix ``_imu``. The sensor becomes an
@@ -154,7 +154,7 @@ def place_sensors(
         carrier_frame.components.append(frame)
         model.add(IMU(name=name, socket_frame=frame))
     names = tuple(name for name, _, _ in placements)
-    return PlacedSensors(names, tuple(name for name in data.names if name not in names), heading)
+    return SensorPlacement(names, tuple(name for name in data.names if name not in names), heading)
 
 
 def _find_single_frame(

@@ -105,14 +105,14 @@ class ScaledPoseFit:
         self, shape: ScalableMarkers, sizes: Array, offsets: Array, weights: Array
     ) -> None:
         self.mechanism, stations = shape.scale_mechanism(sizes)
-        moved_stations = [
+        displaced_stations = [
             station._replace(location=station.location + offset)
             for station, offset in zip(stations, offsets, strict=True)
         ]
-        self._points = _MarkerPoints(self.mechanism, moved_stations)
+        self._points = _MarkerPoints(self.mechanism, displaced_stations)
         markers = [
             MarkerTarget(station, weight)
-            for station, weight in zip(moved_stations, weights.tolist(), strict=True)
+            for station, weight in zip(displaced_stations, weights.tolist(), strict=True)
         ]
         self._fit = PoseFit(self.mechanism, markers)
 
@@ -156,7 +156,7 @@ class _MarkerPoints:
     def __init__(self, mechanism: Mechanism, stations: Sequence[StationPlacement]) -> None:
         self._mechanism = mechanism
         unconstrained = mechanism.without_constraints()
-        self._system = System(unconstrained, Forces(()), apart=True)
+        self._system = System(unconstrained, Forces(()), keep_fixed_bodies=True)
         links = [self._system.placements[station.body][0] for station in stations]
         # Several markers are on one link, whose motion is computed once.
         self._marker_links, self._links = np.unique(links, return_inverse=True)

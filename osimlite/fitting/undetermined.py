@@ -51,22 +51,22 @@ def find_undetermined(
         Names in the order of the mechanism.
     """
     count = len(mechanism.coordinates)
-    held_coordinates = [
+    fixed_coordinates = [
         k
         for k, info in enumerate(mechanism.coordinates)
         if info.locked or info.prescribed is not None
     ]
     # A target determines its coordinate, however small its weight.
-    held_coordinates += [goal.coordinate for goal in goals if goal.weight > 0.0]
+    fixed_coordinates += [goal.coordinate for goal in goals if goal.weight > 0.0]
     open_everywhere = np.ones(count, dtype=bool)
     frames = np.linspace(0, len(values) - 1, min(len(values), MAX_FRAMES)).astype(int)
     # `np.unique` would import `numpy.ma`, which takes ten milliseconds.
     for frame in sorted(set(frames.tolist())):
         state = mechanism.at(values[frame])
-        rows = [np.eye(count)[held_coordinates]]
-        for marker, is_seen in zip(markers, visibility[frame].tolist(), strict=True):
+        rows = [np.eye(count)[fixed_coordinates]]
+        for marker, is_visible in zip(markers, visibility[frame].tolist(), strict=True):
             body, point = marker.station
-            if is_seen and marker.weight > 0.0 and body != GROUND:
+            if is_visible and marker.weight > 0.0 and body != GROUND:
                 # The first three rows are the angular velocity of the body, which a point does not
                 # show.
                 rows.append(state.point_jacobian(body, point)[3:])

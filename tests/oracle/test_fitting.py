@@ -162,7 +162,7 @@ def test_public_setups_at_the_best_accuracy(
     turning = [info.motion_type == "rotational" for info in mechanism.coordinates]
     poses = np.where(turning, np.deg2rad(theirs.rows), theirs.rows)
     for q, measured, wanted, cost in zip(
-        poses, ours.measured, tasks.wanted, ours.costs, strict=True
+        poses, ours.measured, tasks.target_values, ours.costs, strict=True
     ):
         goals = [
             0.5 * goal.weight * (q[goal.coordinate] - value) ** 2

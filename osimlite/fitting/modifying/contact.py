@@ -68,7 +68,7 @@ def _create_smooth_force(
         for parameters in (sphere_parameters, plane_parameters)
     ]
     # The softer surface yields more, so its dissipation counts more.
-    sphere_share = softness[0] / sum(softness)
+    sphere_fraction = softness[0] / sum(softness)
 
     def mean(name: str) -> float:
         a, b = getattr(sphere_parameters, name), getattr(plane_parameters, name)
@@ -83,8 +83,8 @@ def _create_smooth_force(
         # Springs in series: deformations add up; the factor 2 makes equal surfaces keep their
         # number.
         stiffness=(2.0 / sum(softness)) ** 1.5,
-        dissipation=sphere_parameters.dissipation * sphere_share
-        + plane_parameters.dissipation * (1.0 - sphere_share),
+        dissipation=sphere_parameters.dissipation * sphere_fraction
+        + plane_parameters.dissipation * (1.0 - sphere_fraction),
         static_friction=mean("static_friction"),
         dynamic_friction=mean("dynamic_friction"),
         viscous_friction=mean("viscous_friction"),
