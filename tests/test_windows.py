@@ -97,7 +97,7 @@ def test_a_script_that_processes_run_anew_is_told_where_a_sweep_begins() -> None
 def test_a_library_call_starts_no_processes_that_would_run_the_callers_script_anew(
     fixtures: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("osimlite.lint.many.WORTH_SHARING", 0)
+    monkeypatch.setattr("osimlite.lint.many.MIN_PARALLEL_BYTES", 0)
     monkeypatch.delattr("concurrent.futures.ProcessPoolExecutor")
     assert validate(fixtures / "lint" / "OSIM301").checked > 1
 

@@ -87,7 +87,7 @@ def _show_verdicts(report: TrialReport) -> None:
                 column, overflow="fold", justify="right" if column == "limits" else "left"
             )
         for row in verdicts:
-            add_row(table, row.verdict, row.shown, row.limits, row.words)
+            add_row(table, row.verdict, row.value_text, row.limits, row.words)
         show(f"{file}\n")
         print_table(table)
         show("\n")

@@ -53,11 +53,11 @@ def subtract_baseline(path: str | Path, report: Report) -> Report:
     for finding in report.findings:
         key = _make_key(finding)
         # Older baselines contain the code of the group.
-        known_code = next(
+        baseline_code = next(
             (code for code in (key[0], key[0][:7]) if counts[(code, *key[1:])] > 0), None
         )
-        if known_code is not None:
-            counts[(known_code, *key[1:])] -= 1
+        if baseline_code is not None:
+            counts[(baseline_code, *key[1:])] -= 1
         else:
             new_findings.append(finding)
     return replace(report, findings=new_findings, known=len(report.findings) - len(new_findings))

@@ -106,7 +106,7 @@ class Cache:
         try:
             entry = {
                 "key": key,
-                "file": _stamp_if_settled(file, since),
+                "file": _stamp_if_old_enough(file, since),
                 "text": text,
                 "outside": [(path, self._get_stamp(path)) for path in outside_paths],
                 "findings": [_dump_finding(finding) for finding in report],
@@ -174,7 +174,7 @@ def _stamp_file(file: str) -> list[int]:
     return [result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino]
 
 
-def _stamp_if_settled(file: str, moment: int) -> list[int] | None:
+def _stamp_if_old_enough(file: str, moment: int) -> list[int] | None:
     """Return the stamp of a file; None if it may have changed after a moment (ns), since file clocks tick slowly."""
     # A change within the tick of the file system's clock would leave the time of modification as it
     # was.

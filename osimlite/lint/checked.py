@@ -48,18 +48,18 @@ class CheckTarget:
         """Return whether a rule applies to this target."""
         return rule.about == self.about
 
-    def measure(self, *, anew: bool = True) -> str:
+    def measure(self, *, compute: bool = True) -> str:
         """Measure paths and muscles, or recall the results; return the reason of a failure.
 
         Args:
-            anew: whether to measure if there is no result yet; otherwise results are only recalled.
+            compute: whether to measure if there is no result yet; otherwise results are only recalled.
 
         Returns:
             The reason why nothing was measured; empty on success.
         """
         return ""
 
-    def find_obstacles(self, *, anew: bool = True) -> str:
+    def find_obstacles(self, *, compute: bool = True) -> str:
         """Find the reasons why the model cannot be computed; return why that failed, if so.
 
         Returns:

@@ -125,12 +125,12 @@ def may_fail(subject: Subject) -> bool:
     )
 
 
-def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
+def find_obstacles(subject: Subject, *, compute: bool = True) -> str:
     """Find the reasons why a model cannot be computed, and cache them in the subject.
 
     Args:
         subject: check target with the model, which keeps the obstacles.
-        anew: whether the model is built if necessary; otherwise only remembered results are used.
+        compute: whether the model is built if necessary; otherwise only remembered results are used.
 
     Returns:
         Reason why the obstacles are unknown; empty if they are known.
@@ -145,7 +145,7 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
     key = None if subject.source is None else _compute_digest(subject)
     obstacles = _memory.get(key) if key is not None else None
     if obstacles is None:
-        if not anew:
+        if not compute:
             return "not requested"
         obstacles = _try_construction(subject)
     subject.cache[CONSTRUCTION] = obstacles

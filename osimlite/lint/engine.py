@@ -121,9 +121,9 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     building = [rule for rule in selected if rule.about == CONSTRUCTION]
     why_not = unbuilt = ""
     if building:
-        unbuilt = subject.find_obstacles(anew=measure) if measure or recall else "not requested"
+        unbuilt = subject.find_obstacles(compute=measure) if measure or recall else "not requested"
     if measuring:
-        why_not = subject.measure(anew=measure) if measure or recall else "not requested"
+        why_not = subject.measure(compute=measure) if measure or recall else "not requested"
     left_out = [*(measuring if why_not else []), *(building if unbuilt else [])]
     # Failures of a computation are not reported where another rule has reported their cause.
     selected.sort(key=lambda rule: rule.about == CONSTRUCTION)
@@ -131,8 +131,8 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     for rule in selected:
         if rule not in left_out:
             checks.setdefault(rule.check, {})[rule.name if rule.group else ""] = rule
-    for check, told_apart in checks.items():
-        check(subject, FindingCollector(told_apart, subject, findings))
+    for check, rules_by_fault in checks.items():
+        check(subject, FindingCollector(rules_by_fault, subject, findings))
     # Text after a syntax error was guessed by the reader; findings there may be wrong.
     if subject.sure_until is not None:
         limit = subject.sure_until
@@ -204,7 +204,7 @@ def _apply_suppressions(
                     any(map(subject.config.includes, matching_rules)) and not is_silent
                 )
                 if code not in comment.used and ran:
-                    result(f"'{code}' ignores nothing here; delete it", at=comment.place)
+                    result(f"'{code}' ignores nothing here; delete it", at=comment.position)
             if not comment.codes:
-                result("this comment names no code to ignore", at=comment.place)
+                result("this comment names no code to ignore", at=comment.position)
     return remaining

@@ -77,7 +77,8 @@ def find_new_properties(cls: type[Object], release: str) -> list[NewProperty]:
         for tag, spec in get_field_specs(cls).items()
     }
     changes = (
-        (spec, later.get(base) or later.get(own_key)) for spec, (base, own_key) in names.items()
+        (spec, later.get(base_key) or later.get(class_key))
+        for spec, (base_key, class_key) in names.items()
     )
     return [
         NewProperty(spec, result[0], "".join(result[1:]))

@@ -21,7 +21,7 @@ from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merge_reports
 from osimlite.lint.settings import Settings, load_settings
 
-WORTH_SHARING = 4_000_000
+MIN_PARALLEL_BYTES = 4_000_000
 """Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""
 
 Progress = Callable[[int, int], None]
@@ -160,7 +160,7 @@ def count_processes(jobs: list[CheckJob]) -> int:
             size += os.path.getsize(job.file)
         except OSError:
             continue
-    if size < WORTH_SHARING or len(jobs) < 2:
+    if size < MIN_PARALLEL_BYTES or len(jobs) < 2:
         return 1
     # ProcessPoolExecutor allows at most 61 processes on Windows.
     return min(count_cores(), len(jobs), 61)

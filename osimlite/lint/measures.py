@@ -114,7 +114,7 @@ class MovingPoint(NamedTuple):
     # Distance of the coordinate from the range in which the functions are defined (rad or m), 0 if
     # inside.
     beyond: float
-    moved: float  # displacement of the point over that distance, m
+    displacement: float  # displacement of the point over that distance, m
     # Derivative of the position by the coordinate with which OpenSim continues outside of the
     # range, m/rad or 1.
     rate: float
@@ -189,12 +189,12 @@ def has_measures(subject: Subject) -> bool:
     return any(next(subject.find_by_class(name), None) is not None for name in _MEASURED)
 
 
-def measure_subject(subject: Subject, *, anew: bool = True) -> str:
+def measure_subject(subject: Subject, *, compute: bool = True) -> str:
     """Measure a model, or recall its measurements; return the reason of a failure.
 
     Args:
         subject: check target with the model, which keeps the measurements.
-        anew: whether the model is measured if necessary; otherwise only earlier measurements are
+        compute: whether the model is measured if necessary; otherwise only earlier measurements are
             recalled.
 
     Returns:
@@ -222,7 +222,7 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
         ) == find_swept_coordinates(remembered_measures.measures):
             subject.cache[MEASURES] = unchanged
             return ""
-    if not anew:
+    if not compute:
         return "not requested"
     try:
         measured = import_module("osimlite.lint.measuring").measure_model
@@ -266,7 +266,7 @@ _INDEPENDENT_CLASSES = {"Geometry", "Marker", "Controller", "Probe", "ContactGeo
 class TextParts(NamedTuple):
     """Digests of the parts of a text."""
 
-    rest: str  # digest of everything on which all paths depend
+    common: str  # digest of everything on which all paths depend
     paths: dict[str, str]  # digest of the element of each path's owner, by component path
 
 
@@ -308,21 +308,21 @@ def digest_parts(subject: Subject) -> TextParts | None:
                 spans.append((span.start, span.end, subject.path(item) if has_path else ""))
             elif has_path:
                 return None
-    rest_digest = blake2b(str(subject.version).encode(), digest_size=16)
+    common_digest = blake2b(str(subject.version).encode(), digest_size=16)
     paths = dict[str, str]()
     covered_end = 0
     for start, end, path in sorted(spans):
         if start >= covered_end:
             # White space around an element has no meaning: an added element must not change the
             # digest of its surroundings.
-            rest_digest.update(source.text[covered_end:start].strip().encode("utf-8", "replace"))
+            common_digest.update(source.text[covered_end:start].strip().encode("utf-8", "replace"))
             covered_end = end
         if path:
             paths[path] = blake2b(
                 source.text[start:end].encode("utf-8", "replace"), digest_size=16
             ).hexdigest()
-    rest_digest.update(source.text[covered_end:].strip().encode("utf-8", "replace"))
-    return TextParts(rest_digest.hexdigest(), paths)
+    common_digest.update(source.text[covered_end:].strip().encode("utf-8", "replace"))
+    return TextParts(common_digest.hexdigest(), paths)
 
 
 def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures | None:
@@ -332,7 +332,7 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
         parts: digests of the parts of the model's text.
         folder: folder of the cache; None for the memory alone.
     """
-    recalled = remembered.get(parts.rest)
+    recalled = remembered.get(parts.common)
     if recalled is None and folder is not None:
         from pydantic import TypeAdapter, ValidationError
 
@@ -343,7 +343,7 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
         except (OsimliteError, ValidationError):
             return None
         mark_used(_cache_file(folder, parts))
-        remembered[parts.rest] = recalled
+        remembered[parts.common] = recalled
     return recalled
 
 
@@ -355,8 +355,8 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
         measures: measurements of the model.
         folder: folder of the cache; None for the memory alone.
     """
-    entry = remembered[parts.rest] = RememberedMeasures(parts.paths, measures)
-    remembered.move_to_end(parts.rest)
+    entry = remembered[parts.common] = RememberedMeasures(parts.paths, measures)
+    remembered.move_to_end(parts.common)
     while len(remembered) > MAX_REMEMBERED_MODELS:
         remembered.popitem(last=False)
     if folder is not None:
@@ -367,4 +367,4 @@ def remember_measures(parts: TextParts, measures: Measures, folder: Path | None)
 
 
 def _cache_file(folder: Path, parts: TextParts) -> Path:
-    return folder / "measured" / f"{parts.rest}.json"
+    return folder / "measured" / f"{parts.common}.json"

@@ -196,7 +196,7 @@ def compute_poses(
 class _JointMotion(NamedTuple):
     """Rotation or translation of a joint by a function of coordinates; None is the coordinate itself."""
 
-    turns: bool
+    is_rotation: bool
     axis: Vector  # a unit vector, or zeros
     names: list[str]
     function: SmoothFunction | None = None
@@ -218,8 +218,8 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
         if is_a(joint, "CustomJoint"):
             axes = [*enumerate(list_axes(cast("CustomJoint", joint)))]
             functions = [_make_function(axis, rough) for _, axis in axes]
-            known_functions = [function for function in functions if function is not None]
-            if len(known_functions) == len(axes):
+            defined_functions = [function for function in functions if function is not None]
+            if len(defined_functions) == len(axes):
                 result[id(joint)] = [
                     _JointMotion(
                         index < 3,
@@ -228,11 +228,11 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
                         [] if isinstance(axis.function, Constant) else axis.names,
                         function,
                     )
-                    for (index, axis), function in zip(axes, known_functions, strict=True)
+                    for (index, axis), function in zip(axes, defined_functions, strict=True)
                 ]
         elif (
-            joint.moves is not None
-            and len(words := joint.moves.split()) == len(names)
+            joint.coordinate_motions is not None
+            and len(words := joint.coordinate_motions.split()) == len(names)
             # "r" is a rotation whose axis depends on the properties of the joint.
             and "r" not in words
         ):
@@ -281,7 +281,7 @@ def _compute_joint_pose(
     position = ZERO
     for motion in motions:
         amount = motion.amount(values)
-        if motion.turns and amount:
+        if motion.is_rotation and amount:
             axes = multiply_rotations(axes, rotation_about_axis(motion.axis, *_sine_cosine(amount)))
         elif amount:
             position = add_scaled(position, amount, motion.axis)
@@ -307,7 +307,7 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
     result: dict[str, Vector] = {}
     axes = X, Y, Z
     for motion in _find_joint_motions(subject, False).get(id(joint), []):
-        if not motion.turns or len(motion.names) != 1:
+        if not motion.is_rotation or len(motion.names) != 1:
             continue
         # Without a direction neither this rotation nor the following ones can be computed.
         if motion.names[0] not in values or motion.axis == ZERO:

@@ -42,7 +42,7 @@ class RowFault(NamedTuple):
     times: int = 1
     others: int = 0
 
-    def describe_rest(self, noun: str = "row") -> str:
+    def describe_repeats(self, noun: str = "row") -> str:
         """Return a phrase about further rows and columns with the same fault."""
         rows = (
             [f"; the same in {format_count(self.times - 1, f'more {noun}')}"]
@@ -155,7 +155,7 @@ class RowScanner:
             lines = block.split(b"\n")
             # Each line of a block ends with a line feed, so that the last piece is empty.
             lines.pop()
-            looks, zeros = (
+            shapes, zeros = (
                 _compute_shapes(block, layout)
                 if len(block) < _LONGEST
                 # A line of several megabytes would need tables of shapes of many times its size;
@@ -163,16 +163,16 @@ class RowScanner:
                 else (b"!\n" * len(lines), False)
             )
             # The usual case: a block of rows of plain numbers is recognised by one comparison.
-            if looks == (plain_shape + b"\n") * len(lines):
+            if shapes == (plain_shape + b"\n") * len(lines):
                 self._note_rows(lines, [plain_shape] * len(lines), line, zeros)
             else:
-                forms = looks.split(b"\n")
+                forms = shapes.split(b"\n")
                 # Where markers were not seen, a good row has another form than a whole one.
                 kinds = [
                     form
                     and (
                         form == plain_shape
-                        or (self.markers and _find_seen_markers(form, self.cells) is not None)
+                        or (self.markers and _find_present_markers(form, self.cells) is not None)
                     )
                     for form in forms
                 ]
@@ -202,12 +202,12 @@ class RowScanner:
         self._note_line_of_row(line)
         if self.markers:
             times = self._read_marker_times(lines, line)
-            looks = set(forms)
+            shapes = set(forms)
             rows.unseen.difference_update(
-                *(_find_seen_markers(form, self.cells) or () for form in looks if rows.unseen)
+                *(_find_present_markers(form, self.cells) or () for form in shapes if rows.unseen)
             )
             # Only incomplete rows and rows with three zeros in a row can hold faults of markers.
-            if zeros or any(b"\t\t" in form for form in looks):
+            if zeros or any(b"\t\t" in form for form in shapes):
                 for number, (text, form) in enumerate(zip(lines, forms, strict=True)):
                     if b"\t\t" in form or b"\t\t\t" in text.translate(None, b"0.-+"):
                         self._examine_markers(text, line + number)
@@ -349,7 +349,7 @@ class RowScanner:
                 form = b"\t".join(
                     b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells
                 )
-                rows.unseen -= _find_seen_markers(form, self.cells) or set()
+                rows.unseen -= _find_present_markers(form, self.cells) or set()
                 self._examine_markers(text, line)
             if self._count_missing_samples() > 0:
                 rows.samples.append(self._read_numbers(text, parse_number))
@@ -443,7 +443,7 @@ def _compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
 
 
 @lru_cache(maxsize=256)
-def _find_seen_markers(form: bytes, cells: int) -> frozenset[int] | None:
+def _find_present_markers(form: bytes, cells: int) -> frozenset[int] | None:
     """Return the markers that a row of this shape contains; None if it is not a row of markers."""
     # This is cached, since tables have few distinct shapes of rows.
     numbers = form.split(b"\t")

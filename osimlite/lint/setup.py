@@ -17,8 +17,14 @@ from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.patterns import compile_later
 from osimlite.io.document.cache import get_object
 from osimlite.io.document.survey import Survey
-from osimlite.lint.beside import list_documents, list_folders, read_beginning, read_table, read_tree
 from osimlite.lint.config import Config
+from osimlite.lint.neighbours import (
+    list_documents,
+    list_folders,
+    read_beginning,
+    read_table,
+    read_tree,
+)
 from osimlite.lint.project_files import is_table
 from osimlite.lint.registry import Rule
 from osimlite.lint.subject import Subject
@@ -61,7 +67,7 @@ class Setup(Subject):
 
     def __init__(self, survey: Survey, config: Config | None = None) -> None:
         super().__init__(survey, config)
-        self._looked_at: dict[str, None] = {}
+        self._examined_paths: dict[str, None] = {}
         self._tools_by_folder: dict[Path, list[tuple[str, Object]]] = {}
 
     def is_for(self, rule: Rule) -> bool:
@@ -125,7 +131,7 @@ class Setup(Subject):
     def list_outside_paths(self) -> list[str] | None:
         """Return every path on which the check depends."""
         paths = super().list_outside_paths()
-        return None if paths is None else [*paths, *self._looked_at]
+        return None if paths is None else [*paths, *self._examined_paths]
 
     # ------------------------------------------------------------------------------------------------- files
 
@@ -140,9 +146,9 @@ class Setup(Subject):
         folder = str(self.folder or Path())
         path = os.path.join(folder, name)
         # Recorded for the cache of reports: the finding changes when a file appears here.
-        self._looked_at[path] = None
+        self._examined_paths[path] = None
         if not os.path.isfile(path):
-            self._looked_at[os.path.dirname(path)] = None
+            self._examined_paths[os.path.dirname(path)] = None
             # A file that is not in that folder is searched in the working folder.
             if os.path.isfile(name) and not os.path.isabs(name):
                 return name
@@ -152,7 +158,7 @@ class Setup(Subject):
         """Return the table in a file of this setup; None if it is missing or unreadable."""
         return (
             read_table(self.resolve_path(name.strip()))
-            if is_given(name) and is_table(name)
+            if names_file(name) and is_table(name)
             else None
         )
 
@@ -170,7 +176,7 @@ class Setup(Subject):
 
     def read_document(self, name: str) -> Object | None:
         """Return the top object of a document of this setup; None if it is missing or unreadable."""
-        return get_object(self.resolve_path(name.strip())) if is_given(name) else None
+        return get_object(self.resolve_path(name.strip())) if names_file(name) else None
 
     # ------------------------------------------------------------------------------------------------- context
 
@@ -182,10 +188,12 @@ class Setup(Subject):
         if self.folder is None:
             return
         folder = self.folder.resolve()
-        beside = (other for above in (folder, folder.parent) for other in list_folders(above))
-        yield from self._read_tools(chain((folder, folder.parent), beside))
+        neighbour_folders = (
+            other for above in (folder, folder.parent) for other in list_folders(above)
+        )
+        yield from self._read_tools(chain((folder, folder.parent), neighbour_folders))
 
-    def list_tools_beside(self) -> list[tuple[str, Object]]:
+    def list_tools_in_folder(self) -> list[tuple[str, Object]]:
         """Return the tools in the folder of this document, with the paths of their setups."""
         return [] if self.folder is None else self._read_folder(self.folder.resolve())
 
@@ -217,13 +225,13 @@ class Setup(Subject):
             return self._tools_by_folder[folder]
         tools = self._tools_by_folder[folder] = []
         # The cache of reports must expire when a file in the folder appears or changes.
-        self._looked_at[str(folder)] = None
+        self._examined_paths[str(folder)] = None
         for file in (list_documents(str(folder)) or [])[:_MAX_NEIGHBOURS]:
             # Most documents are no tools, which their first bytes show without parsing.
             top = get_object(file) if _NAMES_MODEL.search(read_beginning(file)) else None
             if top is not None and _find_model_file(top) is not None:
                 tools.append((file, top))
-                self._looked_at[file] = None
+                self._examined_paths[file] = None
         return tools
 
     @cached_property
@@ -242,12 +250,12 @@ class Setup(Subject):
         if _find_model_file(self.top) is not None:
             yield self.file, self.top
             return
-        own_path = os.path.realpath(self.file)
+        document_path = os.path.realpath(self.file)
         # Paths may differ by symbolic links and by "..".
         for file, top in self.iterate_neighbours():
             folder = os.path.dirname(file)
             if any(
-                os.path.realpath(os.path.join(folder, name)) == own_path
+                os.path.realpath(os.path.join(folder, name)) == document_path
                 for name in _list_read_files(top)
             ):
                 yield file, top
@@ -314,10 +322,10 @@ class Setup(Subject):
 
     def _resolve_tool_path(self, name: str) -> str | None:
         """Return the path of a file that the tool names; None if it names none."""
-        if not is_given(name) or self.tool is None:
+        if not names_file(name) or self.tool is None:
             return None
         path = os.path.join(os.path.dirname(self.tool[0]), name.strip())
-        self._looked_at[path] = None
+        self._examined_paths[path] = None
         return path
 
     def list_names(self, target: str) -> set[str]:
@@ -365,10 +373,10 @@ class Setup(Subject):
             results_folder = os.path.realpath(os.path.join(folder, results))
             # Tools that run through time call their tables by their own name, which may begin with
             # that of another.
-            is_own = os.path.dirname(target) == results_folder and os.path.basename(
+            has_tool_prefix = os.path.dirname(target) == results_folder and os.path.basename(
                 target
             ).startswith(f"{top.name}_")
-            if is_own and _writes_own_tables(top, target):
+            if has_tool_prefix and _writes_prefixed_tables(top, target):
                 files_by_name_length[len(top.name)] = file
             for item in top.walk():
                 for _, name in list_files(item, "output-file"):
@@ -381,7 +389,7 @@ class Setup(Subject):
         return files_by_name_length[max(files_by_name_length)] if files_by_name_length else None
 
 
-def _writes_own_tables(tool: Object, path: str) -> bool:
+def _writes_prefixed_tables(tool: Object, path: str) -> bool:
     """Return whether a tool may write a file whose name begins with the tool's name.
 
     ScaleTool and InverseDynamicsTool write only files that they name. No tool writes measured
@@ -392,7 +400,7 @@ def _writes_own_tables(tool: Object, path: str) -> bool:
     return os.path.splitext(path)[1] in ("", ".sto", ".mot", ".xml")
 
 
-def is_given(name: str) -> bool:
+def names_file(name: str) -> bool:
     """Return whether a text names a file; the word Unassigned stands for none."""
     return name.strip() not in ("", "Unassigned")
 
@@ -412,7 +420,7 @@ def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
     for spec in get_file_specs(type(item), rule):
         value = getattr(item, spec.name)
         for name in value if isinstance(value, tuple) else (value,):
-            if isinstance(name, str) and is_given(name):
+            if isinstance(name, str) and names_file(name):
                 yield spec, name
 
 

@@ -42,30 +42,30 @@ class RowLayout(NamedTuple):
     """Layout of rows: a code byte for each character, and the characters of the resulting shapes."""
 
     codes: bytes
-    shown: bytes
+    visible: bytes
     hidden: bytes
 
 
-def _make_layout(kept_separators: bytes, *more_characters: tuple[bytes, int, int]) -> RowLayout:
+def _make_layout(separators: bytes, *more_characters: tuple[bytes, int, int]) -> RowLayout:
     """Return a layout with some separators kept in the shapes.
 
     Some characters are said to follow on each other never, though they may: that tells separators
     from each other.
     """
-    codes, shown_bytes = bytearray(256), bytearray(256)
+    codes, visible_bytes = bytearray(256), bytearray(256)
     for characters, code, no_repeat in (*_CHARACTERS, *more_characters):
         for character in characters:
             codes[character] = code | no_repeat << 4
-    shown_bytes[1] = ord("0")
-    for separator in b"\n" + kept_separators:
-        shown_bytes[codes[separator] & _LAYOUT] = separator
+    visible_bytes[1] = ord("0")
+    for separator in b"\n" + separators:
+        visible_bytes[codes[separator] & _LAYOUT] = separator
     for value in range(256):
         if value & 2:
-            shown_bytes[value] = 10 if shown_bytes[value ^ 2] == 10 else ord("!")
+            visible_bytes[value] = 10 if visible_bytes[value ^ 2] == 10 else ord("!")
     return RowLayout(
         bytes(codes),
-        bytes(shown_bytes),
-        bytes(value for value in range(256) if not shown_bytes[value]),
+        bytes(visible_bytes),
+        bytes(value for value in range(256) if not visible_bytes[value]),
     )
 
 
@@ -133,7 +133,7 @@ def compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
     if invalid:
         invalid = (invalid | invalid >> 1 | invalid >> 2 | invalid >> 3) & ones
         marks |= (invalid & solid | (invalid & spaces) >> 8) << 1
-    shapes = marks.to_bytes(len(block) + 1, "little").translate(layout.shown, layout.hidden)
+    shapes = marks.to_bytes(len(block) + 1, "little").translate(layout.visible, layout.hidden)
     return shapes[:-1], bool(zeros)
 
 

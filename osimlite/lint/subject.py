@@ -112,21 +112,21 @@ class Subject(CheckTarget):
             return self.source is not None
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
-    def measure(self, *, anew: bool = True) -> str:
+    def measure(self, *, compute: bool = True) -> str:
         """Measure paths and muscles, or recall the results; return the reason of a failure.
 
         Returns:
             The reason why nothing was measured; empty on success.
         """
-        return measure_subject(self, anew=anew)
+        return measure_subject(self, compute=compute)
 
-    def find_obstacles(self, *, anew: bool = True) -> str:
+    def find_obstacles(self, *, compute: bool = True) -> str:
         """Build the model, or recall the reasons against it; return why neither was done.
 
         Returns:
             The reason why the model was not built; empty on success.
         """
-        return find_obstacles(self, anew=anew)
+        return find_obstacles(self, compute=compute)
 
     @cached_property
     def _may_fail(self) -> bool:

@@ -22,7 +22,7 @@ LAST_LINE = sys.maxsize
 class Suppression:
     """Ignoring comment: its codes, the lines it applies to, and the codes that were used."""
 
-    place: Position
+    position: Position
     codes: tuple[str, ...]
     first: int
     last: int

@@ -40,7 +40,7 @@ BAD = "bad"
 VERDICTS = (GOOD, OKAY, BAD)
 """Verdicts from best to worst."""
 
-SMALLEST_SHOWN = 0.001
+SMALLEST_PRINTED = 0.001
 """Number below which measurements are shown as less than this number."""
 
 STATISTICS = {"peak": "the peak of "} | dict.fromkeys(
@@ -82,7 +82,7 @@ class TrialVerdict(NamedTuple):
     line: int | None  # line in the file, from 1
 
     @property
-    def shown(self) -> str:
+    def value_text(self) -> str:
         """Value with its unit."""
         return f"{_format_number(self.value)} {self.unit}".rstrip()
 
@@ -98,8 +98,8 @@ class TrialVerdict(NamedTuple):
 
 
 def _format_number(value: float) -> str:
-    if 0.0 < value < SMALLEST_SHOWN:
-        return f"<{SMALLEST_SHOWN:g}"
+    if 0.0 < value < SMALLEST_PRINTED:
+        return f"<{SMALLEST_PRINTED:g}"
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 

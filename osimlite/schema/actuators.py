@@ -16,7 +16,7 @@ from osimlite.schema.references import (
 class CoordinateActuator(ScalarActuator):
     """Pushes one coordinate with `optimal_force` times the control."""
 
-    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubtful={"optimal_force": IDLE})
 
     coordinate: MaybeCoordinateName = None
     """Name of the coordinate that is pushed."""
@@ -32,7 +32,7 @@ class ActivationCoordinateActuator(CoordinateActuator):
         outputs="statebounds_activation:Vec2",
         domains={"optimal_force": "!= 0"},
         zero={STOPS: "activation_time_constant"},
-        doubts={"optimal_force": IDLE},
+        doubtful={"optimal_force": IDLE},
     )
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
@@ -44,7 +44,7 @@ class ActivationCoordinateActuator(CoordinateActuator):
 class PointActuator(ScalarActuator):
     """Pushes one point of a body along a fixed direction."""
 
-    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubtful={"optimal_force": IDLE})
 
     body: MaybeBodyName = None
     """Name of the body that is pushed."""
@@ -63,7 +63,7 @@ class PointActuator(ScalarActuator):
 class PointToPointActuator(ScalarActuator):
     """Pushes two points apart along the line between them."""
 
-    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubtful={"optimal_force": IDLE})
 
     bodyA: MaybeBodyName = None
     """Name of the first body, which a positive force pushes away from B."""
@@ -82,7 +82,7 @@ class PointToPointActuator(ScalarActuator):
 class TorqueActuator(ScalarActuator):
     """Applies a torque about an axis to body A, and the opposite torque to body B."""
 
-    facts = Facts(domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+    facts = Facts(domains={"optimal_force": "!= 0"}, doubtful={"optimal_force": IDLE})
 
     bodyA: MaybeFrameName = None
     """Frame that a positive torque turns about the axis."""

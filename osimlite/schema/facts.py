@@ -55,7 +55,7 @@ class Facts(NamedTuple):
         zero: consequences of the number 0, which take precedence; an empty text means that OpenSim
             computes with 0.
         missing: consequences of a missing number that has no default.
-        doubts: reasons to doubt a number outside its domain with which OpenSim computes, by
+        doubtful: reasons to doubt a number outside its domain with which OpenSim computes, by
             property.
         mujoco: properties of a muscle from which the numbers of MuJoCo's muscle are read, by
             MuJoCo's names (vmax, fvmax) or rise and fall, the time constants. A dot leads into the
@@ -74,6 +74,6 @@ class Facts(NamedTuple):
     outside: Mapping[str, str] = _NONE
     zero: Mapping[str, str] = _NONE
     missing: Mapping[str, str] = _NONE
-    doubts: Mapping[str, str] = _NONE
+    doubtful: Mapping[str, str] = _NONE
     mujoco: Mapping[str, str] = _NONE
     scales: Mapping[str, str] = _NONE

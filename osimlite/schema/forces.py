@@ -30,7 +30,7 @@ class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParam
     """The material of some contact surfaces."""
 
     facts = Facts(
-        outside={TOUCHING: "stiffness"}, doubts={"dissipation": "each impact adds energy"}
+        outside={TOUCHING: "stiffness"}, doubtful={"dissipation": "each impact adds energy"}
     )
 
     # OpenSim counts a surface that is named twice as two, which doubles the force. A surface
@@ -63,7 +63,9 @@ class HuntCrossleyContactParametersSet(Set, tag="HuntCrossleyForce::ContactParam
 class HuntCrossleyForce(Force):
     """Contact between all surfaces it lists: Hertz stiffness, Hunt-Crossley dissipation, Stribeck friction."""
 
-    facts = Facts(doubts={"transition_velocity": "friction no longer passes from rest to sliding"})
+    facts = Facts(
+        doubtful={"transition_velocity": "friction no longer passes from rest to sliding"}
+    )
 
     ContactParameters: ClassVar = HuntCrossleyContactParameters
     ContactParametersSet: ClassVar = HuntCrossleyContactParametersSet
@@ -85,7 +87,7 @@ class CoordinateLimitForce(ForceProducer):
     facts = Facts(
         states="dissipatedEnergy?compute_dissipation_energy",
         zero={REFUSED: "transition", NAN: "upper_stiffness lower_stiffness"},
-        doubts={"damping": "the limit adds energy"},
+        doubtful={"damping": "the limit adds energy"},
     )
 
     # OpenSim compares it with plain names of coordinates and rejects paths.

@@ -14,7 +14,7 @@ from osimlite.schema.joints import Joint, make_coordinates_field
 class UniversalJoint(Joint):
     """Body-fixed rotations about X, then Y; coordinates rx, ry."""
 
-    moves = "rx ry"
+    coordinate_motions = "rx ry"
 
     coordinates: Many[Coordinate] = make_coordinates_field(2)
 
@@ -22,7 +22,7 @@ class UniversalJoint(Joint):
 class GimbalJoint(Joint):
     """Body-fixed rotations about X, Y, Z; the generalized speeds are the rates of the angles."""
 
-    moves = "rx ry rz"
+    coordinate_motions = "rx ry rz"
 
     coordinates: Many[Coordinate] = make_coordinates_field(3)
 
@@ -30,7 +30,7 @@ class GimbalJoint(Joint):
 class BallJoint(Joint):
     """Body-fixed rotations about X, Y, Z; the generalized speeds are the angular velocity of M in F, along F."""
 
-    moves = "rx ry rz"
+    coordinate_motions = "rx ry rz"
     # An angular velocity stays finite at a second angle of 90 degrees, where the rates of
     # body-fixed angles do not.
     speeds_are_rates = False
@@ -41,7 +41,7 @@ class BallJoint(Joint):
 class FreeJoint(Joint):
     """Six degrees of freedom: rx, ry, rz as a BallJoint, then tx, ty, tz along the parent's axes."""
 
-    moves = "rx ry rz tx ty tz"
+    coordinate_motions = "rx ry rz tx ty tz"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = make_coordinates_field(6)
@@ -53,11 +53,11 @@ class EllipsoidJoint(Joint):
     facts = Facts(
         # OpenSim has no default for the radii and does not ask for them.
         missing={NAN: "radii_x_y_z"},
-        doubts={"radii_x_y_z": FLAT},
+        doubtful={"radii_x_y_z": FLAT},
         scales={"radii_x_y_z": "socket_parent_frame"},
     )
 
-    moves = "rx ry rz"
+    coordinate_motions = "rx ry rz"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = make_coordinates_field(3)
@@ -72,14 +72,14 @@ class ScapulothoracicJoint(Joint):
 
     facts = Facts(
         missing={NAN: "thoracic_ellipsoid_radii_x_y_z"},
-        doubts={"thoracic_ellipsoid_radii_x_y_z": FLAT},
+        doubtful={"thoracic_ellipsoid_radii_x_y_z": FLAT},
         scales={
             "thoracic_ellipsoid_radii_x_y_z": "socket_parent_frame",
             "scapula_winging_axis_origin": "socket_child_frame",
         },
     )
 
-    moves = "r r r r"
+    coordinate_motions = "r r r r"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = make_coordinates_field(4)
@@ -102,7 +102,7 @@ class ConstantCurvatureJoint(Joint):
     """A rod of fixed length that bends evenly, such as a spine; bends about X and Z, then twist about Y."""
 
     facts = Facts(scales={"length": "socket_child_frame y"})
-    moves = "r r r"
+    coordinate_motions = "r r r"
 
     coordinates: Many[Coordinate] = make_coordinates_field(3)
     neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)

@@ -27,7 +27,7 @@ class Joint(ModelComponent, abstract=True):
 
     facts = Facts(outputs="power reaction_on_child:SpatialVec reaction_on_parent:SpatialVec")
 
-    moves: ClassVar[str | None] = None
+    coordinate_motions: ClassVar[str | None] = None
     """Motion of each coordinate in order: r for a rotation, t for a translation, and its axis.
 
     Translations are along axes of the parent frame and applied first. Rotations are body-fixed: each
@@ -35,7 +35,7 @@ class Joint(ModelComponent, abstract=True):
     class itself computes the motion. None if it depends on the properties of the joint.
     """
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
-    """Motion type of each coordinate, from `moves`."""
+    """Motion type of each coordinate, from `coordinate_motions`."""
     speeds_are_rates: ClassVar[bool] = True
     """Whether the speeds are the rates of the coordinates; if not, those of rotations are an angular velocity."""
 
@@ -53,9 +53,10 @@ class Joint(ModelComponent, abstract=True):
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
-        if cls.moves is not None:
+        if cls.coordinate_motions is not None:
             cls.motion_types = tuple(
-                "rotational" if word[0] == "r" else "translational" for word in cls.moves.split()
+                "rotational" if word[0] == "r" else "translational"
+                for word in cls.coordinate_motions.split()
             )
 
     def between(
@@ -122,13 +123,13 @@ def make_coordinates_field(count: int) -> Any:
 class WeldJoint(Joint):
     """Joint without motion."""
 
-    moves = ""
+    coordinate_motions = ""
 
 
 class PinJoint(Joint):
     """Rotation about the common Z axis; coordinate rz."""
 
-    moves = "rz"
+    coordinate_motions = "rz"
 
     coordinates: Many[Coordinate] = make_coordinates_field(1)
 
@@ -136,7 +137,7 @@ class PinJoint(Joint):
 class SliderJoint(Joint):
     """Translation along the common X axis; coordinate tx."""
 
-    moves = "tx"
+    coordinate_motions = "tx"
 
     coordinates: Many[Coordinate] = make_coordinates_field(1)
 
@@ -144,7 +145,7 @@ class SliderJoint(Joint):
 class PlanarJoint(Joint):
     """Motion in the parent's XY plane; coordinates rz, tx, ty, the translation along the parent's axes."""
 
-    moves = "rz tx ty"
+    coordinate_motions = "rz tx ty"
 
     coordinates: Many[Coordinate] = make_coordinates_field(3)
 

@@ -59,7 +59,7 @@ class Include(NamedTuple):
 
     file: str
     path: str
-    held: Object
+    content: Object
 
     def __deepcopy__(self, memo: object) -> Include:
         # The copy is never modified. Copying it with every object around it would make copies of deeply

@@ -59,7 +59,7 @@ class Millard2012EquilibriumMuscle(Muscle):
         refused="optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
         "deactivation_time_constant minimum_activation maximum_pennation_angle",
         zero={STUCK: "tendon_slack_length"},
-        doubts={"tendon_slack_length": NO_EQUILIBRIUM},
+        doubtful={"tendon_slack_length": NO_EQUILIBRIUM},
     )
 
     internal = (

@@ -66,7 +66,7 @@ class PathActuator(ScalarActuator):
     """Pulls along its path with `optimal_force` times the control."""
 
     facts = Facts(
-        outputs="tension", domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE}
+        outputs="tension", domains={"optimal_force": "!= 0"}, doubtful={"optimal_force": IDLE}
     )
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
@@ -168,7 +168,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
         "KshapePassive Af Flen fv_linear_extrap_threshold maximum_pennation_angle activation_time_constant "
         "deactivation_time_constant minimum_activation",
         zero={NAN: "tendon_slack_length"},
-        doubts={"tendon_slack_length": NO_EQUILIBRIUM},
+        doubtful={"tendon_slack_length": NO_EQUILIBRIUM},
         mujoco={"fvmax": "Flen"},
     )
 

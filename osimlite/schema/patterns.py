@@ -76,7 +76,7 @@ class Pattern:
         # Cache of the transitions between sets of states, useful as many names of a model begin
         # alike.
         self._steps: dict[tuple[frozenset[int], str, bool], frozenset[int]] = {}
-        self._looks_around = any(state.anchor not in ("", "^", "$") for state in self._states)
+        self._has_inner_anchors = any(state.anchor not in ("", "^", "$") for state in self._states)
         self._sources: list[list[int]] = [[] for _ in self._states]
         for number, state in enumerate(self._states):
             for following in state.following:
@@ -88,7 +88,7 @@ class Pattern:
         reached = self._find_reachable_states([self._first], name, 0, cached_starts)
         for index, character in enumerate(name):
             key = reached, character, index == len(name) - 1
-            following = None if self._looks_around else self._steps.get(key)
+            following = None if self._has_inner_anchors else self._steps.get(key)
             if following is None:
                 states = [self._states[number] for number in reached]
                 next_states = [
@@ -97,7 +97,7 @@ class Pattern:
                     if state.test is not None and state.test(character)
                 ]
                 following = self._find_reachable_states(next_states, name, index + 1, cached_starts)
-                if not self._looks_around:
+                if not self._has_inner_anchors:
                     self._steps[key] = following
             reached = following
         return self._final in reached

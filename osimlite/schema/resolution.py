@@ -33,12 +33,12 @@ class Resolution(NamedTuple):
         target: named component; None on failure.
         failure: reason: nothing at the path, a component of another class, an empty text, or a text
             that is not a path.
-        found: component of another class to which the text leads.
+        wrong_target: component of another class to which the text leads.
     """
 
     target: Component | None
     failure: Failure | None = None
-    found: Component | None = None
+    wrong_target: Component | None = None
 
 
 def is_a(component: Object, target: str) -> bool:

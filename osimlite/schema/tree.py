@@ -122,11 +122,11 @@ class Tree:
         self._names: dict[str, dict[str, Component]] = {}
         self._resolved: dict[tuple[str, str, str], Resolution] = {}
         self._parts: dict[int, tuple[Component, list[Component]]] = {}
-        self._known_parts = previous._parts if previous is not None else {}
+        self._previous_parts = previous._parts if previous is not None else {}
         self._internal: set[int] = set()
         self._below: dict[int, list[Component]] = {}
         self._register_branch(model, "")
-        self._known_parts = {}
+        self._previous_parts = {}
 
     def outdate(self, *, numbers_only: bool = False) -> None:
         """Mark the index as outdated before a change of the model.
@@ -433,7 +433,7 @@ class Tree:
 
     def _get_internal_parts(self, owner: Component) -> list[Component]:
         """Return the parts that OpenSim adds itself; the same objects for the same owner."""
-        cached = self._known_parts.get(id(owner))
+        cached = self._previous_parts.get(id(owner))
         if cached is None or cached[0] is not owner:
             cached = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
         self._parts[id(owner)] = cached

@@ -156,7 +156,7 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
         return
     rows = "".join(
         f'<tr><td class="{verdict.verdict}">{verdict.verdict}</td><td '
-        f'class="number">{html.escape(verdict.shown)}</td>'
+        f'class="number">{html.escape(verdict.value_text)}</td>'
         f'<td class="number">{verdict.limits}</td><td>{html.escape(verdict.words)} '
         f'<span class="source">{html.escape(verdict.source)}</span></td></tr>'
         for verdict in result.worst

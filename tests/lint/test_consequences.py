@@ -15,7 +15,9 @@ def entries():
         facts = known_class(cls).__dict__.get("facts", Facts())
         for fates in (facts.outside, facts.zero, facts.missing):
             yield from ((cls, name) for words in fates.values() for name in words.split())
-        yield from ((cls, name) for name in (*facts.refused.split(), *facts.doubts, *facts.domains))
+        yield from (
+            (cls, name) for name in (*facts.refused.split(), *facts.doubtful, *facts.domains)
+        )
 
 
 def known_class(name):

@@ -310,7 +310,7 @@ def test_a_missing_file_is_named_also_by_another_process(project):
 def test_work_is_shared_only_if_there_is_enough(project, monkeypatch):
     jobs = [module.CheckJob(str(project / "m.osim"), Config(), None)] * 3
     assert module.count_processes(jobs) == 1
-    monkeypatch.setattr(module, "WORTH_SHARING", 10)
+    monkeypatch.setattr(module, "MIN_PARALLEL_BYTES", 10)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     monkeypatch.setattr("sys.platform", "win32")
     assert module.count_processes(jobs) == 3

@@ -24,7 +24,7 @@ class StraightMuscle(Muscle):
         domains={"pennation_angle_at_optimal": "0 to 0"},
         refused="width",
         zero={NAN: "rise_time"},
-        doubts={"grip": "lengthening fibers bear less than at rest"},
+        doubtful={"grip": "lengthening fibers bear less than at rest"},
         mujoco={"fvmax": "grip", "vmax": "fastest", "rise": "rise_time", "fall": "rise_time"},
     )
 

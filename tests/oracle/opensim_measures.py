@@ -108,7 +108,12 @@ class Beside:
                 places.append(theirs.getLocation(self.state).to_numpy())
             self.at(pose)
             rate = np.linalg.norm(theirs.getdPointdQ(self.state).to_numpy())
-            yield "OSIM634", point.owner, point.moved, float(np.linalg.norm(places[0] - places[1]))
+            yield (
+                "OSIM634",
+                point.owner,
+                point.displacement,
+                float(np.linalg.norm(places[0] - places[1])),
+            )
             yield "OSIM634", point.owner, point.rate, float(rate)
             yield "OSIM634", point.owner, 0.0, float(np.linalg.norm(places[2] - places[0]))
 

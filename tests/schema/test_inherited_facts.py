@@ -71,7 +71,7 @@ def find_classes() -> Iterator[type[Object]]:
 def find_named(facts: Facts) -> set[str]:
     """Return the properties of which facts say what becomes of a number outside its domain."""
     texts = [*facts.outside.values(), *facts.zero.values(), *facts.missing.values(), facts.refused]
-    return {name for text in texts for name in text.split()} | {*facts.doubts}
+    return {name for text in texts for name in text.split()} | {*facts.doubtful}
 
 
 def test_every_inherited_fact_is_listed() -> None:

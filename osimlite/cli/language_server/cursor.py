@@ -16,10 +16,10 @@ from osimlite.schema.fields import ObjectField
 from osimlite.schema.registry import find_class
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
-Kind = Literal["tag", "closing tag", "attribute", "text", "comment"]
+TextType = Literal["tag", "closing tag", "attribute", "text", "comment"]
 
 _TAG_NAME = compile_later(r"[^\s/<>!?\"'&=]*")
-_NAME_GIVEN = compile_later(r"\sname\s*=\s*([\"'])(.*?)\1", re.DOTALL)
+_NAME_ATTRIBUTE = compile_later(r"\sname\s*=\s*([\"'])(.*?)\1", re.DOTALL)
 _ATTRIBUTE_VALUE = compile_later(r"([^\s=\"'<>/]+)\s*=\s*([\"'])([^\"'<]*)$")
 _SPECIAL = compile_later(r"<[!?]")
 _WORD = compile_later(r"[^\s<>]*")
@@ -40,7 +40,7 @@ class Element(NamedTuple):
 class Cursor(NamedTuple):
     """Kind of text at an offset, the word there, and the enclosing elements."""
 
-    kind: Kind
+    kind: TextType
     # enclosing elements, outermost first; without the element itself if the cursor is in its tag
     around: tuple[Element, ...]
     # offset of the start of the word: a tag, an attribute value or a word of text
@@ -145,7 +145,7 @@ def _close_element(stack: list[Element], markup: Markup) -> None:
 def _make_element(
     text: str, tag: str, start: int, end: int, number: int, stack: list[Element]
 ) -> Element:
-    name_match = _NAME_GIVEN.search(text, start, end)
+    name_match = _NAME_ATTRIBUTE.search(text, start, end)
     name = name_match[2] if name_match else ""
     cls, spec = _identify_element(stack[-1] if stack else None, tag, name)
     return Element(tag, start, number, name, cls, spec)

@@ -10,7 +10,7 @@ from osimlite.base.files import get_relative_path
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.cursor import Cursor, Element
-from osimlite.lint.beside import list_folders, read_beginning
+from osimlite.lint.neighbours import list_folders, read_beginning
 from osimlite.lint.setup import Setup
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Reference

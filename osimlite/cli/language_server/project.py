@@ -15,7 +15,7 @@ from osimlite.cli.language_server.analysis import DocumentAnalysis, Target
 from osimlite.cli.language_server.text import Text
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.io.document.source import Source
-from osimlite.lint.beside import list_documents, list_folders
+from osimlite.lint.neighbours import list_documents, list_folders
 from osimlite.schema.base import Component
 from osimlite.schema.editing import rename_component
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS, get_last_name

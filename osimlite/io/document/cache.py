@@ -102,7 +102,7 @@ def _has_no_include(path: str) -> bool:
 
 
 @cache_by_file(256)
-def _has_known_tags_only(path: str) -> bool:
+def _has_only_known_tags(path: str) -> bool:
     """Return whether a document is known to have no unknown elements; `keep_object` stores that."""
     return False
 
@@ -116,7 +116,7 @@ def keep_object(path: str, top: Object, notes: Iterable[Note]) -> None:
         notes: notes of the reader.
     """
     get_object.keep(path, top)
-    _has_known_tags_only.keep(path, not any(note.kind == "unknown-tag" for note in notes))
+    _has_only_known_tags.keep(path, not any(note.kind == "unknown-tag" for note in notes))
 
 
 def read_copy(path: str | Path, expected_class: type[Top]) -> Top:
@@ -162,7 +162,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
             property; with line and column.
     """
     # In a document without unknown elements there is nothing to suggest.
-    if _has_known_tags_only(str(path)):
+    if _has_only_known_tags(str(path)):
         return read_copy(path, cls)
     document = read_document(Source.from_file(path), expected_class=cls)
     for note in document.notes:

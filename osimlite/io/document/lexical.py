@@ -180,7 +180,7 @@ def make_converter(kind: FieldType) -> Callable[[str], Any]:
     return _make_list_converter(word, kind.least, kind.most)
 
 
-def reads_as(raw: str, kind: FieldType, value: Any) -> bool:
+def is_read_as(raw: str, kind: FieldType, value: Any) -> bool:
     """Return whether the text of a property reads as a value without ambiguity.
 
     Args:

@@ -13,7 +13,7 @@ from osimlite.base.patterns import compile_later
 
 _COLON = "\u02d0"
 _XMLNS = "xml\u0274s"
-_STAND_INS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
+_REPLACEMENTS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
 
 ATTRIBUTE = compile_later(
     r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?P<quoted>\"[^\"]*+\"|'[^']*+')"
@@ -59,7 +59,7 @@ def replace_colons(data: bytes) -> bytes:
         section_index = bisect_right(hidden, (tag, len(data))) - 1
         if section_index >= 0 and start < hidden[section_index][1]:
             continue
-        pieces += [data[copied_end:start], _STAND_INS[data[start:end]]]
+        pieces += [data[copied_end:start], _REPLACEMENTS[data[start:end]]]
         copied_end = end
     return b"".join([*pieces, data[copied_end:]]) if pieces else data
 

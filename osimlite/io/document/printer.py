@@ -109,7 +109,7 @@ class _Printer:
             self.print_comments(layout.comments, depth)
         if isinstance(item, Unknown):
             self._print_unknown(item, depth)
-        elif layout is not None and layout.include is not None and layout.include.held == item:
+        elif layout is not None and layout.include is not None and layout.include.content == item:
             self.lines.append(
                 f"{indent}<{item.tag} file={quote_attribute(self._get_include_path(layout.include))} />"
             )

@@ -336,7 +336,7 @@ def _map_to_old_text(
     source: Source, top: Object, notes: list[Note], upgraded: UpgradeResult
 ) -> list[Note]:
     """Replace indices of elements in the upgraded tree by those in the old text."""
-    source.moved = upgraded.moved
+    source.old_indices = upgraded.old_indices
     numbers = upgraded.numbers
     if numbers is None:
         return notes

@@ -59,13 +59,13 @@ class Repair(NamedTuple):
         kind: type of the note about it.
         offset: character offset in the text.
         word: original text.
-        meant: text as which it was read.
+        replacement: text as which it was read.
     """
 
     kind: NoteKind
     offset: int
     word: str
-    meant: str
+    replacement: str
 
 
 def read_repaired(
@@ -117,7 +117,7 @@ def read_repaired(
         repairs, find_elements_at(source, [repair.offset for repair in repairs]), strict=True
     ):
         line = source.position(repair.offset).line
-        notes.append(Note(repair.kind, number, repair.word, value=repair.meant, line=line))
+        notes.append(Note(repair.kind, number, repair.word, value=repair.replacement, line=line))
     return root, notes
 
 

@@ -68,7 +68,7 @@ class Source:
         self.attributes: bool | None = None
         """Whether there are attributes without a meaning; None if a well-formed text was not searched for them."""
         self._attributes: dict[int, dict[str, Attribute]] = {}
-        self.moved: dict[tuple[int, str], int] = {}
+        self.old_indices: dict[tuple[int, str], int] = {}
         """Elements that an upgrade has moved, by the index of their owner and their new tag."""
 
     @cached_property
@@ -176,7 +176,7 @@ class Source:
         result = next(
             (child for child in self._iterate_children(number) if self._get_tag(child) == tag), None
         )
-        return self.moved.get((number, tag)) if result is None else result
+        return self.old_indices.get((number, tag)) if result is None else result
 
     @cached_property
     def _line_starts(self) -> list[int]:

@@ -195,7 +195,7 @@ class PlainSpans(Sequence[Span]):
         if len(self.starts) != elements:
             result = ((match.start(), match.end()) for match in _BEGIN_OR_HIDDEN.finditer(text))
             self.starts = [start for start, end in result if end == start + 2]
-        self._known: dict[int, Span] = {}
+        self._cached_spans: dict[int, Span] = {}
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -207,10 +207,10 @@ class PlainSpans(Sequence[Span]):
     def __getitem__(self, number: int | slice) -> Span | Sequence[Span]:
         if isinstance(number, slice):
             return [self[index] for index in range(*number.indices(len(self)))]
-        known = self._known.get(number)
-        if known is None:
-            known = self._known[number] = self._find_span(number)
-        return known
+        span = self._cached_spans.get(number)
+        if span is None:
+            span = self._cached_spans[number] = self._find_span(number)
+        return span
 
     def tag(self, number: int) -> str:
         """Return the tag of an element without searching its end, which may be far away."""

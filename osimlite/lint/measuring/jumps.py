@@ -48,7 +48,7 @@ class JumpSuspect(NamedTuple):
     ends: tuple[float, float]  # values of the coordinate at both ends
 
 
-def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
+def find_jumps(paths: Paths, sweeps: Sequence[Sweep]) -> Iterator[PathJump]:
     """Yield the largest jump of each path that has one.
 
     Candidates are the ends of the ranges of conditional points, and intervals in which a length changes
@@ -56,9 +56,9 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
 
     Args:
         paths: paths of the model.
-        looked_at: sweeps of the coordinates.
+        sweeps: sweeps of the coordinates.
     """
-    suspects = [suspect for sweep in looked_at for suspect in _find_suspects(paths, sweep)]
+    suspects = [suspect for sweep in sweeps for suspect in _find_suspects(paths, sweep)]
     if not suspects:
         return
     values = _bisect_suspects(paths, suspects)
@@ -108,7 +108,7 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
         if not isinstance(route, ThroughPoints):
             continue
         for point in route.points:
-            if point.kind == NODE_TYPE.CONDITIONAL and point.coordinate == sweep.place:
+            if point.kind == NODE_TYPE.CONDITIONAL and point.coordinate == sweep.coordinate_index:
                 for end in point.range:
                     yield JumpSuspect(inf, 0.0, sweep, path, 0, (end, end))
         for k in np.flatnonzero(excess[:, path] > MIN_JUMP_M) if route.surfaces else ():
@@ -146,12 +146,12 @@ def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[floa
         is_before = np.abs(middle_lengths - low_lengths - smooth) > np.abs(
             high_lengths - middle_lengths - smooth
         )
-        moves = active & is_before
-        high = np.where(moves, middle, high)
-        high_lengths = np.where(moves, middle_lengths, high_lengths)
-        moves = active & ~is_before
-        low = np.where(moves, middle, low)
-        low_lengths = np.where(moves, middle_lengths, low_lengths)
+        is_replaced = active & is_before
+        high = np.where(is_replaced, middle, high)
+        high_lengths = np.where(is_replaced, middle_lengths, high_lengths)
+        is_replaced = active & ~is_before
+        low = np.where(is_replaced, middle, low)
+        low_lengths = np.where(is_replaced, middle_lengths, low_lengths)
         active = high - low > SIDE_OFFSET
     return np.where(
         [suspect.excess < inf for suspect in suspects], 0.5 * (low + high), low

@@ -96,13 +96,13 @@ def measure_model(
     _check_loop_count(paths.mechanism)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
-    looked_at = sweep_coordinates(
+    sweeps = sweep_coordinates(
         paths,
         start,
         set() if unchanged_measures is None else find_swept_coordinates(unchanged_measures),
     )
     if earlier_measures is not None and {
-        sweep.place for sweep in looked_at
+        sweep.coordinate_index for sweep in sweeps
     } != find_swept_coordinates(earlier_measures):
         # The earlier measurements used other poses; all paths must be measured in the same ones.
         return measure_model(model, compiles=compiles, mechanism=mechanism)
@@ -110,7 +110,7 @@ def measure_model(
     ends = dict(
         zip(
             paths.names,
-            zip(default, _find_length_extremes(looked_at, default), strict=True),
+            zip(default, _find_length_extremes(sweeps, default), strict=True),
             strict=True,
         )
     )
@@ -122,15 +122,15 @@ def measure_model(
             compute_reach(fibers, shortest, True, shortest_pose),
             compute_reach(fibers, longest, False, longest_pose),
         ]
-    moved_paths = {sweep.place: sweep.moved for sweep in looked_at}
+    flags_by_coordinate = {sweep.coordinate_index: sweep.is_moving for sweep in sweeps}
     result = Measures(
         {
-            name: tuple(index for index, is_moved in moved_paths.items() if is_moved[k])
+            name: tuple(index for index, is_moving in flags_by_coordinate.items() if is_moving[k])
             for k, name in enumerate(paths.names)
         },
-        [*compare_wrappings(around, paths, start, looked_at)] if around is not None else [],
-        [*find_jumps(paths, looked_at)],
-        [*_find_bad_surface_lengths(paths, start, looked_at)],
+        [*compare_wrappings(around, paths, start, sweeps)] if around is not None else [],
+        [*find_jumps(paths, sweeps)],
+        [*_find_bad_surface_lengths(paths, start, sweeps)],
         [*measure_moving_points(paths)],
         starts,
         reaches,
@@ -139,11 +139,11 @@ def measure_model(
 
 
 def _find_bad_surface_lengths(
-    paths: Paths, start: Array, looked_at: list[Sweep]
+    paths: Paths, start: Array, sweeps: list[Sweep]
 ) -> Iterator[LengthOnSurface]:
     """Yield the first negative or NaN length of each path on each surface."""
-    poses = [MeasuringPose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
-    all_poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
+    poses = [MeasuringPose(), *(sweep.pose(value) for sweep in sweeps for value in sweep.values)]
+    all_poses = np.concatenate([start[None], *(sweep.poses for sweep in sweeps)])
     for name, surface, lengths in paths.system.measure_all_on_surfaces(all_poses, paths.routes):
         for k in np.flatnonzero(~(lengths >= 0.0))[:1]:
             yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
@@ -169,12 +169,12 @@ def _check_loop_count(mechanism: Mechanism) -> None:
 
 
 def _find_length_extremes(
-    looked_at: list[Sweep], default: Array
+    sweeps: list[Sweep], default: Array
 ) -> Iterator[tuple[tuple[float, MeasuringPose], tuple[float, MeasuringPose]]]:
     """Yield least and largest length of each path with their poses, in the middle of the ranges."""
     poses = [MeasuringPose()]
     rows = [default[None]]
-    for sweep in looked_at:
+    for sweep in sweeps:
         low, high = sweep.info.range
         # Rounded, so that values at the bounds of the middle part belong to it.
         middle_indices = np.flatnonzero(

@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
-FREE_VALUES = 9
+UNTIED_VALUES = 9
 """Number of values of each free coordinate."""
 TIED_VALUES = 5
 """Number of values of a coordinate that constraints tie to others, each of which needs an assembly."""
@@ -34,14 +34,14 @@ class Sweep:
 
     Attributes:
         paths: paths of the model.
-        place: index of the swept coordinate in the mechanism.
+        coordinate_index: index of the swept coordinate in the mechanism.
         poses: values of all coordinates (k, n), ascending in this one, as far as constraints allow.
         is_tied: whether a constraint moves others with the coordinate.
         lengths: lengths of all paths in the poses (k, p), m.
     """
 
     paths: Paths
-    place: int
+    coordinate_index: int
 
     poses: Array
     is_tied: bool
@@ -50,10 +50,10 @@ class Sweep:
     @property
     def values(self) -> Array:
         """Values (k,) of the coordinate, rad or m."""
-        return self.poses[:, self.place]
+        return self.poses[:, self.coordinate_index]
 
     @property
-    def moved(self) -> NDArray[np.bool_]:
+    def is_moving(self) -> NDArray[np.bool_]:
         """Flags (p,) of the paths whose length changes."""
         # `nan_to_num`: a path without a length at some value counts as not moved.
         return np.nan_to_num(np.ptp(self.lengths, axis=0)) > MIN_CHANGE_M
@@ -61,7 +61,7 @@ class Sweep:
     @property
     def info(self) -> CoordinateInfo:
         """Name, range and unit of the coordinate."""
-        return self.paths.mechanism.coordinates[self.place]
+        return self.paths.mechanism.coordinates[self.coordinate_index]
 
     def value(self, value: float) -> CoordinateSetting:
         """Return a value of the coordinate with its name and unit."""
@@ -80,8 +80,8 @@ class Sweep:
         """
         lower_poses = self.poses[indices]
         upper_poses = self.poses[indices + 1]
-        fraction = (values - lower_poses[:, self.place]) / (
-            upper_poses[:, self.place] - lower_poses[:, self.place]
+        fraction = (values - lower_poses[:, self.coordinate_index]) / (
+            upper_poses[:, self.coordinate_index] - lower_poses[:, self.coordinate_index]
         )
         return lower_poses + fraction[:, None] * (upper_poses - lower_poses)
 
@@ -123,7 +123,7 @@ def sweep_coordinates(
             paths,
             start,
             index,
-            np.linspace(low, high, TIED_VALUES if is_tied else FREE_VALUES),
+            np.linspace(low, high, TIED_VALUES if is_tied else UNTIED_VALUES),
             is_tied,
         )
         if len(poses) > 1:
@@ -136,7 +136,11 @@ def sweep_coordinates(
     for index, poses, is_tied in result:
         sweep_lengths, lengths = np.split(lengths, [len(poses)])
         swept.append(Sweep(paths, index, poses, is_tied, sweep_lengths))
-    return [sweep for sweep in swept if sweep.place in required_coordinates or sweep.moved.any()]
+    return [
+        sweep
+        for sweep in swept
+        if sweep.coordinate_index in required_coordinates or sweep.is_moving.any()
+    ]
 
 
 def _find_poses(paths: Paths, start: Array, index: int, values: Array, is_tied: bool) -> Array:

@@ -23,7 +23,7 @@ MAX_REPEAT_DIFFERENCE_M = 1e-4
 
 
 def compare_wrappings(
-    geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]
+    geodesic: Paths, paths: Paths, start: Array, sweeps: Sequence[Sweep]
 ) -> Iterator[WrappingError]:
     """Yield the excess length of each path around surfaces over geodesics, in the default and the worst pose.
 
@@ -31,15 +31,15 @@ def compare_wrappings(
         geodesic: those paths that have surfaces, along geodesics.
         paths: all paths, wrapped as by OpenSim.
         start: default pose (n,).
-        looked_at: sweeps of the coordinates.
+        sweeps: sweeps of the coordinates.
     """
-    free_sweeps = [sweep for sweep in looked_at if not sweep.is_tied]
-    together = _sample_poses(start, free_sweeps)
-    poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at), together])
+    free_sweeps = [sweep for sweep in sweeps if not sweep.is_tied]
+    random_poses = _sample_poses(start, free_sweeps)
+    poses = np.concatenate([start[None], *(sweep.poses for sweep in sweeps), random_poses])
     columns = [paths.names.index(name) for name in geodesic.names]
-    swept = [sweep.lengths[:, columns] for sweep in looked_at]
+    swept = [sweep.lengths[:, columns] for sweep in sweeps]
     ends = np.split(
-        paths.system.measure_poses(np.concatenate([start[None], together]))[:, columns], [1]
+        paths.system.measure_poses(np.concatenate([start[None], random_poses]))[:, columns], [1]
     )
     excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.measure_poses(poses)
     for geodesic_index, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
@@ -50,7 +50,7 @@ def compare_wrappings(
         )
         if not around:
             continue
-        moving_sweeps = [sweep for sweep in free_sweeps if sweep.moved[path]]
+        moving_sweeps = [sweep for sweep in free_sweeps if sweep.is_moving[path]]
 
         def describe_pose(
             k: int, moving_sweeps: Sequence[Sweep] = moving_sweeps
@@ -62,14 +62,16 @@ def compare_wrappings(
             """
             if k == 0:
                 return MeasuringPose(), start
-            for sweep in looked_at:
+            for sweep in sweeps:
                 if k <= len(sweep.poses):
                     return sweep.pose(sweep.values[k - 1]), sweep.poses[k - 1]
                 k -= len(sweep.poses)
             q = start.copy()
-            indices = [sweep.place for sweep in moving_sweeps]
-            q[indices] = together[k - 1][indices]
-            return MeasuringPose(tuple(sweep.value(q[sweep.place]) for sweep in moving_sweeps)), q
+            indices = [sweep.coordinate_index for sweep in moving_sweeps]
+            q[indices] = random_poses[k - 1][indices]
+            return MeasuringPose(
+                tuple(sweep.value(q[sweep.coordinate_index]) for sweep in moving_sweeps)
+            ), q
 
         # Try the poses from the largest excess downwards until one is not a rounding error.
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
@@ -96,11 +98,11 @@ def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
         low + parts[:, k] * (high - low)
         for k, (low, high) in enumerate(sweep.info.range for sweep in free)
     ]
-    together = np.tile(start, (RANDOM_POSES, 1))
-    together[:, [sweep.place for sweep in free]] = (
+    poses = np.tile(start, (RANDOM_POSES, 1))
+    poses[:, [sweep.coordinate_index for sweep in free]] = (
         np.array(values).reshape(len(free), RANDOM_POSES).T
     )
-    return together
+    return poses
 
 
 def _is_certain(

@@ -107,11 +107,11 @@ _NUMBER_PATTERN = compile_later(r"(?<!\S)[^\s']*/[^\s']*|(?<!\w)[-+]?[\d.][\w.+-
 
 
 class Fold(NamedTuple):
-    """A finding with similar findings of the same file (`more`) and of other files (`elsewhere`)."""
+    """A finding with similar findings of the same file (`more`) and of other files (`in_other_files`)."""
 
     first: Finding
     more: list[Finding]
-    elsewhere: list[Finding]
+    in_other_files: list[Finding]
 
     @property
     def remarks(self) -> list[str]:
@@ -129,12 +129,12 @@ class Fold(NamedTuple):
                 else ""
             )
             result.append(f"{len(self.more)} more like this{line_list}")
-        if self.elsewhere:
+        if self.in_other_files:
             files = dict.fromkeys(
-                os.path.basename(finding.file or "") for finding in self.elsewhere
+                os.path.basename(finding.file or "") for finding in self.in_other_files
             )
             result.append(
-                f"{len(self.elsewhere)} more in other files: {join_words(files, max_count=3)}"
+                f"{len(self.in_other_files)} more in other files: {join_words(files, max_count=3)}"
             )
         return result
 
@@ -225,7 +225,7 @@ def render_concise(report: Report, *, colour: bool = False, everything: bool = F
 
 def _format_line(fold: Fold, colour: bool) -> str:
     finding = fold.first
-    counts = (("like this", fold.more), ("in other files", fold.elsewhere))
+    counts = (("like this", fold.more), ("in other files", fold.in_other_files))
     fold_notes = "".join(
         f"; {len(result)} more {relation}" for relation, result in counts if result
     )

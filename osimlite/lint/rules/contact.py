@@ -45,8 +45,8 @@ def report_contact_without_partner(subject: Subject, report: FindingCollector) -
                 continue
             message = f"{describe_object(force)} lists {reason}: it never acts"
         else:
-            listed_one = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
-            message = f"{describe_object(force)} lists {listed_one}: it never acts"
+            surface_text = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
+            message = f"{describe_object(force)} lists {surface_text}: it never acts"
         if holders:
             report(message, holders[0], tag="geometry")
         else:
@@ -54,14 +54,14 @@ def report_contact_without_partner(subject: Subject, report: FindingCollector) -
 
 
 _ROUND = frozenset(("ContactSphere", "ContactEllipsoid"))
-_BESIDE_MESH = frozenset(("ContactMesh", "ContactSphere", "ContactHalfSpace"))
+_MESH_PARTNERS = frozenset(("ContactMesh", "ContactSphere", "ContactHalfSpace"))
 
 
 def _can_meet(force: str, first: str, second: str) -> bool:
     """Return whether OpenSim 4.6 computes contact between two shapes (measured, all pairs)."""
     shapes = {first, second}
     if force == "ElasticFoundationForce":
-        return "ContactMesh" in shapes and shapes <= _BESIDE_MESH
+        return "ContactMesh" in shapes and shapes <= _MESH_PARTNERS
     return not shapes.isdisjoint(_ROUND) and shapes <= _ROUND | {"ContactHalfSpace"}
 
 
@@ -71,14 +71,15 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     if kind not in ("HuntCrossleyForce", "ElasticFoundationForce"):
         return ""
     surfaces = [subject.resolution(use).target for use in uses]
-    known_surfaces = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
+    resolved_surfaces = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
     bases = [
-        find_base(subject, subject.target_of(surface, "socket_frame")) for surface in known_surfaces
+        find_base(subject, subject.target_of(surface, "socket_frame"))
+        for surface in resolved_surfaces
     ]
     # An unresolved surface or frame may be the partner.
-    if len(known_surfaces) != len(surfaces) or any(base is None for base in bases):
+    if len(resolved_surfaces) != len(surfaces) or any(base is None for base in bases):
         return ""
-    pairs = [*combinations(zip(known_surfaces, bases, strict=True), 2)]
+    pairs = [*combinations(zip(resolved_surfaces, bases, strict=True), 2)]
     # Surfaces of one body do not move against each other.
     if all(first[1] is second[1] for first, second in pairs):
         return f"surfaces of {describe_object(bases[0])} alone" if bases[0] is not None else ""
@@ -89,7 +90,7 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     ):
         return ""
     shapes = join_words(
-        [f"{type(surface).__name__} '{surface.name}'" for surface in known_surfaces], max_count=3
+        [f"{type(surface).__name__} '{surface.name}'" for surface in resolved_surfaces], max_count=3
     )
     return f"{shapes}, between which OpenSim computes no contact"
 

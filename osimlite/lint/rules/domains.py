@@ -49,8 +49,8 @@ def describe_consequence(
             for consequence, properties in consequences.items():
                 if name in properties.split():
                     return consequence, bool(consequence)
-        if name in facts.doubts:
-            return facts.doubts[name], False
+        if name in facts.doubtful:
+            return facts.doubtful[name], False
     return "", False
 
 
@@ -150,7 +150,7 @@ def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for item, spec, value, verdict in find_outside_domain(subject):
-        if verdict.known:
+        if verdict.is_known:
             # Unknown consequences are reported by OSIM207.
             _report_domain(subject, report, item, spec, value, verdict)
     for item in subject.find_by_class("CoordinateLimitForce"):
@@ -197,7 +197,7 @@ def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for item, spec, value, verdict in find_outside_domain(subject):
-        if not verdict.known:
+        if not verdict.is_known:
             _report_domain(subject, report, item, spec, value, verdict)
     for item, spec, value in _find_large_numbers(subject):
         huge = [number for number in _to_numbers(value) if HUGE <= abs(number) < math.inf]
@@ -323,7 +323,7 @@ class DomainVerdict(NamedTuple):
     number: float
     domain: str
     consequence: str
-    known: bool
+    is_known: bool
 
 
 _NAN_CONSEQUENCE = "everything computed from it becomes NaN, without a message"
@@ -456,7 +456,7 @@ def _report_domain(
     verdict: DomainVerdict,
 ) -> None:
     """Report a number outside its domain, or one that is missing."""
-    is_given = spec.name in item.model_fields_set
+    is_explicit = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:
         report(
@@ -469,7 +469,7 @@ def _report_domain(
         return
     size = (
         format_quantity(value, spec.kind.unit)
-        if is_given
+        if is_explicit
         else f"not given (default {format_quantity(value, spec.kind.unit)})"
     )
     # Domains are written as comparisons with all digits; the message needs words and few digits.

@@ -251,7 +251,7 @@ class _FolderListings:
     """Listings of the folders in which files are searched, each read once for all meshes."""
 
     def __init__(self) -> None:
-        self._known: dict[str, dict[str, str]] = {}
+        self._cached_names: dict[str, dict[str, str]] = {}
 
     def has(self, root: str, name: str) -> bool:
         """Return whether the folder `root` has a file `name`, which may contain folders."""
@@ -281,9 +281,9 @@ class _FolderListings:
         if "/" in name or os.sep in name:
             parent, file_name = os.path.split(name)
             folder = os.path.join(root, parent)
-        names = self._known.get(folder)
+        names = self._cached_names.get(folder)
         if names is None:
-            names = self._known[folder] = _list_lower_case(folder)
+            names = self._cached_names[folder] = _list_lower_case(folder)
         return names, file_name
 
 

@@ -167,12 +167,12 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
             # A GCVSpline of order 2 m needs 2 m points (Woltring's GCVSPL).
             min_count = 2 * cast("GCVSpline", function).half_order
         if is_a(function, "GCVSpline") and min_count < 2:
-            given_text = (
+            count_text = (
                 str(min_count // 2) if "half_order" in function.model_fields_set else "not given"
             )
             description, consequence = _describe_refusal(subject, function)
             report(
-                f"half_order of {subject.describe_part(function)} is {given_text}: {description}; 2 is a "
+                f"half_order of {subject.describe_part(function)} is {count_text}: {description}; 2 is a "
                 "cubic spline",
                 function,
                 consequence=consequence,
@@ -185,9 +185,9 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
                 description, consequence = _describe_refusal(subject, function)
             elif is_a(function, "SimmSpline"):
                 consequence = NAN
-            given_text = format_count(len(function.x), "point")
+            count_text = format_count(len(function.x), "point")
             report(
-                f"{subject.describe_part(function)} has {given_text} and needs {min_count}: {description}",
+                f"{subject.describe_part(function)} has {count_text} and needs {min_count}: {description}",
                 function,
                 consequence=consequence,
                 tag="x",

@@ -100,7 +100,7 @@ def report_marker_gap(table: Table, report: FindingCollector) -> None:
             else "lacks some of its coordinates"
         )
         report(
-            f"the marker '{name}' {problem}{fault.describe_rest()}",
+            f"the marker '{name}' {problem}{fault.describe_repeats()}",
             at=Position(fault.line, fault.column, fault.length),
         )
     for label in [
@@ -136,6 +136,6 @@ def report_frame_number(table: Table, report: FindingCollector) -> None:
             else "the frame number is missing"
         )
         report(
-            f"{problem}{fault.describe_rest()}",
+            f"{problem}{fault.describe_repeats()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
         )

@@ -44,9 +44,9 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
     max_difference = subject.config.value_of(OFF)
     for start in get_measures(subject).starts:
         muscle = subject.tree.find(start.owner)
-        (length, settled), (tension, settled_tension) = start.lengths, start.tensions
+        (length, equilibrium_length), (tension, equilibrium_tension) = start.lengths, start.tensions
         # Only NaN differs from itself.
-        if settled != settled:
+        if equilibrium_length != equilibrium_length:
             report(
                 f"{describe_object(muscle)} has no equilibrium in the default pose: OpenSim fails "
                 "when asked to equilibrate it",
@@ -54,13 +54,13 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
                 severity=WARNING,
             )
         elif (
-            abs(length - settled) > max_difference
-            or abs(tension - settled_tension) > max_difference
+            abs(length - equilibrium_length) > max_difference
+            or abs(tension - equilibrium_tension) > max_difference
         ):
             report(
                 f"{describe_object(muscle)} does not start in equilibrium: its fiber length is "
-                f"{length:.3g} optimal lengths (in equilibrium {settled:.3g}), its tendon force "
-                f"{tension:.3g} times max_isometric_force (in equilibrium {settled_tension:.3g})",
+                f"{length:.3g} optimal lengths (in equilibrium {equilibrium_length:.3g}), its tendon force "
+                f"{tension:.3g} times max_isometric_force (in equilibrium {equilibrium_tension:.3g})",
                 muscle,
                 tag="default_fiber_length" if hasattr(muscle, "default_fiber_length") else None,
             )

@@ -8,7 +8,7 @@ from osimlite.lint.registry import ERROR, INFO, RUNS, WARNING, FindingCollector,
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object
 
-SHOWN = 5e-6
+MIN_DEFAULT_ERROR_M = 5e-6
 """Smallest error of a length in the default pose that messages mention, m."""
 
 OFF = Threshold(
@@ -68,7 +68,11 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
             surfaces = join_words([f"'{name}'" for name in wrapping.surfaces])
             # The default pose is mentioned only if it is not the worst pose itself.
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
-            default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
+            default = (
+                by_default
+                if wrapping.pose.values and abs(wrapping.default) >= MIN_DEFAULT_ERROR_M
+                else ""
+            )
             report(
                 f"OpenSim's length of the path of {describe_object(owner)} around {surfaces} is "
                 f"off by {default}{1000.0 * wrapping.worst:.3g} mm {wrapping.pose}",
@@ -211,7 +215,7 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
     }
     worst: dict[tuple[str, str], MovingPoint] = {}
     for point in get_measures(subject).moving_points:
-        if point.moved >= made_up or (
+        if point.displacement >= made_up or (
             point.rate >= rate and point.end.coordinate not in limited_names
         ):
             # One finding for each point: the largest motion, then the largest rate.
@@ -219,17 +223,21 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
             worst[point.owner, point.point] = max(
                 worst_point,
                 point,
-                key=lambda candidate: (candidate.moved >= made_up, candidate.moved, candidate.rate),
+                key=lambda candidate: (
+                    candidate.displacement >= made_up,
+                    candidate.displacement,
+                    candidate.rate,
+                ),
             )
     for point in worst.values():
         owner = subject.tree.find(point.owner)
         end = point.end
         names = f"'{point.point}' of {describe_object(owner)}"
-        if point.moved >= made_up:
+        if point.displacement >= made_up:
             report(
                 f"the location functions of {names} end {end.format_value(point.beyond, 3)} "
                 f"before the range of '{end.coordinate}': OpenSim extrapolates them and moves the "
-                f"point by {1000.0 * point.moved:.3g} mm up to {end}",
+                f"point by {1000.0 * point.displacement:.3g} mm up to {end}",
                 owner,
             )
         else:

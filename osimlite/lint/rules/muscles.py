@@ -59,8 +59,8 @@ def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
         length = getattr(muscle, "default_fiber_length", None)
         optimal = muscle.optimal_fiber_length
         # 0.1, the default, is what OpenSim prints of every muscle that does not say.
-        is_given = "default_fiber_length" in muscle.model_fields_set and length != 0.1
-        if is_given and length is not None and optimal > 0 and 0 < length < math.inf:
+        is_explicit = "default_fiber_length" in muscle.model_fields_set and length != 0.1
+        if is_explicit and length is not None and optimal > 0 and 0 < length < math.inf:
             ratio = length / optimal
             if not shortest <= ratio <= longest:
                 report(
@@ -183,10 +183,10 @@ def report_shared_time_constants(subject: Subject, report: FindingCollector) -> 
         # OpenSim 4.6 shares the constants by mistake: the first such muscle sets them.
         first_muscle = first_muscle or muscle
         for tag in _SHARED_CONSTANTS:
-            own_value, used_value = getattr(muscle, tag), getattr(first_muscle, tag)
-            if own_value != used_value:
+            declared_value, used_value = getattr(muscle, tag), getattr(first_muscle, tag)
+            if declared_value != used_value:
                 report(
-                    f"{tag} of {describe_object(muscle)} is {format_quantity(own_value)}, and OpenSim "
+                    f"{tag} of {describe_object(muscle)} is {format_quantity(declared_value)}, and OpenSim "
                     f"computes with {format_quantity(used_value)}, that of {describe_object(first_muscle)}",
                     muscle,
                     tag=tag if tag in muscle.model_fields_set else None,

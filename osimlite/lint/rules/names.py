@@ -87,8 +87,8 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     """
     # Almost every model passes this test of all its names at once.
     components = subject.tree.components
-    together = "".join([component.name for component in components])
-    if not any(character in together for character in ILLEGAL_CHARACTERS):
+    all_names = "".join([component.name for component in components])
+    if not any(character in all_names for character in ILLEGAL_CHARACTERS):
         components = []
     for component in components:
         if _ILLEGAL.isdisjoint(component.name):

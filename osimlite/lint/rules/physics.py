@@ -210,9 +210,9 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
             # A range of many turns stands for none, or is in degrees; so does a limit that is not
             # given.
             widest = math.degrees(subject.config.value_of(UNLIMITED))
-            is_given = tag in force.model_fields_set and (unit == "m" or high - low < widest)
+            is_explicit = tag in force.model_fields_set and (unit == "m" or high - low < widest)
             # Swapped limits have OSIM507.
-            if is_inside and is_given and force.lower_limit <= force.upper_limit:
+            if is_inside and is_explicit and force.lower_limit <= force.upper_limit:
                 in_degrees = math.degrees(limit)
                 # Both limits are as small as angles in radians are, and one is a bound of the range
                 # then.

@@ -120,8 +120,8 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
                 consequence=RUNS,
             )
             continue
-        is_given = use.spec.name in use.holder.model_fields_set
-        state = "is empty" if is_given else "is not given"
+        is_explicit = use.spec.name in use.holder.model_fields_set
+        state = "is empty" if is_explicit else "is not given"
         report(
             f"{use.spec.tag} of {_describe_holder(subject, use)} {state}, expected the name of "
             f"{add_article(use.reference.target)}",
@@ -306,7 +306,7 @@ def _explain_reference(
     same_name = [word for word in valid_texts if word.rpartition("/")[2] == last_name]
     if same_name and resolution.failure != "wrong-type" and _differs_in_form(text, same_name):
         return _make_form_fault(use, text, same_name)
-    wrong_target = resolution.found or _find_elsewhere(subject, use, text)
+    wrong_target = resolution.wrong_target or _find_wrong_target(subject, use, text)
     if wrong_target is not None and is_a(wrong_target, reference.target):
         # A coordinate, but of another joint.
         wrong_target = None
@@ -369,7 +369,7 @@ def _differs_in_form(text: str, candidates: list[str]) -> bool:
     return any(word.strip("/") == text.strip("/") for word in candidates)
 
 
-def _find_elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
+def _find_wrong_target(subject: Subject, use: Use, text: str) -> Component | None:
     """Return a component of another class with this name or path; None without one."""
     tree = subject.tree
     at_path = tree.by_path.get(normalize_path("/" + text) or "")

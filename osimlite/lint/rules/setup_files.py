@@ -13,7 +13,7 @@ from osimlite.lint.setup import (
     Setup,
     find_motion_file,
     get_content_type,
-    is_given,
+    names_file,
 )
 from osimlite.lint.words import describe_object
 from osimlite.schema.specs import get_file_specs
@@ -58,13 +58,13 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
             continue
         # Backslashes work on Windows, where OpenSim is mostly used.
         slashed = naming.name.replace("\\", "/")
-        is_meant = slashed != naming.name and os.path.isfile(setup.resolve_path(slashed))
-        twin = slashed if is_meant else _find_other_case(naming)
+        has_slash_twin = slashed != naming.name and os.path.isfile(setup.resolve_path(slashed))
+        twin = slashed if has_slash_twin else _find_other_case(naming)
         hint = "; backslashes separate folders on Windows only" if "\\" in naming.name else ""
         if not hint and twin is None and (nearest := _find_nearest_file(naming)):
             hint = f", but '{nearest}' does"
-        goes_on = is_a(naming.item, "ControlSetController")
-        consequence = "OpenSim continues without it" if goes_on else "OpenSim rejects the setup"
+        is_optional = is_a(naming.item, "ControlSetController")
+        consequence = "OpenSim continues without it" if is_optional else "OpenSim rejects the setup"
         report(
             f"the file '{naming.name}' of {describe_object(naming.item)} does not exist{hint}: "
             f"{consequence}",
@@ -87,7 +87,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
             )
     for item in setup.items:
         for spec in get_file_specs(type(item), "file"):
-            if spec.reference.required and not is_given(getattr(item, spec.name)):
+            if spec.reference.required and not names_file(getattr(item, spec.name)):
                 report(
                     f"{describe_object(item)} names no {spec.tag}: {NO_FILE_CONSEQUENCE}",
                     item,
@@ -107,7 +107,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
             )
         if is_a(item, "AnalyzeTool"):
             named_files = [
-                tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))
+                tag for tag in ("states_file", "coordinates_file") if names_file(getattr(item, tag))
             ]
             if len(named_files) != 1:
                 file_names = (
@@ -323,7 +323,7 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
         return
     tool_path = os.path.realpath(setup.tool[0])
     reported_tags: set[str] = set()
-    for file, other_tool in setup.list_tools_beside():
+    for file, other_tool in setup.list_tools_in_folder():
         other_path = os.path.realpath(file)
         if (
             other_path == tool_path
@@ -353,4 +353,4 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
 
 def _is_set(value: str | float) -> bool:
     """Return whether a setting has a value."""
-    return is_given(value) if isinstance(value, str) else value > 0.0
+    return names_file(value) if isinstance(value, str) else value > 0.0

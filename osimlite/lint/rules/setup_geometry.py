@@ -145,8 +145,8 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
         model = _compute_agreement(
             [_compute_direction(positions[left], positions[right]) for right, left in pairs]
         )
-        seen_counts = [0] * len(pairs)
-        turned = [0] * len(pairs)
+        row_counts = [0] * len(pairs)
+        swapped_counts = [0] * len(pairs)
         for row in _select_rows(user, table):
             # Rows may lack their last cells.
             row = row + [math.nan] * (2 + 3 * len(columns) - len(row))
@@ -158,9 +158,9 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
             ]
             for number, agreement in enumerate(_compute_agreement(directions)):
                 # NaN, of a pair that is not seen, differs from itself.
-                seen_counts[number] += agreement == agreement
-                turned[number] += agreement * model[number] < -0.3
-        for (right, left), rows, wrong in zip(pairs, seen_counts, turned, strict=True):
+                row_counts[number] += agreement == agreement
+                swapped_counts[number] += agreement * model[number] < -0.3
+        for (right, left), rows, wrong in zip(pairs, row_counts, swapped_counts, strict=True):
             if rows and wrong >= 0.8 * rows:
                 # A finding at the task points to the name that the user has to compare.
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
@@ -219,8 +219,8 @@ def _compute_direction(start: Sequence[float], end: Sequence[float]) -> list[flo
 
 def _compute_agreement(directions: list[list[float]]) -> list[float]:
     """Return the cosine of each direction with the mean of the others; NaN if few are known or they disagree."""
-    known_directions = [direction for direction in directions if direction[0] == direction[0]]
-    sums = [sum(components) for components in zip(*known_directions, strict=True)] or [
+    finite_directions = [direction for direction in directions if direction[0] == direction[0]]
+    sums = [sum(components) for components in zip(*finite_directions, strict=True)] or [
         0.0,
         0.0,
         0.0,
@@ -231,7 +231,7 @@ def _compute_agreement(directions: list[list[float]]) -> list[float]:
         length = math.hypot(*others_sum)
         # With fewer pairs, or pairs that point everywhere, a reversed one cannot be told from the
         # others.
-        agree = len(known_directions) > 3 and length > 0.5 * (len(known_directions) - 1)
+        agree = len(finite_directions) > 3 and length > 0.5 * (len(finite_directions) - 1)
         result.append(
             sum(a * b for a, b in zip(direction, others_sum, strict=True)) / length
             if agree

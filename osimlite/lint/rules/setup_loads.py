@@ -104,10 +104,10 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                 # "ground_force_vx" and others.
                 matching_columns = [column for column in columns if column.startswith(prefix)]
                 if len(matching_columns) != 3 or len(set(matching_columns)) != 3:
-                    found_columns = join_words(matching_columns) if matching_columns else "none"
+                    column_text = join_words(matching_columns) if matching_columns else "none"
                     report(
                         f"expected three columns of '{loads.datafile}' that begin with '{prefix}' "
-                        f"({tag} of {describe_object(force)}), found {found_columns}: OpenSim rejects the "
+                        f"({tag} of {describe_object(force)}), found {column_text}: OpenSim rejects the "
                         "loads",
                         force,
                         tag=tag,

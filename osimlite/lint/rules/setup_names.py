@@ -17,7 +17,7 @@ from osimlite.schema.specs import get_reference_specs
 from osimlite.schema.states import find_variables
 from osimlite.schema.tree import Tree, Use, is_a
 
-_KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
+_PART_CLASSES = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
 """Beginnings of the names of reference rules that search a name in one part of the model."""
 _PATHS = ("model-path", "state-path", "pattern")
 """Other reference rules that lead from a setup into the model, with any target."""
@@ -25,7 +25,7 @@ _CONSEQUENCES = {
     "refused": ("OpenSim rejects it", None),
     "left out": ("OpenSim ignores it", WARNING),
 }
-_PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/controllerset"}
+_SET_PATHS = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/controllerset"}
 """Paths in the model of the sets to which tools add components; relative paths start there."""
 
 
@@ -73,7 +73,9 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     for cls, items in setup.by_class.items():
         for spec in get_reference_specs(cls):
             kind = spec.reference
-            target_kind = _get_kind(kind) if kind.required and kind.shape != "list" else None
+            target_kind = (
+                _get_target_class(kind) if kind.required and kind.shape != "list" else None
+            )
             for item in items if target_kind else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
                     consequence, severity = _CONSEQUENCES[kind.consequence]
@@ -152,10 +154,10 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         _look_up_controls(setup, setup.tool[1], setup.list_names("Actuator") | unknown, report)
 
 
-def _get_kind(kind: Reference) -> str | None:
+def _get_target_class(reference: Reference) -> str | None:
     """Return the class that a reference names in the model; None if it names nothing there."""
-    by_rule = (target_kind for target_kind in _KINDS if kind.rule.startswith(target_kind))
-    return kind.target if kind.rule in _PATHS else next(by_rule, None)
+    by_rule = (part_class for part_class in _PART_CLASSES if reference.rule.startswith(part_class))
+    return reference.target if reference.rule in _PATHS else next(by_rule, None)
 
 
 def _look_up_text(
@@ -168,14 +170,14 @@ def _look_up_text(
     """
     item = use.holder
     kind = use.reference
-    target_kind = _get_kind(use.reference)
+    target_kind = _get_target_class(use.reference)
     # In older formats controllers name their actuators without a path.
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.
         return "actuator", text.rpartition("/")[2], None
     if kind.rule == "socket" and kind.target.endswith(("Frame", "Actuator")):
         set_path = next(
-            (f"{path}/{item.name}" for cls, path in _PLACES.items() if is_a(item, cls)), ""
+            (f"{path}/{item.name}" for cls, path in _SET_PATHS.items() if is_a(item, cls)), ""
         )
         socket_kind = kind.target if kind.target == "Actuator" else "component"
         target_kind = socket_kind if set_path or text.startswith("/") else None

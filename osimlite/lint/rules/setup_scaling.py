@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from osimlite.lint.registry import ERROR, FindingCollector, rule
-from osimlite.lint.setup import NO_FILE_CONSEQUENCE, Setup, is_given, select_members
+from osimlite.lint.setup import NO_FILE_CONSEQUENCE, Setup, names_file, select_members
 from osimlite.lint.words import describe_object, find_nearest_name
 
 _TOOL = """```setup
@@ -131,7 +131,7 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
                 tag="scaling_order",
                 fault="manual-scale-overwritten",
             )
-        if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
+        if measures and scaler.measurement_set.objects and not names_file(scaler.marker_file):
             report(
                 f"{describe_object(scaler)} uses measurements, but names no marker_file: "
                 f"{NO_FILE_CONSEQUENCE}",
@@ -184,7 +184,7 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
                 tag="apply",
                 fault="markers-not-placed",
             )
-        elif not is_given(placer.output_model_file):
+        elif not names_file(placer.output_model_file):
             report(
                 "the model with its markers placed is not written",
                 placer,
@@ -199,7 +199,7 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
                 tag="time_range",
                 fault="static-times",
             )
-        elif placer.apply and len(placer.time_range) == 2 and is_given(placer.marker_file):
+        elif placer.apply and len(placer.time_range) == 2 and names_file(placer.marker_file):
             _check_static_times(setup, placer, report)
 
 

@@ -60,13 +60,15 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
             elif task.weight == 0:
                 # OpenSim's default is 0 as well, so that only the text tells whether the user meant
                 # it.
-                is_given = setup.element_of(task, "weight") is not None
-                problem = "has the weight 0" if is_given else "has no weight, and the default is 0"
+                is_explicit = setup.element_of(task, "weight") is not None
+                problem = (
+                    "has the weight 0" if is_explicit else "has no weight, and the default is 0"
+                )
                 report(
                     f"{describe_object(task)} {problem}: it is not tracked",
                     task,
                     tag="weight",
-                    severity=INFO if is_given else WARNING,
+                    severity=INFO if is_explicit else WARNING,
                 )
             if (
                 is_a(task, "IKCoordinateTask")

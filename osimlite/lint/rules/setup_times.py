@@ -12,7 +12,7 @@ from osimlite.lint.diagnostic import Severity
 from osimlite.lint.posture import coordinate_name, find_angles
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.rules.setup_columns import find_motions
-from osimlite.lint.setup import Setup, is_given, select_members
+from osimlite.lint.setup import Setup, names_file, select_members
 from osimlite.lint.table import Table
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
@@ -27,14 +27,16 @@ _USUAL_WINDOW = 0.01
 """Default window of computed muscle control, s."""
 
 
-_WHOLE = '<{0} name="run">\n    <model_file>leg.osim</model_file>\n    {{}}\n    {1}\n</{0}>'
+_TOOL_EXAMPLE = '<{0} name="run">\n    <model_file>leg.osim</model_file>\n    {{}}\n    {1}\n</{0}>'
 _FRAMES = {
-    "ik": _WHOLE.format("InverseKinematicsTool", "<output_motion_file>ik.mot</output_motion_file>"),
-    "dynamics": _WHOLE.format(
+    "ik": _TOOL_EXAMPLE.format(
+        "InverseKinematicsTool", "<output_motion_file>ik.mot</output_motion_file>"
+    ),
+    "dynamics": _TOOL_EXAMPLE.format(
         "InverseDynamicsTool", "<coordinates_file>leg.mot</coordinates_file>"
     ),
-    "any": _WHOLE.format("InverseDynamicsTool", "<time_range>0 0.05</time_range>"),
-    "control": _WHOLE.format(
+    "any": _TOOL_EXAMPLE.format("InverseDynamicsTool", "<time_range>0 0.05</time_range>"),
+    "control": _TOOL_EXAMPLE.format(
         "CMCTool",
         "<desired_kinematics_file>leg.mot</desired_kinematics_file> "
         "<task_set_file>tasks.xml</task_set_file>",
@@ -195,11 +197,11 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 continue
             # A tool with default times is reported only where the default cuts data off.
             specs = get_field_specs(type(item))
-            is_given = [
+            are_explicit = [
                 setup.element_of(item, tag) is not None and not setup.has_note(item, specs[tag])
                 for tag in tags
             ]
-            if not is_given[-1] and last < span[1] - slack:
+            if not are_explicit[-1] and last < span[1] - slack:
                 report(
                     f"{describe_object(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, but "
                     f"'{name}' continues to {span[1]:g} s",
@@ -207,14 +209,14 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                     tag=tags[-1],
                     fault="stops-at-default",
                 )
-            if is_given[-1] and math.isfinite(last) and last > span[1] + slack:
+            if are_explicit[-1] and math.isfinite(last) and last > span[1] + slack:
                 report(
                     f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}",
                     item,
                     tag=tags[-1],
                     fault="data-end-early",
                 )
-            if is_given[0] and math.isfinite(first) and first < span[0] - slack:
+            if are_explicit[0] and math.isfinite(first) and first < span[0] - slack:
                 report(
                     f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}",
                     item,
@@ -310,8 +312,8 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
         if loads is None or not hasattr(loads, "datafile"):
             continue
         # OpenSim searches the data beside the loads file, and in the working folder.
-        path_beside_loads = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
-        table = setup.read_table(loads.datafile) or setup.read_table(path_beside_loads)
+        path_from_loads = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
+        table = setup.read_table(loads.datafile) or setup.read_table(path_from_loads)
         span = table.span if table is not None and not table.rows.select("order", "time") else None
         if table is None or span is None:
             continue
@@ -321,7 +323,7 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
             if motion is not None and motion.span is not None:
                 # The tool runs only where it has a motion as well.
                 first, last = max(first, motion.span[0]), min(last, motion.span[1])
-            elif is_given(name):
+            elif names_file(name):
                 # It may be written yet, and is not known to last longer than the loads.
                 first, last = -math.inf, math.inf
         slack = max(table.step, 1e-9) * 1.01

@@ -9,7 +9,7 @@ from typing import Any
 
 from osimlite.base.text import join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
-from osimlite.lint.setup import Setup, is_given, select_members
+from osimlite.lint.setup import Setup, names_file, select_members
 from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.schema.tree import is_a
 
@@ -44,11 +44,11 @@ def _make_analysis_example(start: str, end: str = "", model: str = "leg.osim") -
     content = f"{start}\n                {{}}\n            {end}" if end else "{}"
     objects = f"        <objects>\n            {content}\n        </objects>"
     analyses = f'<AnalysisSet name="analyses">\n{objects}\n    </AnalysisSet>'
-    settled = "<solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>"
+    equilibrium_setting = "<solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>"
     return _make_tool_example(
         "AnalyzeTool",
         "<coordinates_file>leg.mot</coordinates_file>",
-        settled,
+        equilibrium_setting,
         analyses,
         model=model,
     )
@@ -284,7 +284,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
             # Fiber lengths come from a states file if there is one, and else from the equilibrium.
             for tool in setup.find_by_class("AnalyzeTool"):
                 if (
-                    is_given(tool.coordinates_file)
+                    names_file(tool.coordinates_file)
                     and not tool.solve_for_equilibrium_for_auxiliary_states
                 ):
                     report(

@@ -24,7 +24,7 @@ _MAX_ROWS = 50
 """Number of rows of markers that are examined."""
 _MIN_MARKERS = 3
 """Smallest number of markers that data and model must share."""
-_MAX_SLIGHT_SHARE = 0.02
+_MAX_SLIGHT_FRACTION = 0.02
 """Ratio of the largest load to the model's weight below which loads are doubtful."""
 _WEIGHT_RANGE = 0.2, 10.0
 """Plausible ratios of the largest load of a trial, in newtons, to the model's weight."""
@@ -138,7 +138,10 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
         )
         low, high = _WEIGHT_RANGE
         # Unloaded plates of a short trial are small in any unit, hence the second test.
-        if 0.0 < largest < _MAX_SLIGHT_SHARE * weight and low <= 1000.0 * largest / weight <= high:
+        if (
+            0.0 < largest < _MAX_SLIGHT_FRACTION * weight
+            and low <= 1000.0 * largest / weight <= high
+        ):
             report(
                 f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N "
                 f"together, and the model weighs {weight:.0f} N: are they in kilonewtons?",

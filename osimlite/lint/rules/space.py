@@ -170,13 +170,13 @@ def _describe_frame_cycle(subject: Subject, cycle: Sequence[PhysicalOffsetFrame]
 DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
 # A relative limit as well, since small spheres at the floor start a few tenths of a millimetre deep
 # by rounding.
-DEPTH_SHARE = Threshold(
+RELATIVE_DEPTH = Threshold(
     "contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface"
 )
 LENGTH = Threshold("largest-length", 10.0, "m", "largest plausible length on a body")
 
 
-@rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, DEPTH_SHARE))
+@rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, RELATIVE_DEPTH))
 def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None:
     """Contact surfaces are inside each other in the default pose.
 
@@ -196,7 +196,7 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
     ```
     """
     min_depth = subject.config.value_of(DEPTH)
-    min_depth_share = subject.config.value_of(DEPTH_SHARE)
+    min_relative_depth = subject.config.value_of(RELATIVE_DEPTH)
     for force, surfaces in _find_contact_groups(subject):
         for surface, other_surface in combinations(surfaces, 2):
             # The pair is tried in both orders: a force may name the half-space first or second.
@@ -209,7 +209,7 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
                 continue
             depth = _compute_depth(subject, ball, against)
             # `not >` excludes NaN.
-            if depth is None or not depth > max(min_depth, min_depth_share * ball.radius):
+            if depth is None or not depth > max(min_depth, min_relative_depth * ball.radius):
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
             report(

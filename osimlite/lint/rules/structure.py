@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.patterns import compile_later
 from osimlite.base.text import add_article, find_nearest, format_count, join_words
-from osimlite.io.document.lexical import reads_as
+from osimlite.io.document.lexical import is_read_as
 from osimlite.io.document.notes import Note
 from osimlite.io.document.source import Source
 from osimlite.lint.diagnostic import Fix, Severity
@@ -118,7 +118,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
         # If the object also has the correct tag, OpenSim does not use the default.
         message += (
             f" and keeps the default of {suggestion}{default_text}"
-            if suggestion not in _list_given(owner)
+            if suggestion not in _list_explicit_tags(owner)
             else ""
         )
     elif note.value is not None:
@@ -132,7 +132,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
     # Only the letter case is wrong: the fix is certain.
     is_same_word = suggestion is not None and suggestion.lower() == note.word.lower()
     # Renaming is no fix if the property is given as well: it would be there twice.
-    is_missing = suggestion is not None and suggestion not in _list_given(owner)
+    is_missing = suggestion is not None and suggestion not in _list_explicit_tags(owner)
     fix = (
         rename_tag(subject.source, note.number, suggestion, safe=is_same_word)
         if is_missing
@@ -190,7 +190,7 @@ def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
     text = _get_inner_text(subject, number)
     if isinstance(spec.kind, ObjectField):
         return spec.kind.form == "list" and not text.strip()
-    return reads_as(text, spec.kind, spec.default)
+    return is_read_as(text, spec.kind, spec.default)
 
 
 def _repeats_first(subject: Subject, owner: Object, number: int) -> bool:
@@ -399,7 +399,7 @@ _FORMER = {"enable_controller": "enabled"}
 """Names of properties in early releases, which OpenSim does not update in any file."""
 
 
-def _list_given(owner: Object) -> set[str]:
+def _list_explicit_tags(owner: Object) -> set[str]:
     return {
         spec.tag
         for spec in get_field_specs(type(owner)).values()

@@ -80,13 +80,13 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
             )
             cell_count = format_count(fault.number, "cell")
             report(
-                f"the row has {cell_count} and needs {rows.cells}{fault.text}{fault.describe_rest()}",
+                f"the row has {cell_count} and needs {rows.cells}{fault.text}{fault.describe_repeats()}",
                 at=position,
                 fix=fix,
             )
         elif fault.kind == "comment":
             report(
-                f"OpenSim does not allow comments among the rows{fault.describe_rest('line')}",
+                f"OpenSim does not allow comments among the rows{fault.describe_repeats('line')}",
                 at=position,
             )
         # Blank lines after the last row do no harm.
@@ -102,7 +102,7 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
                 )
             else:
                 report(
-                    f"there is a blank line among the rows{fault.describe_rest('line')}",
+                    f"there is a blank line among the rows{fault.describe_repeats('line')}",
                     at=position,
                     severity=INFO,
                 )
@@ -172,7 +172,7 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
             )
         problem = f"'{fault.text}' is not a number" if fault.text else "the number is missing"
         report(
-            f"{problem} (column '{label}'): {consequence}{fault.describe_rest()}",
+            f"{problem} (column '{label}'): {consequence}{fault.describe_repeats()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING
             if fault.kind == "cell" and (table.is_markers or table.is_strict)
@@ -225,7 +225,7 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
             else WARNING
         )
         position = Position(fault.line, fault.column, fault.length)
-        report(f"the time {problem}{fault.describe_rest()}", at=position, severity=severity)
+        report(f"the time {problem}{fault.describe_repeats()}", at=position, severity=severity)
     times = table.rows.times
     # Times grow: what is too large is at the ends. A time that goes back is reported above.
     far_rows = [row for row in (0, len(times) - 1) if times and abs(times[row]) >= MAX_TIME_S]

@@ -12,7 +12,7 @@ from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
-_WHOLE = compile_later(r"\+?[0-9]+")
+_WHOLE_NUMBER = compile_later(r"\+?[0-9]+")
 _TO_THE_END = 1_000_000
 """Length of a position that reaches to the end of any line, in characters."""
 
@@ -236,7 +236,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         if entry is None or (row_kind in ("rows", "frames") and (odd_rows or not count)):
             continue
         count_text = entry.value.text
-        number = float(count_text) if _WHOLE.fullmatch(count_text) else nan
+        number = float(count_text) if _WHOLE_NUMBER.fullmatch(count_text) else nan
         if number == count:
             continue
         consequence = ""

@@ -6,7 +6,7 @@ from osimlite.lint.registry import WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OSIMLITE, TRIAL, Trial
 
 _BOTH = f"{OPENSIM}; {HICKS}"
-FORCE_SHARE = Threshold(
+RELATIVE_FORCE = Threshold(
     "residual-force-share",
     5.0,
     "%",
@@ -36,7 +36,7 @@ FORCE_RMS_BAD = Threshold(
     "N",
     "a larger root mean square of a residual force is bad",
 )
-MOMENT_SHARE = Threshold(
+RELATIVE_MOMENT = Threshold(
     "residual-moment-share",
     1.0,
     "%",
@@ -120,7 +120,7 @@ PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "a larger passive force
 
 @rule(
     "OSIM911", "residual-force", severity=WARNING, about=TRIAL,
-    thresholds=(FORCE_SHARE, FORCE_GOOD, FORCE_BAD, FORCE_RMS_GOOD, FORCE_RMS_BAD),
+    thresholds=(RELATIVE_FORCE, FORCE_GOOD, FORCE_BAD, FORCE_RMS_GOOD, FORCE_RMS_BAD),
 )  # fmt: skip
 def report_residual_force(trial: Trial, report: FindingCollector) -> None:
     """A residual force is large.
@@ -145,13 +145,13 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
         "check masses and mass centres, the filter, and that the loads agree with the motion in time "
         "and act on the right foot"
     )
-    trial.judge(report, [FORCE_GOOD, FORCE_SHARE, FORCE_BAD], _BOTH, advice, "peak")
+    trial.judge(report, [FORCE_GOOD, RELATIVE_FORCE, FORCE_BAD], _BOTH, advice, "peak")
     trial.judge(report, [FORCE_RMS_GOOD, FORCE_RMS_BAD], OPENSIM, advice, "rms")
 
 
 @rule(
     "OSIM912", "residual-moment", severity=WARNING, about=TRIAL,
-    thresholds=(MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD, MOMENT_RMS_GOOD, MOMENT_RMS_BAD),
+    thresholds=(RELATIVE_MOMENT, MOMENT_GOOD, MOMENT_BAD, MOMENT_RMS_GOOD, MOMENT_RMS_BAD),
 )  # fmt: skip
 def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
     """A residual moment is large.
@@ -174,7 +174,7 @@ def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
     advice = (
         "check the mass centre of the trunk (RRA adjusts it), and the points at which the loads act"
     )
-    trial.judge(report, [MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD], _BOTH, advice, "peak")
+    trial.judge(report, [RELATIVE_MOMENT, MOMENT_GOOD, MOMENT_BAD], _BOTH, advice, "peak")
     trial.judge(report, [MOMENT_RMS_GOOD, MOMENT_RMS_BAD], OPENSIM, advice, "rms")
 
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.lexical import (
     UncleanText,
+    is_read_as,
     parse_flag,
     parse_integer,
     parse_real,
-    reads_as,
     split_words,
 )
 from osimlite.io.document.notes import Note
@@ -61,7 +61,7 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
         report(
             f"{subject.describe_property(owner, spec)} is '{text}', expected "
             f"{kind.words()}{_describe_foreign_characters(text)}: "
-            f"{_describe_kept_value(note, owner, spec, kind)}",
+            f"{_describe_used_value(note, owner, spec, kind)}",
             owner,
             number=note.number,
             word=note.word,
@@ -72,7 +72,9 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
             if "\n" not in text
             else None,
             # If OpenSim happens to read the intended value, the motion is right.
-            severity=WARNING if better is not None and reads_as(better, kind, used_value) else None,
+            severity=WARNING
+            if better is not None and is_read_as(better, kind, used_value)
+            else None,
         )
 
 
@@ -97,7 +99,7 @@ def report_wrong_count(subject: Subject, report: FindingCollector) -> None:
         count = len(split_words(note.word))
         report(
             f"{subject.describe_property(owner, spec)} expects {kind.words()}, found {count}: "
-            f"{_describe_kept_value(note, owner, spec, kind)}",
+            f"{_describe_used_value(note, owner, spec, kind)}",
             owner,
             tag=spec.tag,
             consequence=_get_consequence(note, spec, kind),
@@ -161,7 +163,7 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
         if kind.shape != "optional":
             report(
                 f"{subject.describe_property(owner, spec)} is empty, expected {kind.words()}: "
-                f"{_describe_kept_value(note, owner, spec, kind)}",
+                f"{_describe_used_value(note, owner, spec, kind)}",
                 owner,
                 number=note.number,
                 consequence=REFUSES,
@@ -216,10 +218,10 @@ def _are_readable(text: str, kind: Value) -> bool:
         "bool": parse_flag,
         "string": str,
     }
-    reads = readers[kind.scalar]
+    parse = readers[kind.scalar]
     try:
         for word in split_words(text):
-            reads(word)
+            parse(word)
     except UncleanText:
         return False
     return True
@@ -243,7 +245,7 @@ def _get_consequence(note: Note, spec: FieldSpec, kind: Value) -> Consequence:
     return REFUSES if _is_refused(note, spec, kind) else RUNS
 
 
-def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
+def _describe_used_value(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
     """Return which value OpenSim uses instead."""
     if note.value is not None:
         return f"OpenSim takes {format_value(note.value)}"
@@ -303,7 +305,7 @@ def _replace_digits(text: str) -> str:
 def _complete_number(word: str) -> str | None:
     """Return the intended number, if it is obvious; otherwise None."""
     plain = word.rstrip(_SEPARATORS)
-    if plain != word and reads_as(plain, _ONE_NUMBER, _read_beginning(word)):
+    if plain != word and is_read_as(plain, _ONE_NUMBER, _read_beginning(word)):
         return plain
     # A comma with digits on both sides is a decimal comma.
     comma = re.fullmatch(r"([+-]?\d+),(\d+)", word)

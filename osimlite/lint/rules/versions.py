@@ -64,7 +64,7 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
         for spec, version, earlier_name in find_new_properties(cls, target):
             rename_note = f"; before it was called {earlier_name}" if earlier_name else ""
             for item in items:
-                if not _is_given(subject, item, spec):
+                if not _is_explicit(subject, item, spec):
                     continue
                 is_default = spec.factory is None and getattr(item, spec.name) == spec.default
                 report(
@@ -76,7 +76,7 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
                 )
 
 
-def _is_given(subject: Subject, item: Object, spec: FieldSpec) -> bool:
+def _is_explicit(subject: Subject, item: Object, spec: FieldSpec) -> bool:
     """Return whether the text gives a property under its current tag; older texts may use another."""
     if subject.source is None:
         return spec.name in item.model_fields_set

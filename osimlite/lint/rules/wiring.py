@@ -125,7 +125,7 @@ def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
         text = use.text
         list_targets = targets_by_list.setdefault((id(use.holder), use.spec.tag), [])
         # By identity: two different texts can name the same component.
-        if any(listed is target for listed, _ in list_targets):
+        if any(target_before is target for target_before, _ in list_targets):
             report(
                 f"{describe_object(use.holder)} lists {describe_object(target)} again: OpenSim "
                 "rejects the model",

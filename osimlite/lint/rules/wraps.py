@@ -93,7 +93,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
         points = path.path_point_set.objects
         count = len(points)
         owner = subject.tree.parent_of(path)
-        is_left = False
+        has_inverted_range = False
         may_leave = False
         for wrap in _list_wraps(path):
             first, last = wrap.range
@@ -105,7 +105,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
             )
             start = max(first, 1)
             end = last if last > 0 else count
-            if end > count and start <= end and not (is_left or is_off):
+            if end > count and start <= end and not (has_inverted_range or is_off):
                 consequence = "OpenSim fails when it computes its length"
                 consequence += ", unless an earlier wrap has no points there" if may_leave else ""
                 report(
@@ -126,7 +126,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
                     wrap,
                     tag="range",
                 )
-            is_left = is_left or (start > end and not is_off)
+            has_inverted_range = has_inverted_range or (start > end and not is_off)
             covered_points = points[start - 1 : end]
             may_leave = may_leave or not (
                 is_off

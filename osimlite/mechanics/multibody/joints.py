@@ -52,7 +52,7 @@ def make_plain_motions(joint_class: type[Joint]) -> tuple[JointMotion, ...]:
         Translations first, then rotations; those of a ball joint are one motion.
     """
     axes = {"x": X, "y": Y, "z": Z}
-    words = [*enumerate((joint_class.moves or "").split())]
+    words = [*enumerate((joint_class.coordinate_motions or "").split())]
     translations = [translate(axes[word[1]], index) for index, word in words if word[0] == "t"]
     rotations = [rotate_about(axes[word[1]], index) for index, word in words if word[0] == "r"]
     if joint_class.speeds_are_rates:

@@ -142,7 +142,7 @@ class UpgradeResult:
         )
 
     @property
-    def moved(self) -> dict[tuple[int, str], int]:
+    def old_indices(self) -> dict[tuple[int, str], int]:
         """Indices of changed properties in the old document.
 
         Returns:

@@ -180,7 +180,7 @@ def _is_integer(text: str) -> bool:
 def _is_vector(size: int) -> Callable[[str], bool]:
     """Return the predicate for texts that OpenSim reads as a vector of finite numbers."""
 
-    def reads(text: str) -> bool:
+    def is_vector_text(text: str) -> bool:
         # Nearly all vectors have one space between their numbers, and need no pattern.
         words = text.split(" ")
         if len(words) == size and all(map(_is_real, words)):
@@ -190,7 +190,7 @@ def _is_vector(size: int) -> Callable[[str], bool]:
             number and isinf(float(number)) for number in result.groups()
         )
 
-    return reads
+    return is_vector_text
 
 
 _is_real = compile_later(_NUMBER).fullmatch

@@ -243,7 +243,7 @@ def convert_wrap_appearance(draft: Draft) -> None:
         if set_by is not None or visible is not None:
             lost = (
                 "the position of the shown surface, which was not that of the wrap object"
-                if _is_shown_elsewhere(wrap, visible)
+                if _is_drawn_at_other_pose(wrap, visible)
                 else None
             )
             draft.record_change(wrap, lost=lost)
@@ -269,20 +269,20 @@ def _add_appearance(
     draft.add(surface, "representation", representation, source=source)
 
 
-def _is_shown_elsewhere(wrap: Element, visible: Element | None) -> bool:
+def _is_drawn_at_other_pose(wrap: Element, visible: Element | None) -> bool:
     """Return whether the surface was shown at another position than that of the wrap object."""
-    shown_pose = None if visible is None else parse_reals(get_child_text(visible, "transform"), 6)
+    drawn_pose = None if visible is None else parse_reals(get_child_text(visible, "transform"), 6)
     angles, translation = (
         parse_reals(get_child_text(wrap, tag), 3) or [0.0] * 3
         for tag in ("xyz_body_rotation", "translation")
     )
     wrap_pose = [*angles, *translation]
     return (
-        shown_pose is not None
-        and any(shown_pose)
+        drawn_pose is not None
+        and any(drawn_pose)
         # OpenSim's wrap objects may be drawn elsewhere than they act, which the new format cannot
         # say.
-        and any(abs(a - b) > 1e-4 for a, b in zip(shown_pose, wrap_pose, strict=True))
+        and any(abs(a - b) > 1e-4 for a, b in zip(drawn_pose, wrap_pose, strict=True))
     )
 
 
