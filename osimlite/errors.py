@@ -37,10 +37,10 @@ class OsimliteError(Exception):
         self.column = column
 
     def __str__(self) -> str:
-        place = ":".join(
+        location = ":".join(
             str(part) for part in (self.file, self.line, self.column) if part is not None
         )
-        return escape_unprintable(f"{place}: {self.message}" if place else self.message)
+        return escape_unprintable(f"{location}: {self.message}" if location else self.message)
 
 
 class DoubtfulWarning(UserWarning):
@@ -117,8 +117,8 @@ class MissingNameError(ModelError, AttributeError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Functions do not pass from one process to another, sentences do.
-        place = {"file": self.file, "line": self.line, "column": self.column}
-        return _restore_missing_name, (type(self), self.message), place
+        location = {"file": self.file, "line": self.line, "column": self.column}
+        return _restore_missing_name, (type(self), self.message), location
 
 
 def _restore_missing_name(cls: type[MissingNameError], message: str) -> MissingNameError:

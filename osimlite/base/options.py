@@ -17,9 +17,9 @@ class OptionSpec(NamedTuple):
         name: keyword of the library; on the command line with - for _, unless `spelled` is given.
         type: type of the value.
         help: sentence for the help of the command.
-        default: value if the option is absent; None if `shown` says what the library then takes.
+        default: value if the option is absent; None if `default_text` says what the library then takes.
         unit: placeholder of the value in the help, in capitals, as SECONDS.
-        shown: default in words, where `default` does not say it.
+        default_text: default in words, where `default` does not say it.
         group: heading of the help under which the option is listed.
         spelled: spellings on the command line.
     """
@@ -29,7 +29,7 @@ class OptionSpec(NamedTuple):
     help: str
     default: Any = None
     unit: str = ""
-    shown: str = ""
+    default_text: str = ""
     group: str = ""
     spelled: tuple[str, ...] = ()
 
@@ -41,14 +41,14 @@ class OptionDescription(NamedTuple):
         help: sentence for the help of the command; an option without it exists in the library only.
         more: text for the library, after `help` or instead of it.
         unit: placeholder of the value in the help.
-        shown: default in words.
+        default_text: default in words.
         type: type of the value on the command line, where the library accepts more.
     """
 
     help: str
     more: str
     unit: str
-    shown: str
+    default_text: str
     type: Any
 
 
@@ -58,11 +58,11 @@ def define_option(
     *,
     more: str = "",
     unit: str = "",
-    shown: str = "",
+    default_text: str = "",
     type: Any = None,
 ) -> Any:
     """Return the field of an options record; for the arguments see :class:`OptionDescription`."""
-    return field(default=default, option=OptionDescription(help, more, unit, shown, type))
+    return field(default=default, option=OptionDescription(help, more, unit, default_text, type))
 
 
 def list_options(options: Any) -> Iterator[OptionSpec]:
@@ -80,9 +80,9 @@ def list_options(options: Any) -> Iterator[OptionSpec]:
                 kind,
                 description.help,
                 # The library can then tell that the user has not set the option.
-                None if description.shown else option_field.default,
+                None if description.default_text else option_field.default,
                 description.unit,
-                description.shown,
+                description.default_text,
                 "",
                 spelled,
             )

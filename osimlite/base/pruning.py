@@ -87,7 +87,7 @@ def find_entries(folder: str) -> Iterator[_Entry]:
     """Yield all entries in the tree of a folder."""
     for parent, folders, names in os.walk(folder, followlinks=False):
         # On Windows Python does not see that a junction is a link.
-        folders[:] = [name for name in folders if not _leads_elsewhere(parent, name)]
+        folders[:] = [name for name in folders if not _is_link(parent, name)]
         for name in names:
             if not name.endswith(".json"):
                 continue
@@ -97,7 +97,7 @@ def find_entries(folder: str) -> Iterator[_Entry]:
                     yield _Entry(info.st_mtime, info.st_size, parent, name)
 
 
-def _leads_elsewhere(parent: str, name: str) -> bool:
+def _is_link(parent: str, name: str) -> bool:
     """Return whether a folder is a link or a junction."""
     path = os.path.join(parent, name)
     return os.path.realpath(path) != os.path.join(os.path.realpath(parent), name)

@@ -32,7 +32,7 @@ class Quantity(NamedTuple):
         return self.number * _SIZES.get(self.unit or "rad", 1.0)
 
 
-def describe_unit_doubt(name: str, value: Quantity | None, range: tuple[float, float]) -> str:
+def describe_unit_mistake(name: str, value: Quantity | None, range: tuple[float, float]) -> str:
     """Describe why the value of a rotational coordinate is probably in degrees.
 
     That is so if it has no unit, is more than a turn and is outside the range of the coordinate.
@@ -55,7 +55,7 @@ def describe_unit_doubt(name: str, value: Quantity | None, range: tuple[float, f
 
 
 def warn_of_unit(message: str) -> None:
-    """Issue the warning of :func:`describe_unit_doubt`; do nothing for an empty text."""
+    """Issue the warning of :func:`describe_unit_mistake`; do nothing for an empty text."""
     if message:
         warn_caller(message, UnitWarning)
 

@@ -127,7 +127,7 @@ class ResultWriter:
             return
         existing = read_at_most(path, BEGINNING_BYTES)
         kind = describe_content(beginning)
-        if existing and not _are_alike(describe_content(existing), kind):
+        if existing and not _can_replace(describe_content(existing), kind):
             raise WriteRefusedError(
                 f"a result would replace this file, which is not {kind or 'such a text'}; move it, "
                 "let the document name another file, or replace it with --overwrite",
@@ -187,7 +187,7 @@ UNNAMED_TABLE = "a table 'UNKNOWN' of OpenSim"
 """Type of a table without a name, as RRA and CMC write their states."""
 
 
-def _are_alike(present: str | None, new: str | None) -> bool:
+def _can_replace(present: str | None, new: str | None) -> bool:
     """Return whether a new text of one type may replace a result of another type."""
     if present is None or new is None:
         return False

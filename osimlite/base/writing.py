@@ -338,11 +338,11 @@ def _open_temporary(
             yield stream
         if target_stat is None:
             Path(name).chmod(0o666 & ~_get_umask())
-        is_alike = target_stat is None or _copy_attributes(name, target, target_stat)
-        if not is_alike and not in_place and target_stat is not None:
+        has_same_attributes = target_stat is None or _copy_attributes(name, target, target_stat)
+        if not has_same_attributes and not in_place and target_stat is not None:
             os.chmod(name, stat.S_IMODE(target_stat.st_mode))
-            is_alike = True
-        replaces = is_alike and _replace_file(name, target)
+            has_same_attributes = True
+        replaces = has_same_attributes and _replace_file(name, target)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None

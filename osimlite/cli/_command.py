@@ -301,7 +301,9 @@ def _list_argument_names(function: Any) -> tuple[str, ...]:
 
 
 def _make_spec(option: OptionSpec) -> ParameterSpec:
-    show_default: Any = option.shown or (option.default is not None and option.type is not bool)
+    show_default: Any = option.default_text or (
+        option.default is not None and option.type is not bool
+    )
     settings = {
         "help": option.help,
         "metavar": option.unit,

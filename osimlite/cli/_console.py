@@ -119,21 +119,21 @@ def show_rows(
     last = len(headings) - 1
     widths = [max(len(row[index]) for row in all_rows) for index in range(last)]
     indent = sum(widths) + 2 * last
-    fits_beside = count_columns() - indent >= MIN_TEXT_WIDTH
-    text_indent = indent if fits_beside else TEXT_INDENT
+    fits_in_column = count_columns() - indent >= MIN_TEXT_WIDTH
+    text_indent = indent if fits_in_column else TEXT_INDENT
     bold, reset = ("\033[1m", "\033[0m") if wants_colour() else ("", "")
     for row_index, row in enumerate(all_rows):
-        if row_index == 0 and not fits_beside:
+        if row_index == 0 and not fits_in_column:
             continue
         cells = [
             f"{cell:>{width}}" if index in right_aligned else f"{cell:{width}}"
             for index, (cell, width) in enumerate(zip(row[:last], widths, strict=True))
         ]
         # Above its text a row is not aligned with others, so that empty cells are left out.
-        first_line = "  ".join(cells if fits_beside else [cell for cell in row[:last] if cell])
+        first_line = "  ".join(cells if fits_in_column else [cell for cell in row[:last] if cell])
         text_width = max(count_columns() - text_indent, MIN_WRAP_WIDTH)
         lines = wrap(row[last], text_width, break_on_hyphens=False, break_long_words=False)
-        if fits_beside:
+        if fits_in_column:
             first_line = f"{first_line}  {lines.pop(0) if lines else ''}"
         text = "\n".join([first_line.rstrip(), *(f"{'':{text_indent}}{line}" for line in lines)])
         show((f"{bold}{text}{reset}" if row_index == 0 else text) + "\n")
@@ -480,9 +480,9 @@ class FactTable:
             for name, content in self.rows
         ]
         width = max((len(name) for name, _ in rows), default=0)
-        width_left = count_columns() - width - 2
+        remaining_width = count_columns() - width - 2
         # Narrow columns need broken words, and characters of other scripts can be two columns wide.
-        if width_left < 30 or not all(_has_single_columns(name, text) for name, text in rows):
+        if remaining_width < 30 or not all(_has_single_columns(name, text) for name, text in rows):
             self._show_any([(name, _join_content(content)) for name, content in rows])
             return
 
@@ -490,8 +490,8 @@ class FactTable:
         if self.title:
             show(f"{italic}{escape_unprintable(self.title)}{end}\n")
         for name, content in rows:
-            lines = _list_content_lines(content, width_left) or [""]
-            if max(map(len, lines)) > width_left:
+            lines = _list_content_lines(content, remaining_width) or [""]
+            if max(map(len, lines)) > remaining_width:
                 show(f"{bold}{name}{end}\n")
                 for line in _list_content_lines(content, count_columns() - 2):
                     show(f"  {line}\n")

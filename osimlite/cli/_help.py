@@ -74,8 +74,8 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
     heading_of = {member: heading for heading, group in command.groups.items() for member in group}
     for parameter in parameters:
         if parameter.declared.maker == "Option":
-            own_heading = parameter.declared.settings.get("rich_help_panel") or "Options"
-            heading = heading_of.get(parameter.name, own_heading)
+            declared_heading = parameter.declared.settings.get("rich_help_panel") or "Options"
+            heading = heading_of.get(parameter.name, declared_heading)
             groups.setdefault(heading, []).append(parameter)
     for heading, group in groups.items():
         lines.append(f"{start}{heading}:{end}")

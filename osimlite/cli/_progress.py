@@ -78,7 +78,7 @@ class _Task:
         self.started = time.monotonic()
         self.done = 0.0
         self.details = ""
-        self.is_told = False
+        self.is_announced = False
         self.part: _Task | None = None
         self.stage: _Task | None = None
 
@@ -146,7 +146,7 @@ class _Line:
         # Innermost task last; the line shows that one.
         self.tasks: list[_Task] = []
         # Number of characters on the line now.
-        self._shown = 0
+        self._drawn_width = 0
         self._last_output = time.monotonic()
         self._last_drawn = 0.0
         # Re-entrant: what is printed while the line is erased erases it again.
@@ -165,8 +165,8 @@ class _Line:
             self.draw()
             return
         now = time.monotonic()
-        if not task.is_told and now - task.started > LONG_S:
-            task.is_told = True
+        if not task.is_announced and now - task.started > LONG_S:
+            task.is_announced = True
             complain(task.describe(now))
 
     def is_terminal(self) -> bool:
@@ -177,7 +177,7 @@ class _Line:
     def start(self) -> None:
         """Redraw the line in the background, while the program computes."""
         if self._thread is None and self.is_terminal():
-            set_output_hook(self.make_room)
+            set_output_hook(self.make_way)
             if hasattr(os, "register_at_fork"):
                 # A child has the line of its parent, but not the thread.
                 os.register_at_fork(after_in_child=self.abandon)
@@ -187,7 +187,7 @@ class _Line:
 
     def abandon(self) -> None:
         """Never draw again, in a process that another has started."""
-        self.tasks, self._shown = [], 0
+        self.tasks, self._drawn_width = [], 0
         # The lock of the parent may be held by a thread that the child does not have.
         self._lock = threading.RLock()
         set_output_hook(None)
@@ -210,9 +210,9 @@ class _Line:
                 # One column less than the terminal has, which would break the line.
                 text = self.tasks[-1].describe(now)[: max(1, count_columns() - 1)]
                 # Padding with blanks overwrites the rest of a longer line.
-                self._write(f"\r{text:{self._shown}}")
+                self._write(f"\r{text:{self._drawn_width}}")
                 # The cursor, and ^C with it, stands behind the blanks of a longer line.
-                self._shown = max(self._shown, len(text))
+                self._drawn_width = max(self._drawn_width, len(text))
         finally:
             self._lock.release()
 
@@ -220,7 +220,7 @@ class _Line:
         """Show the line of a command that has just started earlier than other lines."""
         self._last_output = time.monotonic() - (SILENT_S - FIRST_SILENT_S)
 
-    def make_room(self) -> None:
+    def make_way(self) -> None:
         """Remove the line, since something else is printed."""
         self._last_output = time.monotonic()
         self.erase()
@@ -228,11 +228,11 @@ class _Line:
     def erase(self) -> None:
         """Overwrite the line with blanks, and what the terminal wrote behind it."""
         with self._lock:
-            if self._shown:
+            if self._drawn_width:
                 # Terminals write ^C for Ctrl-C behind the line.
-                width = min(self._shown + len("^C"), count_columns())
+                width = min(self._drawn_width + len("^C"), count_columns())
                 self._write(f"\r{'':{width}}\r")
-                self._shown = 0
+                self._drawn_width = 0
 
     def _write(self, text: str) -> None:
         # The terminal may be closed; progress is no reason to fail.
@@ -322,7 +322,7 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
         if task in _line.tasks:
             _line.tasks.remove(task)
         _line.erase()
-    if task.is_told:
+    if task.is_announced:
         complain(f"{title}: finished in {_format_duration(time.monotonic() - task.started)}")
 
 
@@ -348,7 +348,7 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
     advance: Callable[..., None] = _ignore_progress
     with ExitStack() as bars:
 
-        def tell(title: str, done: float, of: float) -> None:
+        def report_stage(title: str, done: float, of: float) -> None:
             nonlocal current, advance
             if title != current:
                 bars.close()
@@ -356,7 +356,7 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
                 advance = bars.enter_context(progress_bar(title, of))
             advance(done, of)
 
-        yield tell
+        yield report_stage
 
 
 def show_engine_warnings() -> None:

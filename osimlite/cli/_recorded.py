@@ -65,8 +65,8 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
         say(f"not in the motion, default value used: {join_words(recorded.missing)}")
     if recorded.ignored:
         say(f"ignored columns, which are not coordinates: {join_words(recorded.ignored)}")
-    turned = [info.motion_type == "rotational" for info in recorded.mechanism.coordinates]
-    largest = abs(recorded.values[:, turned]).max(initial=0.0)
+    is_rotational = [info.motion_type == "rotational" for info in recorded.mechanism.coordinates]
+    largest = abs(recorded.values[:, is_rotational]).max(initial=0.0)
     if largest > LARGEST_USUAL_ANGLE:
         say(
             f"the largest angle is {largest:.4g} rad; if the motion is in degrees, write inDegrees=yes in the header "

@@ -48,7 +48,7 @@ def build(
     from osimlite.errors import OsimliteError
     from osimlite.io.document.printer import to_text, write
     from osimlite.lint import validate
-    from osimlite.models.source import make_model, write_beside
+    from osimlite.models.source import make_model, write_companion_files
 
     if list_models:
         _list_models()
@@ -80,7 +80,7 @@ def build(
         f"; {format_count(warned, 'warning')}: see osimlite validate {target}" if warned else ""
     )
     say(f"{target}: {count} components{advice}")
-    for path in write_beside(source, model, target):
+    for path in write_companion_files(source, model, target):
         say(f"wrote {path}")
 
 

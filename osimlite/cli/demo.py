@@ -41,7 +41,7 @@ class TourMotion(NamedTuple):
         to: duration, s.
         title: heading of its step and page.
         describe: function that returns sentences about the result.
-        seen: description of what the page shows besides the motion.
+        description: sentence about what the page shows besides the motion.
         command: command to try next; {} is the folder of the tour.
     """
 
@@ -49,7 +49,7 @@ class TourMotion(NamedTuple):
     to: float
     title: str
     describe: Callable[[Trajectory], str]
-    seen: str
+    description: str
     command: str
 
 
@@ -110,7 +110,7 @@ class _Tour:
         say(f"{self.steps}. {title}")
         start = time.perf_counter()
 
-        def tell(result: str, *files: Path) -> None:
+        def print_result(result: str, *files: Path) -> None:
             duration = f"({time.perf_counter() - start:.1f} s)"
             for line in textwrap.wrap(f"{result} {duration}", 76):
                 say(f"   {line}")
@@ -122,7 +122,7 @@ class _Tour:
 
         # The heading above the line of progress says what the step does.
         with progress_bar(f"   step {self.steps}", None):
-            yield tell
+            yield print_result
 
 
 def _build_and_check(tour: _Tour) -> None:
@@ -224,7 +224,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
             model_view = ModelView.from_model(
                 trajectory.model, trajectory.mechanism, motion=trajectory
             )
-            caption = f"{sentence} {motion.seen}"
+            caption = f"{sentence} {motion.description}"
             story = Story(
                 caption, motion.command.format(tour.folder), f"{motion.model}.html", titles
             )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from osimlite.tools.many import RunRecord
     from osimlite.tools.outcome import Outcome
 
-WORTH_SHARING = 4
+MIN_PARALLEL_SETUPS = 4
 """Number of setups from which on several processes are worth their start."""
 MOST_WARNINGS = 3
 """Number of warnings that are shown of a single setup, besides those with a suggestion."""
@@ -153,7 +153,9 @@ def run(
     # Outcomes hold all tables: they are kept only if something is drawn from them.
     outcomes: dict[str | Path, Outcome] | None = {} if report is not None or plot else None
     # Starting processes for few setups takes longer than running them.
-    count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
+    count = (
+        1 if workers is None and cluster is None and len(files) < MIN_PARALLEL_SETUPS else workers
+    )
     with progress_bar("running", len(files)) as progress:
         trials = run_many(
             files,

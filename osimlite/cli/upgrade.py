@@ -105,7 +105,7 @@ def _print_changes(document: Document) -> None:
     for description, changes in losses.items():
         first = document.source.locate_tag(changes[0].number).line
         # One line for each loss with its first place; a model may have hundreds of the same kind.
-        other_places = (
+        other_positions = (
             f" and {format_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
         )
-        say(f"lost: {description} (line {first}, {changes[0].where}{other_places})")
+        say(f"lost: {description} (line {first}, {changes[0].where}{other_positions})")

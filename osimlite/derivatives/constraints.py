@@ -148,10 +148,10 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
         unused: int,
     ) -> int:
         """Return OK after storing the accelerations under all constraints in the derivative `f`."""
-        h = model.rest(model[MODEL.CONSTRAINED])
+        h = model.get_tail(model[MODEL.CONSTRAINED])
         size = model[MODEL.DOFS]
-        right_side = f.rest(size)
-        freedoms = model.rest(model[MODEL.DOF_AT])
+        right_side = f.get_tail(size)
+        freedoms = model.get_tail(model[MODEL.DOF_AT])
         make_symbolic(evaluate_constraints)(model, reals, data, y, f)
         make_symbolic(solve_accelerations)(model, data, right_side)
         # M = Lᵀ D L; the diagonal of D stands first in each row of the stored factors.

@@ -30,7 +30,7 @@ class DifferentiableModel:
         model: model to differentiate.
         parameters: paths of numbers that the rates are functions of.
         folder: folder of the model's file.
-        apart: whether bodies that never move relative to one another remain separate links.
+        keep_fixed_bodies: whether bodies that never move relative to one another remain separate links.
 
     Attributes:
         name: name of the model.
@@ -48,18 +48,25 @@ class DifferentiableModel:
     """
 
     def __init__(
-        self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False
+        self,
+        model: Model,
+        parameters: Sequence[str],
+        folder: Path,
+        *,
+        keep_fixed_bodies: bool = False,
     ) -> None:
         self._folder = folder
         self._model = model
         # The inertia of merged bodies is not a linear function of masses and positions, those of
         # separate bodies are.
-        self._apart = apart or bool(parameters)
+        self._keep_fixed_bodies = keep_fixed_bodies or bool(parameters)
         self.name = model.name or "model"
         self.parameters = tuple(parameters)
         self.mechanism: Mechanism = build_mechanism(model)
         self.forces = self._collect_forces(model, self.mechanism)
-        self._packed: PackedModel = pack(self.mechanism, self.forces, apart=self._apart)
+        self._packed: PackedModel = pack(
+            self.mechanism, self.forces, keep_fixed_bodies=self._keep_fixed_bodies
+        )
         self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
         infos = self.mechanism.coordinates
         coordinate_states = [
@@ -151,7 +158,11 @@ class DifferentiableModel:
             Numbers (k,); none if the structure of the model changes.
         """
         mechanism = build_mechanism(changed_model)
-        packed = pack(mechanism, self._collect_forces(changed_model, mechanism), apart=self._apart)
+        packed = pack(
+            mechanism,
+            self._collect_forces(changed_model, mechanism),
+            keep_fixed_bodies=self._keep_fixed_bodies,
+        )
         return (
             packed.numbers
             # A change of the structure, such as of a number of points, is not a change of numbers:

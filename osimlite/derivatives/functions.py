@@ -121,7 +121,7 @@ class CasadiModel(SymbolicModel):
         # Rows of values and auxiliary states: given rate less computed rate. Those of speeds are
         # forces, which replace them below.
         rows = [
-            given_rate - computed_rate for given_rate, computed_rate in zip(xdot, f, strict=True)
+            input_rate - computed_rate for input_rate, computed_rate in zip(xdot, f, strict=True)
         ]
         rows[size : 2 * size] = f[size : 2 * size]
         if self.constraint_count:
@@ -182,7 +182,11 @@ class CasadiModel(SymbolicModel):
             # A joint without motion is merged away, so a model with separate links computes its
             # load.
             separate_model = CasadiModel(
-                self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads)
+                self._model,
+                self.parameters,
+                self._folder,
+                keep_fixed_bodies=True,
+                loads_as_inputs=bool(self.loads),
             )
             return separate_model.joint_load(path, side)
         # The missing wrench acts on the body that the joint carries in the tree, and its opposite on
@@ -260,15 +264,15 @@ class CasadiModel(SymbolicModel):
         for number in range(count):
             first_offset = h[CONSTRAINED.WORK_ROWS] + size * number
             row = [0.0] * size
-            for k, place in enumerate(order):
-                row[place] = data[first_offset + k]
+            for k, state_index in enumerate(order):
+                row[state_index] = data[first_offset + k]
             rows.append(self._library.horzcat(*row))
         jacobian = self._library.sparsify(self._library.SX(column(*rows)))
         u = self._symbols["x"][size : 2 * size]
         udot = self._symbols["xdot"][size : 2 * size]
 
-        def get_rows(place: int) -> Any:
-            return column(*data[h[place] : h[place] + count])
+        def get_rows(field: int) -> Any:
+            return column(*data[h[field] : h[field] + count])
 
         errors = [
             data[h[CONSTRAINED.WORK_ERRORS] + number]

@@ -232,7 +232,7 @@ class _SensitivityRun:
         } or tangent_model.controls != simulation.forces.controls.names:
             raise SettingError("the tangents are of another model; create them from this one")
         engine_states = [*coordinate_states, *simulation.state.paths]
-        self._places = [engine_states.index(name) for name in tangent_model.states]
+        self._engine_indices = [engine_states.index(name) for name in tangent_model.states]
         count = len(tangent_model.parameters)
         self._steps = tangent_model.steps(
             engine.current_controls, np.eye(count, count + len(initial))
@@ -247,7 +247,7 @@ class _SensitivityRun:
         Returns:
             States (n, x).
         """
-        return self._pack_rows(trajectory)[:, self._places]
+        return self._pack_rows(trajectory)[:, self._engine_indices]
 
     def _pack_rows(self, trajectory: Trajectory) -> Array:
         """Return the states of a motion in the order of the simulation (n, x)."""
@@ -281,9 +281,9 @@ class _SensitivityRun:
             self._check_same_rates(times[step], states[step])
         count = len(self._tangent_model.parameters)
         initial = self._initial
-        slopes = np.zeros((len(self._places), count + len(initial)))
+        slopes = np.zeros((len(self._engine_indices), count + len(initial)))
         slopes[initial, range(count, count + len(initial))] = 1.0
-        rows = np.array(states)[:, self._places]
+        rows = np.array(states)[:, self._engine_indices]
         if self._simulation.constraints:
             self._project_start(rows[0], slopes)
         return integrate_sensitivities(
@@ -338,8 +338,8 @@ class _SensitivityRun:
         Raises:
             SettingError: the rates differ.
         """
-        expected_rates = np.array(self._engine.compute_derivative(t, y))[self._places]
-        state = np.asarray(y)[self._places]
+        expected_rates = np.array(self._engine.compute_derivative(t, y))[self._engine_indices]
+        state = np.asarray(y)[self._engine_indices]
         tangent_rates, _ = self._tangent_model.along(
             t, state, self._engine.read_controls(), np.zeros((len(state), 0))
         )

@@ -65,7 +65,7 @@ OPERATOR_HELPERS: dict[type, str] = {
 
 def _slice_vector(vector: Any, start: int) -> Any:
     """Return the part of a vector that begins at an index."""
-    return vector.rest(start) if isinstance(vector, RecordedVector) else vector[start:]
+    return vector.get_tail(start) if isinstance(vector, RecordedVector) else vector[start:]
 
 
 def _call_law(address: int, *arguments: Any) -> int:
@@ -154,7 +154,7 @@ class _KernelScope(dict[str, Any]):
         super().__init__(HELPERS, __builtins__=builtins)
         for name in function.__code__.co_names:
             value = function.__globals__.get(name, getattr(builtins, name, None))
-            if _is_own_function(value):
+            if _is_package_function(value):
                 self[name] = _LazyFunction(value)
             elif (isinstance(value, type) and value not in COUNTERPARTS) or not callable(value):
                 self[name] = value
@@ -172,7 +172,7 @@ class _LazyFunction:
         return make_symbolic(self.function)(*arguments)
 
 
-def _is_own_function(value: Any) -> bool:
+def _is_package_function(value: Any) -> bool:
     """Return whether a value is a function of this package."""
     return isinstance(value, FunctionType) and value.__module__.startswith("osimlite.")
 

@@ -264,7 +264,7 @@ class SymbolicEvaluator:
             UnsupportedError: a force has no formula.
         """
 
-        def run_once() -> SymbolicWorkspace:
+        def run_branch() -> SymbolicWorkspace:
             """Return the workspace in which the function has run on new vectors."""
             # New vectors for each attempt: a rerun must not see values of the one before.
             model = RecordedVector(self.structure if structure is None else structure)
@@ -285,7 +285,7 @@ class SymbolicEvaluator:
 
         try:
             with postpone_interrupts():
-                return branches.run_until_mergeable(run_once)
+                return branches.run_until_mergeable(run_branch)
         except branches.NoFormula as error:
             path = next(
                 (

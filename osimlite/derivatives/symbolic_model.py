@@ -46,17 +46,17 @@ class SymbolicModel(DifferentiableModel):
         parameters: Sequence[str],
         folder: Path,
         *,
-        apart: bool = False,
-        loads_given: bool = False,
+        keep_fixed_bodies: bool = False,
+        loads_as_inputs: bool = False,
     ) -> None:
         # Imported first, as its error names the missing package.
         from osimlite.derivatives.symbolic_evaluator import list_load_functions
         from osimlite.derivatives.symbols import casadi as library
 
         self._library = library
-        super().__init__(model, parameters, folder, apart=apart)
+        super().__init__(model, parameters, folder, keep_fixed_bodies=keep_fixed_bodies)
         self.loads = (
-            list_load_functions(self.forces.elements) if loads_given and not parameters else []
+            list_load_functions(self.forces.elements) if loads_as_inputs and not parameters else []
         )
         self._symbols = {
             "t": library.SX.sym("t", 1 + len(self.loads)),
@@ -111,7 +111,7 @@ class SymbolicModel(DifferentiableModel):
         """
         mechanism = build_mechanism(changed_model)
         searched = self._find_wrapped_paths(changed_model, mechanism)
-        packed = pack(mechanism, searched.forces, apart=self._apart)
+        packed = pack(mechanism, searched.forces, keep_fixed_bodies=self._keep_fixed_bodies)
         if not np.array_equal(packed.structure, self._packed.structure):
             return np.zeros(0)
         # Paths around surfaces must not depend on a parameter, because their lengths are not linear in

@@ -172,7 +172,7 @@ class RecordedVector:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def rest(self, start: int) -> RecordedVector:
+    def get_tail(self, start: int) -> RecordedVector:
         """Return the vector from an index on."""
         return RecordedVector(self.cells, self.first + start)
 

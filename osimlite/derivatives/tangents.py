@@ -386,7 +386,11 @@ class TangentModel(DifferentiableModel):
         Returns:
             Steps with derivatives along these directions and those of the start.
         """
-        packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
+        packed = pack(
+            self.mechanism,
+            replace(self.forces, controls=controls),
+            keep_fixed_bodies=self._keep_fixed_bodies,
+        )
         result = TangentSteps(packed, self.forces, self.state_indices)
         numbers = packed.numbers.copy()
         changes = np.zeros((len(numbers), dp.shape[1]))

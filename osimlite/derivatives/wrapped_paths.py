@@ -71,7 +71,7 @@ class SymbolicPath:
         count = len(freedoms)
 
         def write_length(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
-            record = w.rest(s[item + ITEM.RECORD])
+            record = w.get_tail(s[item + ITEM.RECORD])
             record[PATH_WORK.LENGTH] = self.symbols[0]
             for k in range(count):
                 # The moment arm is minus the derivative of the length.
@@ -81,7 +81,7 @@ class SymbolicPath:
         def write_speed(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
             rates = zip(self.symbols[1 + count :], freedoms, strict=True)
             first_speed = s[MODEL.DOFS]
-            w.rest(s[item + ITEM.RECORD])[0] = sum(
+            w.get_tail(s[item + ITEM.RECORD])[0] = sum(
                 (
                     derivative * y[first_speed + freedom]
                     for derivative, freedom in rates

@@ -52,7 +52,7 @@ SCAPULA_WORDS = ("abduction", "elevation", "upward")
 MODEL_NAMES = ("optimized_scale_and_markers",)
 """Names of models that AddBiomechanics writes."""
 
-TURNED_SUFFIX = "_nimble"
+ROTATED_FRAME_SUFFIX = "_nimble"
 """Ending of the names of frames that turn an EllipsoidJoint of Nimble into one of OpenSim."""
 
 
@@ -122,10 +122,10 @@ def classify_custom_joint(joint: CustomJoint) -> NimbleJoint:
     return NimbleJoint.CUSTOM
 
 
-def is_turned(joint: EllipsoidJoint) -> bool:
+def has_rotated_frames(joint: EllipsoidJoint) -> bool:
     """Return whether the frames of an EllipsoidJoint of Nimble were turned for OpenSim."""
     frame = joint.socket_child_frame
-    return str(getattr(frame, "name", frame)).endswith(TURNED_SUFFIX)
+    return str(getattr(frame, "name", frame)).endswith(ROTATED_FRAME_SUFFIX)
 
 
 def is_nimble_ellipsoid(joint: EllipsoidJoint, model_name: str) -> bool:
@@ -136,7 +136,7 @@ def is_nimble_ellipsoid(joint: EllipsoidJoint, model_name: str) -> bool:
         model_name: name of the model.
     """
     # A file that was rewritten must not be rewritten again.
-    if is_turned(joint):
+    if has_rotated_frames(joint):
         return False
     names = [coordinate.name.lower() for coordinate in joint.coordinates]
     is_scapula = len(names) == len(SCAPULA_WORDS) and all(

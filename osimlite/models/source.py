@@ -61,7 +61,7 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     return model
 
 
-def write_beside(source: str, model: Model, file: Path) -> list[Path]:
+def write_companion_files(source: str, model: Model, file: Path) -> list[Path]:
     """Write further files of a built-in model, such as a study, beside its file.
 
     Args:

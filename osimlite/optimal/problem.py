@@ -306,7 +306,7 @@ class Problem(StudyContext):
             try:
                 # Loads that depend on time only come as numbers (`functions.loads`): their splines
                 # are costly as formulas.
-                functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
+                functions = CasadiModel(self.model, parameters, self.folder, loads_as_inputs=True)
             except SettingError as error:
                 # The error of the model names a path; the parameter with this path is what the user
                 # wrote.

@@ -47,7 +47,7 @@ class StateEvaluator:
         forces: forces on it besides gravity.
         chain: joints whose mass matrix another program computes; None if the kernels compute it.
         code: backend that runs the kernels; None for the fastest that is installed.
-        apart: whether a body that never moves in its parent is a link of its own.
+        keep_fixed_bodies: whether a body that never moves in its parent is a link of its own.
 
     Attributes:
         structure: integers that describe topology; equal for models that differ in numbers only.
@@ -76,9 +76,9 @@ class StateEvaluator:
         chain: Chain | None = None,
         code: Code | None = None,
         *,
-        apart: bool = False,
+        keep_fixed_bodies: bool = False,
     ) -> None:
-        packed = pack(mechanism, forces, chain, apart=apart)
+        packed = pack(mechanism, forces, chain, keep_fixed_bodies=keep_fixed_bodies)
         self.structure = packed.structure
         self.placements = packed.placements
         self.order = packed.order

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from osimlite.base.quantity import Quantity, describe_unit_doubt, parse_quantity
+from osimlite.base.quantity import Quantity, describe_unit_mistake, parse_quantity
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -68,7 +68,7 @@ def describe_suspect_value(info: CoordinateInfo, name: str, value: float | str) 
     """
     if info.motion_type == "translational":
         return ""
-    return describe_unit_doubt(
+    return describe_unit_mistake(
         name,
         parse_quantity(value) if isinstance(value, str) else Quantity(float(value), None),
         info.range,

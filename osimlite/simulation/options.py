@@ -80,7 +80,7 @@ class IntegrationOptions:
     accuracy: float = define_option(
         DEFAULT_ACCURACY,
         "Integrator accuracy, as in OpenSim.",
-        shown="0.001",
+        default_text="0.001",
         more="The default is 0.001.",
         type=float | None,
     )
@@ -88,7 +88,7 @@ class IntegrationOptions:
         MERSON,
         "'merson' (OpenSim's), 'euler2' (SCONE's), 'adams' for smooth motions (few muscles), 'bdf' for stiff motions "
         "(many muscles), or 'rosenbrock' for stiff motions at loose accuracy.",
-        shown="merson",
+        default_text="merson",
         type=str | None,
     )
     step_bounds: tuple[float, float] = define_option(

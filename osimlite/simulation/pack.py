@@ -50,7 +50,11 @@ class PackedModel:
 
 
 def pack(
-    mechanism: Mechanism, forces: Forces, chain: Chain | None = None, *, apart: bool = False
+    mechanism: Mechanism,
+    forces: Forces,
+    chain: Chain | None = None,
+    *,
+    keep_fixed_bodies: bool = False,
 ) -> PackedModel:
     """Pack a mechanism and its forces into vectors.
 
@@ -58,7 +62,7 @@ def pack(
         mechanism: the mechanism.
         forces: forces on it besides gravity.
         chain: joints whose mass matrix another program computes; None if the kernels compute it.
-        apart: whether a body that never moves in its parent is a link of its own.
+        keep_fixed_bodies: whether a body that never moves in its parent is a link of its own.
 
     Returns:
         The packed model.
@@ -66,7 +70,7 @@ def pack(
     Raises:
         UnsupportedError: the kernels do not support a joint, function, constraint or force.
     """
-    tree = tree_of(mechanism, find_free_coordinates(mechanism), apart=apart)
+    tree = tree_of(mechanism, find_free_coordinates(mechanism), keep_fixed_bodies=keep_fixed_bodies)
     return Packer(
         tree, forces, StateLayout(mechanism, tree.order, forces.elements), chain
     ).pack_model()

@@ -93,7 +93,7 @@ class Trajectory(Tabular):
         )
 
     @property
-    def _listed(self) -> Mapping[str, Array]:
+    def _text_columns(self) -> Mapping[str, Array]:
         """Coordinates: forces would have to be computed first."""
         return dict(zip(self.coordinates, self.values.T, strict=True))
 

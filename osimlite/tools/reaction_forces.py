@@ -224,7 +224,7 @@ class JointWrenches:
         self.carried = {
             body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)
         }
-        system = System(self.mechanism, motion.simulation.forces, apart=True)
+        system = System(self.mechanism, motion.simulation.forces, keep_fixed_bodies=True)
         if controls is not None:
             system.set_controls(controls)
         balanced = motion.select_times(motion.balanced) if motion.unbalanced else motion
@@ -242,7 +242,7 @@ class JointWrenches:
     def _add_unbalanced_times(self, motion: Motion) -> Array:
         """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
         # Without forces the wrenches are unknown, but the kinematics of the links is not.
-        unloaded = System(self.mechanism.without_constraints(), Forces(()), apart=True)
+        unloaded = System(self.mechanism.without_constraints(), Forces(()), keep_fixed_bodies=True)
         moments = np.column_stack(
             [motion.times, unloaded.state.pack_rows(motion.values, motion.speeds)]
         )

@@ -109,7 +109,7 @@ URDF_CHOICES = (
         "limits",
         str | None,
         "'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
-        shown="none",
+        default_text="none",
         group="URDF",
     ),
     OptionSpec(
@@ -130,40 +130,42 @@ URDF_CHOICES = (
         "effort",
         float | None,
         "Effort limit (N, N m) of joints whose actuators set no limit.",
-        shown="no limit",
+        default_text="no limit",
         group="URDF",
     ),
     OptionSpec(
         "velocity",
         float | None,
         "Greatest rate (m/s, rad/s) of all joints.",
-        shown="no limit",
+        default_text="no limit",
         group="URDF",
     ),
 )
 """Options of the format URDF."""
 
 MJCF_CHOICES = (
-    OptionSpec("mujoco", int | None, "The version to write for, 3 or 4.", shown="4", group="MJCF"),
+    OptionSpec(
+        "mujoco", int | None, "The version to write for, 3 or 4.", default_text="4", group="MJCF"
+    ),
     OptionSpec(
         "contact",
         str | None,
         "'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
-        shown="native",
+        default_text="native",
         group="MJCF",
     ),
     OptionSpec(
         "fit",
         str | None,
         "'wraps' fits wrap surfaces to OpenSim's paths, 'force' muscles too (up to a minute).",
-        shown="none",
+        default_text="none",
         group="MJCF",
     ),
     OptionSpec(
         "spline",
         str | None,
         "How to fit a spline that moves a joint: 'quartic', a polynomial of degree four, or 'series', a quartic of a quartic.",
-        shown="series",
+        default_text="series",
         group="MJCF",
     ),
     OptionSpec(
@@ -180,7 +182,7 @@ BVH_SCALE = OptionSpec(
     "scale",
     float | None,
     "How many length units of the BVH file are one metre.",
-    shown="100, centimetres",
+    default_text="100, centimetres",
     group="BVH",
 )
 """Option of the format BVH, for reading and writing."""
@@ -268,7 +270,7 @@ EXPORTERS: list[Exporter] = [
                 float | None,
                 "The moment of the screenshot.",
                 unit="SECONDS",
-                shown="the first",
+                default_text="the first",
             ),
         ),
         title="picture",

@@ -98,21 +98,21 @@ MJCF_CHOICES = (
         str | None,
         "'millard' makes muscles with fitted curves, 'exact' RigidTendonMuscles with MuJoCo's "
         "curves and without activation dynamics.",
-        shown="millard",
+        default_text="millard",
         group="From MJCF",
     ),
     OptionSpec(
         "armature",
         str | None,
         "'rotors' adds a rotor and a coupler for each joint with armature, 'none' leaves it out.",
-        shown="rotors",
+        default_text="rotors",
         group="From MJCF",
     ),
     OptionSpec(
         "joint_limits",
         str | None,
         "'forces' adds a CoordinateLimitForce for each limited joint, 'range' sets ranges only.",
-        shown="forces",
+        default_text="forces",
         group="From MJCF",
     ),
     OptionSpec(
@@ -120,14 +120,14 @@ MJCF_CHOICES = (
         str | None,
         "'forces' makes contact surfaces and Hunt-Crossley forces, 'geometry' surfaces only, 'none' "
         "nothing.",
-        shown="forces",
+        default_text="forces",
         group="From MJCF",
     ),
     OptionSpec(
         "up",
         str | None,
         "'z' keeps MuJoCo's axes, 'y' turns the model so that y is up.",
-        shown="z",
+        default_text="z",
         group="From MJCF",
     ),
     OptionSpec(
@@ -135,7 +135,7 @@ MJCF_CHOICES = (
         str | None,
         "'wraps' makes paths with wrap objects, 'geodesics' paths over contact surfaces "
         "(Scholz2015GeometryPath) where these are nearer to MuJoCo's.",
-        shown="wraps",
+        default_text="wraps",
         group="From MJCF",
     ),
     OptionSpec(
@@ -143,7 +143,7 @@ MJCF_CHOICES = (
         str | None,
         "The keyframe that gives the default pose.",
         unit="NAME",
-        shown="qpos0",
+        default_text="qpos0",
         group="From MJCF",
     ),
 )
@@ -164,7 +164,7 @@ B3D_CHOICES = (
         "Processing pass to write the trials of: kinematics, dynamics, lowpass-filter or "
         "acceleration-minimizing-filter.",
         unit="TYPE",
-        shown="dynamics, or else the last one",
+        default_text="dynamics, or else the last one",
         group="AddBiomechanics",
     ),
 )

@@ -18,10 +18,10 @@ from osimlite.errors import UnsupportedError
 from osimlite.io.nimble import (
     JOINT_CLASSES,
     OMITTED_JOINTS,
-    TURNED_SUFFIX,
+    ROTATED_FRAME_SUFFIX,
     NimbleJoint,
     classify_custom_joint,
-    is_turned,
+    has_rotated_frames,
     list_coordinates,
     unwrap_function,
 )
@@ -102,7 +102,7 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
                 f"'{joint.path}': Nimble cannot read a {type(joint).__name__}, so that it is not Nimble's"
             )
         if isinstance(joint, EllipsoidJoint):
-            if is_turned(joint):
+            if has_rotated_frames(joint):
                 continue
             changes.append(_turn_ellipsoid(joint, model.tree()))
         elif isinstance(joint, CustomJoint):
@@ -126,7 +126,7 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
     bases = [tree.target(joint, socket, getattr(joint, socket)) for socket in sockets]
     for socket, base in zip(sockets, bases, strict=True):
         frame = PhysicalOffsetFrame(
-            name=f"{base.name}{TURNED_SUFFIX}",
+            name=f"{base.name}{ROTATED_FRAME_SUFFIX}",
             socket_parent=base,
             # A quarter turn about Z.
             orientation=(0.0, 0.0, math.pi / 2),

@@ -103,7 +103,7 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
         assert taken[choice.name].default == choice.default
         # A command leaves out what its user has not set if the help shows the library's default.
         assert choice.default == default or (
-            choice.default is None and choice.shown == f"{default}"
+            choice.default is None and choice.default_text == f"{default}"
         )
         assert f"{choice.name}: {choice.help.split()[0]}" in (Options.__doc__ or "")
     for name in ("sweep", "optimize", "gait", "muscles"):

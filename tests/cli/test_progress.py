@@ -40,7 +40,7 @@ def clock(monkeypatch):
     line = _progress._Line()
     monkeypatch.setattr(_progress, "_line", line)
     monkeypatch.setattr(_progress, "_stack", _progress.ExitStack())
-    monkeypatch.setattr(line, "start", lambda: _console.set_output_hook(line.make_room))
+    monkeypatch.setattr(line, "start", lambda: _console.set_output_hook(line.make_way))
     yield clock
     _console.set_output_hook(None)
 

@@ -22,7 +22,7 @@ class OutsideError(OsimliteError):
 class MeshFolders:
     """Folders in which the mesh files of a model are searched."""
 
-    beside: Path | None = None  # folder of the model file; None for a model without one
+    model_folder: Path | None = None  # folder of the model file; None for a model without one
     # Folders that the user names; those in the environment variable follow them.
     named: Sequence[str | Path] = ()
 
@@ -33,11 +33,13 @@ class MeshFolders:
         Returns:
             The folders in the order of the search.
         """
-        model_folders = () if self.beside is None else (self.beside, self.beside / "Geometry")
-        return (*model_folders, *self._trusted_elsewhere)
+        model_folders = (
+            () if self.model_folder is None else (self.model_folder, self.model_folder / "Geometry")
+        )
+        return (*model_folders, *self._user_folders)
 
     @property
-    def _trusted_elsewhere(self) -> tuple[Path, ...]:
+    def _user_folders(self) -> tuple[Path, ...]:
         return (*map(Path, self.named), *list_mesh_folders())
 
     def find(self, name: str) -> Path | None:
@@ -52,23 +54,23 @@ class MeshFolders:
         Raises:
             OutsideError: the file exists, but elsewhere.
         """
-        elsewhere = None
+        untrusted_path = None
         for path in _list_candidates(name, self.searched):
             if self._is_trusted(path):
                 return path
-            elsewhere = elsewhere or path
-        if elsewhere is not None:
+            untrusted_path = untrusted_path or path
+        if untrusted_path is not None:
             raise OutsideError(
-                f"the file '{name}' is in '{elsewhere.resolve().parent}', outside the model's folder; if you trust the "
+                f"the file '{name}' is in '{untrusted_path.resolve().parent}', outside the model's folder; if you trust the "
                 f"model, name that folder {MESH_FOLDER_HINT}"
             )
         return None
 
     def _is_trusted(self, path: Path) -> bool:
         roots = (
-            self._trusted_elsewhere
-            if self.beside is None
-            else (self.beside, *self._trusted_elsewhere)
+            self._user_folders
+            if self.model_folder is None
+            else (self.model_folder, *self._user_folders)
         )
         return any(path.resolve().is_relative_to(root.resolve()) for root in roots)
 

@@ -20,12 +20,12 @@ def read_obj(content: bytes, name: str) -> Surface:
     Raises:
         OsimliteError: a point or a face is damaged, or there is no face; with the line.
     """
-    polygons, normals, chosen = _parse_lines(content, name)
+    polygons, normals, corner_normals = _parse_lines(content, name)
     if normals is None:
         return Surface(polygons.points, triangulate(*polygons))
     # A surface has one normal at each point, so a point is repeated for each of its normals.
     pairs, corners = np.unique(
-        np.column_stack((polygons.corners, chosen)), axis=0, return_inverse=True
+        np.column_stack((polygons.corners, corner_normals)), axis=0, return_inverse=True
     )
     points = polygons.points[pairs[:, 0]]
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -53,7 +53,7 @@ def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Ind
     points: list[tuple[float, float, float]] = []
     normals: list[list[str]] = []
     corners: list[int] = []
-    chosen: list[int] = []
+    corner_normals: list[int] = []
     ends: list[int] = []
     lines = content.decode("utf-8", errors="replace").replace("\\\n", " ").splitlines()
     for number, line in enumerate(lines, start=1):
@@ -69,7 +69,7 @@ def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Ind
                     point, _, normal = (*word.split("/"), "", "")[:3]
                     corners.append(_get_index(point, len(points)))
                     with suppress(ValueError):
-                        chosen.append(_get_index(normal, len(normals)))
+                        corner_normals.append(_get_index(normal, len(normals)))
                 ends.append(len(corners))
         except ValueError:
             raise OsimliteError(
@@ -83,9 +83,9 @@ def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Ind
     if not np.isfinite(result).all():
         raise OsimliteError("a point is not three finite numbers; save it again", file=name)
     polygons = Polygons(result, np.array(corners, dtype=np.int64), np.array(ends, dtype=np.int64))
-    if len(chosen) < len(corners) or max(chosen) >= len(normals):
+    if len(corner_normals) < len(corners) or max(corner_normals) >= len(normals):
         return polygons, None, polygons.corners
-    return polygons, _make_vectors(normals), np.array(chosen, dtype=np.int64)
+    return polygons, _make_vectors(normals), np.array(corner_normals, dtype=np.int64)
 
 
 def _get_index(word: str, count: int) -> int:

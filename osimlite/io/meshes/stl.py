@@ -77,11 +77,11 @@ def _read_text_corners(content: bytes, name: str) -> Array:
     if content.lstrip()[:5].lower() != b"solid":
         raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
     numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)
-    corners_said = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
+    corner_count = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
     if (
         not len(numbers)
         or len(numbers) % 3
-        or len(numbers) != corners_said
+        or len(numbers) != corner_count
         or b"endsolid" not in content.lower()
     ):
         raise OsimliteError("its triangles are damaged or cut off; save it again", file=name)

@@ -48,13 +48,13 @@ class Surface:
             factors: factors along X, Y and Z.
         """
         a, b, c = factors
-        turned = a * b * c < 0.0
-        triangles = self.triangles[:, ::-1] if turned else self.triangles
+        is_mirrored = a * b * c < 0.0
+        triangles = self.triangles[:, ::-1] if is_mirrored else self.triangles
         normals = self.normals
         if normals is not None:
             # Normals scale by 1/a, 1/b, 1/c. The products differ from these by the factor abc, and
             # also work if a factor is 0.
-            normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if turned else 1.0)
+            normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if is_mirrored else 1.0)
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
         return Surface(self.points * np.array(factors), triangles, normals, self.is_closed)

@@ -179,12 +179,12 @@ def find_named_file(folder: Path, name: str) -> Path:
         folder: folder of the document.
         name: name of the file in the document.
     """
-    beside_document = folder / name
+    in_document_folder = folder / name
     in_current_folder = Path(name)
     # The folder of the document wins; if the file is in neither place, messages name that folder.
     return (
-        beside_document
-        if beside_document.is_file() or not in_current_folder.is_file()
+        in_document_folder
+        if in_document_folder.is_file() or not in_current_folder.is_file()
         else in_current_folder
     )
 

@@ -38,12 +38,12 @@ class Tabular(ABC):
         return {}
 
     @property
-    def _listed(self) -> Mapping[str, Any]:
+    def _text_columns(self) -> Mapping[str, Any]:
         """Columns that the text lists."""
         return self.table[1]
 
     def __repr__(self) -> str:
-        columns = self._listed
+        columns = self._text_columns
         units = self.units
         rows = [
             (name if len(name) <= MAX_NAME_LENGTH else f"...{name[3 - MAX_NAME_LENGTH :]}", *cells)
@@ -72,7 +72,7 @@ class Tabular(ABC):
         # Only notebooks need it.
         from html import escape
 
-        columns = self._listed
+        columns = self._text_columns
         header = "".join(f"<th>{word}</th>" for word in ("", "smallest", "largest", "unit"))
         rows = "".join(
             "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"

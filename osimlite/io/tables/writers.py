@@ -104,8 +104,8 @@ def format_control_set(table: StoTable) -> Iterator[str]:
 
     yield _START
     for name, values in zip(table.columns, table.rows.T, strict=True):
-        is_known = ~np.isnan(values)
-        nodes = np.column_stack([table.times[is_known], values[is_known]])
+        is_finite = ~np.isnan(values)
+        nodes = np.column_stack([table.times[is_finite], values[is_finite]])
         yield _BEFORE.format(name=quoteattr(name))
         yield _NODE * len(nodes) % tuple(nodes.ravel().tolist())
         yield _AFTER

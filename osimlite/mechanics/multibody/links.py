@@ -159,14 +159,16 @@ class LinkTree(NamedTuple):
     places: Places  # degrees of freedom and links by coordinates and bodies
 
 
-def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> LinkTree:
+def tree_of(
+    mechanism: Mechanism, free: Collection[int], *, keep_fixed_bodies: bool = False
+) -> LinkTree:
     """Return the links of a mechanism.
 
     Args:
         mechanism: mechanism.
         free: indices of the coordinates that are degrees of freedom; the others keep their
             defaults.
-        apart: whether bodies that never move relative to each other are separate links.
+        keep_fixed_bodies: whether bodies that never move relative to each other are separate links.
 
     Raises:
         UnsupportedError: the kernels do not know the motion of a joint.
@@ -178,7 +180,7 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
         operations, remaining_frame = _list_operations(mechanism, body.mobilizer, frame, free)
         # A body without motions of its own is merged into the link that carries it.
-        if operations or apart:
+        if operations or keep_fixed_bodies:
             links.append(Link(parent, operations))
             parent = len(links) - 1
         placements.append(Placement(parent, remaining_frame))
