@@ -22,6 +22,7 @@ def unpack_file(source: Path, target: Path) -> Path:
     Returns:
         `target`.
     """
+    # The corpus has compressed files, users give plain ones.
     content = source.read_bytes()
     if source.suffix == ".gz":
         content = gzip.decompress(content)

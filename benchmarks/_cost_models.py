@@ -1,8 +1,8 @@
 """Models of three sizes for cost.py: a walker, legs with muscles, and a human with 80 muscles.
 
 The walker is a file of the repository, the legs are the built-in jumper. The human is built here.
-It is as large as the largest models in everyday use: 39 coordinates, splines in the knees, a coupled
-patella at each knee, and wrap surfaces. Its sizes are plausible.
+It is as large as the largest models in everyday use: 39 coordinates, splines in the knees, a
+coupled patella at each knee, and wrap surfaces. Its sizes are plausible.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ MOTOR_JOINTS = ("back", "shoulder", "elbow", "wrist")
 def write_models(folder: Path) -> None:
     """Write walker.osim, legs.osim and human.osim to a folder."""
     shutil.copy(WALKER, folder / "walker.osim")
+    # Without its controller, the jumper needs no table of excitations.
     osimlite.write(jumper(driven=False), folder / "legs.osim")
     osimlite.write(make_human(), folder / "human.osim")
 
@@ -116,6 +117,7 @@ def set_tendon_lengths(model: Model) -> None:
     default_values = osimlite.mechanism(model).default_state()[0]
     lengths = osimlite.paths(model).lengths(default_values)
     for muscle in model.components(Millard2012EquilibriumMuscle):
+        # The length of a short path alone would give zero or less.
         muscle.tendon_slack_length = max(0.02, lengths[muscle.path] - OPTIMAL_FIBER_LENGTH_M)
 
 
@@ -217,6 +219,7 @@ def add_knee(model: Model, femur: Body, tibia: Body, side: str) -> None:
         location=(0.0, -0.41, 0.0),
         gear=-1.0,
     )
+    # As in Rajagopal's model, the patella has a coordinate, which a coupler sets.
     patella_angle = Coordinate(name=f"knee_{side}_beta", range=(0.0, 2.1))
     patella = add_body(model, f"patella_{side}", 0.1)
     add_spline_joint(
@@ -331,6 +334,7 @@ def add_muscle(model: Model, bodies: dict[str, Body], side: str, number: int) ->
     ]
     surfaces = (f"hip_{side}", f"condyles_{side}", f"shank_{side}", f"seat_{side}")
     wraps = []
+    # Every other muscle wraps, so that paths with and without surfaces are counted.
     if number % 2:
         wraps.append(PathWrap(name="wrap", wrap_object=surfaces[first]))
     path = GeometryPath(

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from typing import Any
 
 COMPREHENSIONS = frozenset(("<listcomp>", "<dictcomp>", "<setcomp>"))
-"""Names of frames that do not count: only Python 3.11 calls comprehensions, later ones inline them."""
+"""Names of frames that do not count.
+
+Python 3.11 calls comprehensions as functions, later versions inline them.
+"""
 
 IMPORT_MACHINERY = ("<frozen importlib", "<frozen zipimport")
 """Beginnings of file names that do not count.
@@ -35,7 +38,10 @@ WRITE_FLAGS = 3
 """Bits of the flags of an opened file that say it is written (``O_WRONLY | O_RDWR``)."""
 
 GENERATED_SUFFIXES = (".py", ".pyc", ".code")
-"""Files that are not data: byte code is counted by module, and machine code depends on the processor."""
+"""Suffixes of files that are not data.
+
+Byte code is counted by module, and machine code depends on the processor.
+"""
 
 
 class OpenedFiles:
@@ -68,8 +74,8 @@ class WorkCounter:
     """Counter of the work of actions, one after the other.
 
     Args:
-        package: folder of the package whose functions, modules and files are counted separately from
-            those of libraries.
+        package: folder of the package whose functions, modules and files are counted separately
+            from those of libraries.
     """
 
     def __init__(self, package: str) -> None:
@@ -176,7 +182,7 @@ def _find_library(file: str) -> str:
 
 
 def _measure_byte_code(module: str) -> int:
-    """Return the size of the byte code of a module (bytes), 0 where there is none."""
+    """Return the size of the byte code of a module (bytes), 0 if it has no file."""
     spec = sys.modules[module].__spec__
     if spec is None or spec.cached is None or spec.origin is None:
         return 0

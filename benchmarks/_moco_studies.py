@@ -1,11 +1,11 @@
 """Studies that osimlite and Moco 4.6 both solve.
 
 Each writer puts files that both programs read into a folder: either ``study.omoco``, or the setup
-``track.xml`` or ``inverse.xml`` of a tool. ``more.omoco`` has goals, bounds and solver settings that
-are added to the study that the tool makes.
+``track.xml`` or ``inverse.xml`` of a tool. ``more.omoco`` has goals, bounds and solver settings
+that are added to the study that the tool makes.
 
-`STUDIES` and `LONG` have the writers by name. A writer is called with the folder and with the sources
-of opensim-core, from which some studies take models and data.
+`STUDIES` and `LONG` have the writers by name. A writer is called with the folder and with the
+sources of opensim-core, from which some studies take models and data.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ SOLVER_TOLERANCES = {"optim_convergence_tolerance": 1e-4, "optim_constraint_tole
 """Solver settings of the tracking study."""
 
 INVERSE_SETTINGS: dict[str, Any] = {
+    # The tables have more columns than the models have coordinates.
     "kinematics_allow_extra_columns": True,
     "convergence_tolerance": 1e-4,
     "constraint_tolerance": 1e-4,
@@ -151,6 +152,7 @@ def write_parabola_study(folder: Path, _: Path) -> None:
     """
     model = osimlite.Model(name="planar_point_mass")
     parent = "/ground"
+    # The first body has no mass: it only carries the second slider.
     for name, mass, rotation in (("tx", 0.0, 0.0), ("ty", 1.0, 0.5 * math.pi)):
         body = osimlite.Body(
             name=f"body_{name}", mass=mass, mass_center=(0.0, 0.0, 0.0), inertia=(0.0,) * 6
@@ -199,6 +201,7 @@ def make_double_pendulum() -> osimlite.Model:
             inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
         )
         model.add(body)
+        # The origin of a body is the far end of its link; the joint is at the near end.
         model.add(osimlite.Marker(name=f"m{index}", socket_parent_frame=body.path))
         joint = osimlite.PinJoint(
             name=f"j{index}", socket_parent_frame=parent, socket_child_frame="end"
@@ -261,6 +264,7 @@ def track_walking(intervals: int) -> StudyWriter:
             ),
             allow_unused_references=True,
             track_reference_position_derivatives=True,
+            # The measured motion is a better guess than the middle of the bounds.
             apply_tracked_states_to_guess=True,
             initial_time=0.0,
             final_time=STEP_DURATION_S,
@@ -270,6 +274,7 @@ def track_walking(intervals: int) -> StudyWriter:
         osimlite.write(tool, folder / "track.xml")
         study = osimlite.read_document(_unpack("track.omoco", folder, "more.omoco"))
         phase = study.problem.phases
+        # The tool has the model; the study only adds to it.
         phase.model = osimlite.ModelProcessor(name="model")
         # The first two goals are those that the tool makes.
         phase.goals = phase.goals[2:4]
@@ -296,6 +301,7 @@ def write_walking_3d_study(folder: Path, core: Path) -> None:
     model = osimlite.modify(
         osimlite.read(folder / model_file),
         osimlite.ModOpReplaceJointsWithWelds(joint_paths=("mtp_r", "mtp_l")),
+        # A path is absolute where no setup file gives the folder.
         osimlite.ModOpAddExternalLoads(filepath=str(folder / "grf_walk.xml")),
     )
     weights = add_residual_actuators(model)
@@ -390,6 +396,7 @@ def predict_walking(intervals: int) -> StudyWriter:
         _unpack("track_25.sto", folder, "guess.sto")
         study = osimlite.read_document(MOCO / "predict.omoco")
         study.solver.num_mesh_intervals = intervals
+        # Both programs start from the same guess.
         study.solver.guess_file = "guess.sto"
         osimlite.write(study, folder / "study.omoco")
 

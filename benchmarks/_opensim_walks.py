@@ -64,6 +64,7 @@ def simulate_opensim_walks(
     with tempfile.TemporaryDirectory() as folder:
         processes = {
             name: subprocess.Popen(
+                # OpenSim's bindings warn when they are imported.
                 [sys.executable, "-W", "ignore", __file__, *map(str, request)],
                 # OpenSim may write a log file into the working folder.
                 cwd=folder,
@@ -75,6 +76,7 @@ def simulate_opensim_walks(
         try:
             outputs = {name: process.communicate()[0] for name, process in processes.items()}
         finally:
+            # After an error or an interrupt no process may stay behind.
             for process in processes.values():
                 process.kill()
                 process.wait()
@@ -101,6 +103,7 @@ def simulate_opensim_walk(path: Path, to: float, accuracy: float) -> tuple[Walke
     import opensim
 
     opensim.Logger.setLevelString("off")
+    # Otherwise OpenSim writes opensim.log into the working folder.
     opensim.Logger.removeFileSink()
     start = time.process_time()
     model = opensim.Model(str(path))
@@ -163,12 +166,17 @@ def _evaluate_walk(engine: Any, forces: Any, states: _StateHistory) -> WalkerSte
         np.array([is_touching[0] for is_touching in touching]),
     )
     if walk.walks:
+        # A walk without a fall ends with the integration.
         walk.end = float(times[-1])
     return walk
 
 
 def _find_contact_times(engine: Any, forces: Any) -> list[np.ndarray]:
-    """Return, for each contact of the engine, at which rows of the reports its force is not zero."""
+    """Find where the force of each contact is not zero.
+
+    Returns:
+        For each contact of the engine a boolean for each row of the reports.
+    """
     labels = forces.getColumnLabels()
     columns = [labels.get(k) for k in range(labels.getSize())]
     touching = []

@@ -39,7 +39,11 @@ class Pair:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """Time of osimlite divided by that of OpenSim, for each round; below 1 osimlite is faster."""
+        """Ratios of times, osimlite / OpenSim.
+
+        Returns:
+            One ratio for each round; below 1 osimlite is faster.
+        """
         return tuple(a / b for a, b in zip(self.ours, self.theirs, strict=True))
 
 
@@ -128,7 +132,9 @@ def run_command(command: str | Sequence[str]) -> None:
     }
     process = subprocess.run(
         arguments,
+        # A command that asks a question must not wait for an answer.
         stdin=subprocess.DEVNULL,
+        # Printing to a terminal would take time.
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         env=environment,

@@ -6,9 +6,9 @@ A kit has settings of the linter, a workflow and patches for a public project. C
 the project at the commit of the kit; at the end it is as before.
 
 The script lints the project with the settings of the kit and prints the number of findings. Then it
-applies the patches one by one. For each it prints which findings disappear, and whether OpenSim reads
-the changed files as before. A patch says in its text whether it does; the exit code is 1 if one of
-them is wrong.
+applies the patches one by one. For each it prints which findings disappear, and whether OpenSim
+reads the changed files as before. A patch says in its text whether it does; the exit code is 1 if
+one of them is wrong.
 """
 
 from __future__ import annotations
@@ -93,6 +93,7 @@ def use_settings(kit: Path) -> Iterator[None]:
     try:
         yield
     finally:
+        # The clone must be as before.
         os.remove("osimlite.toml")
 
 
@@ -162,6 +163,7 @@ def read_model(model: Any) -> dict[str, Any]:
     bodies = model.getBodySet()
     positions = [bodies.get(i).getPositionInGround(state) for i in range(bodies.getSize())]
     numbers = [position.get(axis) for position in positions for axis in range(3)]
+    # A model may print as before and still compute something else.
     return {"print": model.dump(), "numbers": numbers + state.getYDot().to_numpy().tolist()}
 
 
@@ -215,6 +217,7 @@ def count_differences(before: dict[str, Any], after: dict[str, Any]) -> tuple[in
         numbers_after,
         rtol=NUMBER_TOLERANCE,
         atol=NUMBER_TOLERANCE,
+        # A number that stays undefined is no difference.
         equal_nan=True,
     )
     return line_count, int(np.sum(~is_close))
@@ -238,8 +241,8 @@ def check_patch(
         before: result of `read_in_process` for each changed file before the patch.
 
     Returns:
-        The findings after the patch, and whether the patch says correctly if OpenSim reads the files
-        as before.
+        The findings after the patch, and whether the patch says correctly if OpenSim reads the
+        files as before.
     """
     files = list_changed_files(patch)
     after = [read_in_process(file) for file in files]
@@ -288,6 +291,7 @@ def check_kit(name: str, clone: str) -> int:
             # The later patches change the files that the earlier ones have changed.
             for patch in sorted(kit.glob("*.patch")):
                 before = [read_in_process(file) for file in list_changed_files(patch)]
+                # All parts of the patch must fit before any file changes.
                 run_git("apply", "--check", patch)
                 run_git("apply", patch)
                 applied.append(patch)
@@ -296,6 +300,7 @@ def check_kit(name: str, clone: str) -> int:
                     exit_code = 1
             print(f"left: {format_counts(count_rules(findings))}")
         finally:
+            # A later patch may change the lines of an earlier one.
             for patch in reversed(applied):
                 run_git("apply", "-R", patch)
     return exit_code

@@ -3,14 +3,14 @@
     python benchmarks/all.py [--quick] [FOLDER]
 
 FOLDER holds Rajagopal2016.osim, gait2392.osim and gait10dof18musc.osim. Models that it lacks are
-taken from the shared corpus; without that, the Dynamic Walker alone is measured. The script takes up
-to ten minutes, with --quick (three rounds of each action) two.
+taken from the shared corpus; without that, the Dynamic Walker alone is measured. The script takes
+up to ten minutes, with --quick (three rounds of each action) two.
 
-Each row is an action, and both programs run in turn. The target is a ratio, time of osimlite divided
-by time of OpenSim, and the last column says whether the median ratio reaches it. Where OpenSim has
-no counterpart, the action of osimlite is timed alone, and the target is in milliseconds. Rows that
-begin with ``osimlite`` are processes from start to exit, as a user starts them: byte code and
-machine code exist before. What is counted instead of timed is in cost.py.
+Each row is an action, and both programs run in turn. The target is a ratio, time of osimlite
+divided by time of OpenSim, and the last column says whether the median ratio reaches it. Where
+OpenSim has no counterpart, the action of osimlite is timed alone, and the target is in
+milliseconds. Rows that begin with ``osimlite`` are processes from start to exit, as a user starts
+them: byte code and machine code exist before. What is counted instead of timed is in cost.py.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Comparison(NamedTuple):
 
     @property
     def is_reached(self) -> bool:
-        """Whether the target is reached."""
+        """True if the target is reached."""
         return self.value <= self.target
 
 
@@ -111,6 +111,7 @@ def find_models(folder: Path, work_folder: Path) -> dict[str, Path]:
     """
     files = {}
     for name, number in CORPUS_NAMES.items():
+        # The user's file takes precedence over that of the corpus.
         file = folder / f"{name}.osim"
         packed = CORPUS / f"{number}.osim.gz"
         if file.exists():
@@ -144,7 +145,7 @@ def compare_motions(rounds: int) -> Iterator[Comparison]:
             ("motion of the walker, compiled", prepare_osimlite_runs(simulation, ACCURACY), 1 / 30),
         ]
         for name, ours, target in actions:
-            # One run more than rounds, for the warm-up.
+            # One run more than rounds, for the warm-up: a manager of OpenSim runs once.
             theirs = prepare_opensim_runs(opensim_model, ACCURACY, rounds + 1)
             pair = time_pair(name, ours=ours, theirs=theirs, rounds=rounds, clock=time.process_time)
             yield Comparison(pair, target)
@@ -188,6 +189,7 @@ def compare_commands(
     for name, file in files.items():
         pair = time_command_pair(
             f"osimlite validate {name}, first",
+            # With a cache the second round would find the result of the first.
             ours=build_command("validate", "--no-cache", str(file)),
             theirs=[sys.executable, "-c", INITIALIZATION_SCRIPT.format(model=str(file))],
             # OpenSim alone takes seconds for the large models.
@@ -210,6 +212,7 @@ def time_commands(rounds: int) -> Iterator[Comparison]:
     for name, words, target in (
         ("info walker", ("info", str(MODEL)), 100),
         ("validate walker, first", ("validate", "--no-cache", str(MODEL)), 90),
+        # The warm-up writes the cache that the timed rounds find.
         ("validate walker, unchanged", ("validate", str(MODEL)), 40),
     ):
         # They run in turn with a Python that does nothing, which shows how fast the machine is.
@@ -262,6 +265,7 @@ def main() -> None:
     )
     parser.add_argument("--quick", action="store_true", help="run three rounds of each action")
     options = parser.parse_args()
+    # Messages of OpenSim would take time, and hide the table.
     opensim.Logger.setLevelString("off")
     start = time.perf_counter()
     rounds = QUICK_ROUNDS if options.quick else ROUNDS

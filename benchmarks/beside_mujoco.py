@@ -1,15 +1,16 @@
-"""Compare the time of one evaluation of a model: osimlite's compiled engine and MuJoCo's mj_forward.
+"""Compare the time of one evaluation of a model by osimlite and by MuJoCo.
 
     python benchmarks/beside_mujoco.py [--rounds N] [FILE ...]
 
-MuJoCo evaluates the MJCF that osimlite writes for the model. Without FILEs, the built-in walker and
-jumper are measured, and models of the shared folder where that exists.
+osimlite uses its compiled engine. MuJoCo (``mj_forward``) evaluates the MJCF that osimlite writes
+for the model. Without FILEs, the built-in walker and jumper are measured, and models of the shared
+folder where that exists.
 
 Both programs evaluate several states in turn, 1,000 evaluations in each round. The table gives the
 processor time of an evaluation (us) and the ratio osimlite / MuJoCo of the pairs of rounds. The
 muscle parameters of the MJCF are not fitted, which does not change the time. An evaluation by
-osimlite is a call from Python that returns all rates. One by MuJoCo includes collision detection and
-the solver of its constraints.
+osimlite is a call from Python that returns all rates. One by MuJoCo includes collision detection
+and the solver of its constraints.
 """
 
 from __future__ import annotations
@@ -86,6 +87,7 @@ def prepare_mujoco(model: osimlite.Model, folder: Path) -> Callable[[int], None]
         model: model to translate.
         folder: folder for the MJCF.
     """
+    # Neither meshes nor fitted muscles change the time of an evaluation.
     path = osimlite.to_mjcf(model, visuals=False, fit="none").write(folder)[0]
     compiled = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(compiled)
@@ -117,7 +119,7 @@ def find_models(files: list[Path], folder: Path) -> dict[str, osimlite.Model]:
     """Read the models to compare.
 
     Args:
-        files: model files; if there are none, built-in and shared models are compared.
+        files: model files; built-in and shared models if the list is empty.
         folder: folder for unpacked files.
 
     Returns:
@@ -146,6 +148,7 @@ def compare_model(model: osimlite.Model, folder: Path, rounds: int) -> list[str]
     """
     ours = prepare_osimlite(model)
     theirs = prepare_mujoco(model, folder)
+    # Both programs run in turn, so that they meet the same machine.
     pairs = [(measure_round(ours), measure_round(theirs)) for _ in range(1 + rounds)]
     # The first pair is the warm-up.
     del pairs[0]

@@ -3,10 +3,10 @@
     python benchmarks/clients.py perfanalytics-pose2sim CLONE TRIAL.trc
     python benchmarks/clients.py stanfordnmbl-opencap-core CLONE TRIAL.trc --static STATIC.trc
 
-The patch of docs/adoption/CLIENT/client replaces OpenSim by osimlite. CLONE is a clone of the client
-at the commit of the kit, whose dependencies are installed; at the end it is as before. In each round
-the client scales a model and fits the trial twice, in processes of their own: with OpenSim, and with
-the patch.
+The patch of docs/adoption/CLIENT/client replaces OpenSim by osimlite. CLONE is a clone of the
+client at the commit of the kit, whose dependencies are installed; at the end it is as before. In
+each round the client scales a model and fits the trial twice, in processes of their own: with
+OpenSim, and with the patch.
 
 The script prints the processor times of both, the marker errors that both report, and how far the
 motions differ: of the complete step, and with the model that OpenSim has scaled.
@@ -95,6 +95,7 @@ def prepare_opencap(folder: Path, trial: Path, static: Path | None) -> Kinematic
     assert static is not None, "OpenCap needs --static"
     # The step uses nothing of this module, whose import logs in to a server.
     sys.modules["utils"] = types.SimpleNamespace(storage2numpy=None)  # type: ignore[assignment]
+    # OpenCap is not a package: its modules are imported from the clone.
     sys.path.insert(0, os.getcwd())
     times = import_module("utilsDataman").TRCFile(str(static)).time
     tools = import_module("utilsOpenSim")
@@ -205,6 +206,7 @@ def compare_client(client: str, trial: Path, static: Path | None, rounds: int) -
                 ours.append(run_step(client, folder / f"ours{number}", trial, static))
             finally:
                 run_git("apply", "-R", patch)
+        # Other programs disturb the fastest run least.
         opensim_time = min(theirs).seconds
         osimlite_time = min(ours).seconds
         print(

@@ -6,9 +6,9 @@ Three tables are printed, all for simulations of two seconds:
 
 1. A sweep of 1,000 walkers whose initial states differ a little: walkers per second of one core, by
    osimlite and by OpenSim. osimlite saves the final states and the contact events of all runs.
-   OpenSim simulates some of the same walkers one by one in its fastest way: the model is built once,
-   the state is copied, and nothing is recorded. Both count processor time. The last column is the
-   largest difference of any coordinate at the end (rad or m).
+   OpenSim simulates some of the same walkers one by one in its fastest way: the model is built
+   once, the state is copied, and nothing is recorded. Both count processor time. The last column is
+   the largest difference of any coordinate at the end (rad or m).
 2. The same sweep by osimlite with several threads.
 3. Wall time of a Python process that imports osimlite, reads the file, simulates, and ends.
 
@@ -54,7 +54,10 @@ MAX_CHANGE = 0.01
 MAX_EVENTS = 40
 """Contact events of a walker for which memory is reserved."""
 
-PROCESS = "import osimlite; osimlite.simulate(osimlite.read({model!r}), to={to}, engine={engine!r}).summary"
+PROCESS = """
+import osimlite
+osimlite.simulate(osimlite.read({model!r}), to={to}, engine={engine!r}).summary
+"""
 """Python program that simulates the walker once."""
 
 
@@ -88,6 +91,7 @@ def compare_sweeps(simulation: Any) -> Table:
         )
         # The first sweep prepares what later ones find ready. Its result is the same.
         final_states = run_sweep().states
+        # Other programs disturb the fastest run least.
         osimlite_time = min(measure_time(run_sweep, time.process_time) for _ in range(ROUNDS))
         opensim_times = []
         differences = []
@@ -130,6 +134,7 @@ def simulate_opensim_walker(
     initial_speeds = simulation.state.speeds(row.tolist())
     infos = simulation.mechanism.coordinates
     for index, info in enumerate(infos):
+        # OpenSim keeps the values of locked coordinates.
         if not info.locked:
             coordinate = coordinates.get(info.name)
             # False: OpenSim does not project the state onto constraints each time.
@@ -137,6 +142,7 @@ def simulate_opensim_walker(
             coordinate.setSpeedValue(initial_state, initial_speeds[index])
     manager = opensim.Manager(model)
     manager.setIntegratorAccuracy(accuracy)
+    # Nothing is recorded: this is the fastest way of OpenSim.
     manager.setPerformAnalyses(False)
     manager.setWriteToStorage(False)
     manager.initialize(initial_state)

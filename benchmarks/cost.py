@@ -9,12 +9,12 @@ listed with the functions and modules that cause it.
 
 A command is counted in a process of its own, from before the first import. A call of the library is
 counted at its second run, in one process with the other calls. Byte code and machine code exist
-before. Caches of earlier runs exist only where the action says so. Nothing is a terminal, and hashes
-of texts are the same in every run.
+before. Caches of earlier runs exist only where the action says so. Nothing is a terminal, and
+hashes of texts are the same in every run.
 
 Calls and modules of osimlite are counted separately from those of libraries and of Python. The
-latter, and the size of byte code, are compared only if Python and the libraries have the versions of
-cost.json.
+latter, and the size of byte code, are compared only if Python and the libraries have the versions
+of cost.json.
 """
 
 from __future__ import annotations
@@ -158,12 +158,12 @@ def make_library_calls() -> Iterator[tuple[str, Callable[[], object]]]:
     simulation.close()
 
 
-# ------------------------------------------------------------------------------------------------------- counting
+# -------------------------------------------------------------------------------- counting
 def measure_costs(words: Iterable[str] = ()) -> dict[str, Cost]:
     """Count the cost of actions.
 
     Args:
-        words: count only actions whose names contain one of these; all actions if there are none.
+        words: count only actions whose names contain one of these; all actions by default.
 
     Returns:
         The cost of each action, by its name.
@@ -277,7 +277,7 @@ def _run_process(command: list[str], folder: Path, package: str) -> None:
         raise RuntimeError(f"{command} ended with exit code {process.returncode}: {message}")
 
 
-# ------------------------------------------------------------------------------------------------------- comparing
+# -------------------------------------------------------------------------------- comparing
 def get_versions() -> dict[str, str]:
     """Return the versions of Python and of `LIBRARIES`.
 
@@ -357,7 +357,7 @@ def _describe_modules(old: Mapping[str, int], new: Mapping[str, int]) -> Iterato
             yield f"    {verb} {', '.join(sorted(names)[:MAX_LISTED])}{rest}"
 
 
-# ------------------------------------------------------------------------------------------------------- the file
+# -------------------------------------------------------------------------------- the file
 def _sum_small_parts(
     parts: Mapping[str, int], named: Container[str]
 ) -> tuple[dict[str, int], dict[str, str]]:
@@ -394,7 +394,7 @@ def _get_rest_name(name: str) -> str:
 
 
 def _find_large_parts(parts: Mapping[str, int]) -> set[str]:
-    """Return names of functions, and of the rests of files, that have more than 1 % of the total."""
+    """Return the names of functions, and of rests of files, with more than 1 % of the total."""
     limit = MIN_SHARE * sum(parts.values())
     large = {name for name, count in parts.items() if count > limit}
     rests: Counter[str] = Counter()
@@ -466,7 +466,7 @@ def _format_members(table: Mapping[str, object], depth: int = 2) -> str:
     )
 
 
-# ------------------------------------------------------------------------------------------------------- command
+# -------------------------------------------------------------------------------- command
 def print_costs(costs: Mapping[str, Cost], old: Mapping[str, Cost]) -> None:
     """Print the table of costs, with the relative change from the accepted cost behind each."""
     print(f"{'':30}" + "".join(f"{kind:>20}" for kind in KINDS))

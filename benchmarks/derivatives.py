@@ -6,9 +6,10 @@ A row is printed for each model, with these columns:
 
 - kind of the expressions (SX or MX) and number of states;
 - instructions in the function of the state derivative, and time to make it (s);
-- largest errors of the state derivative, of its Jacobian, and of the Hessian of a random combination,
-  at random states and controls. They are compared with the kernels, which compute derivatives with
-  dual numbers (`tests/derivatives/jets.py`), relative to the size of the terms of each number;
+- largest errors of the state derivative, of its Jacobian, and of the Hessian of a random
+  combination, at random states and controls. They are compared with the kernels, which compute
+  derivatives with dual numbers (`tests/derivatives/jets.py`), relative to the size of the terms of
+  each number;
 - processor time (us) of the state derivative by machine code, and of the CasADi functions of value,
   Jacobian and Hessian.
 
@@ -88,6 +89,7 @@ def measure_model(path: Path) -> dict[str, Any]:
         Kind, number of states, instructions, seconds to make the functions, errors by `ERROR_KEYS`,
         and under "times" the processor times by `TIME_KEYS` (us). The Hessian may be missing.
     """
+    # A module of the tests computes the derivatives of the kernels.
     sys.path.insert(0, str(ROOT))
     import casadi
     import numpy as np
@@ -111,6 +113,7 @@ def measure_model(path: Path) -> dict[str, Any]:
         consistent = comparison.kept(x) if functions.constraint_count else x
         errors = comparison.errors(consistent, seed)
         row |= {key: max(error, row.get(key, 0.0)) for key, error in errors.items()}
+    # All functions are timed at the last of the random states.
     t = comparison.t
     u = functions.u
     symbol = casadi.MX.sym("x", len(x))
@@ -121,6 +124,7 @@ def measure_model(path: Path) -> dict[str, Any]:
         "casadi value": lambda: dynamics(t, x, u, functions.p),
         "casadi jacobian": lambda: jacobian(x),
     }
+    # Functions that are not expressions have no Hessian.
     if row["kind"] == "SX" and len(x) <= MAX_HESSIAN_STATES:
         weights = casadi.DM(np.random.default_rng(9).normal(size=len(x)))
         second = casadi.hessian(casadi.dot(weights, xdot), symbol)[0]
@@ -135,6 +139,7 @@ def measure_call(function: Callable[[], object]) -> float:
     function()
     start = time.process_time()
     count = 0
+    # Many calls, because one is shorter than the resolution of the clock.
     while time.process_time() - start < MEASURE_TIME_S:
         function()
         count += 1
@@ -145,7 +150,7 @@ def measure_in_process(path: Path) -> tuple[dict[str, Any] | None, str]:
     """Measure one model in a process of its own, which may fail or take too long.
 
     Returns:
-        The result of `measure_model`, or None and the reason why there is none.
+        The result of `measure_model`, or None and the reason of the failure.
     """
     command = [sys.executable, __file__, "--one", str(path)]
     try:
@@ -155,6 +160,7 @@ def measure_in_process(path: Path) -> tuple[dict[str, Any] | None, str]:
     except subprocess.TimeoutExpired:
         return None, f"not within {TIME_LIMIT_S} s"
     if process.returncode == 0 and process.stdout:
+        # Libraries may print something before.
         return json.loads(process.stdout.splitlines()[-1]), ""
     last_line = (process.stderr.strip().splitlines() or ["?"])[-1]
     return None, last_line.rpartition("Error: ")[2][:100]
@@ -176,6 +182,7 @@ def format_row(row: dict[str, Any]) -> str:
 def measure_opensim(path: Path) -> str:
     """Return the times of OpenSim in words, nothing if OpenSim fails."""
     process = subprocess.run(
+        # CasADi and OpenSim cannot be loaded in one process.
         [sys.executable, "-c", OPENSIM_SCRIPT, str(path)],
         capture_output=True,
         text=True,

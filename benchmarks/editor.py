@@ -48,6 +48,7 @@ def make_long_model(kilobytes: int) -> str:
     model.add(osimlite.PathSpring(name="spring0", stiffness=10.0, resting_length=0.2))
     number = 0
     while True:
+        # How long the text is, is known only when it has been written.
         text = osimlite.to_text(model)
         missing = kilobytes * 1000 - len(text)
         if missing <= 0:
@@ -99,6 +100,7 @@ async def measure_keystrokes(text: str, keystrokes: int) -> list[float]:
 
     @client.feature(types.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)
     def receive_findings(parameters: types.PublishDiagnosticsParams) -> None:
+        # The time is that of the arrival; the queue may be read later.
         arrivals.put_nowait((time.perf_counter(), list(parameters.diagnostics)))
 
     await start_server(client)
@@ -107,6 +109,7 @@ async def measure_keystrokes(text: str, keystrokes: int) -> list[float]:
         item = types.TextDocumentItem(uri, "osim", 0, text)
         client.text_document_did_open(types.DidOpenTextDocumentParams(item))
         await arrivals.get()
+        # The findings after opening do not count.
         offset = text.index(CONTACT_NAMES) + TYPED_COLUMN
         line = text.count("\n", 0, offset)
         column = offset - text.rfind("\n", 0, offset) - 1
@@ -129,6 +132,7 @@ async def measure_keystrokes(text: str, keystrokes: int) -> list[float]:
                 finding.range for finding in findings if finding.code == UNKNOWN_NAME_RULE
             ]
             assert underlined == ([misspelt_range] if is_insertion else []), underlined
+            # A fast answer with wrong findings would not count.
             times.append(end - start)
     await client.shutdown_async(None)
     client.exit(None)

@@ -93,6 +93,7 @@ def write_rra_setup(folder: Path) -> None:
         folder: folder with the model, the motion and the external loads.
     """
     text = (folder / "subject01_simbody.osim").read_text(encoding="utf-8")
+    # Each name once, in the order of the file.
     names = list(dict.fromkeys(re.findall(r'<Coordinate name="([^"]+)"', text)))
     actuators = "".join(_format_actuator(name) for name in names)
     tasks = "".join(
@@ -150,6 +151,7 @@ def prepare_files(folder: Path) -> None:
 COMMANDS: dict[str, tuple[str, str]] = {
     "validate Rajagopal2016": (".", "validate --no-cache Rajagopal2016.osim"),
     "validate it unchanged": (".", "validate Rajagopal2016.osim"),
+    # With --overwrite a later run may replace the results of the first.
     "run Scale": ("scale_gait2354", "run scale.xml --overwrite"),
     "run IK": ("ik_id_gait2354", "run subject01_Setup_IK.xml --overwrite"),
     "run ID": ("ik_id_gait2354", "run subject01_Setup_InverseDynamics.xml --overwrite"),
@@ -175,6 +177,7 @@ def measure_process(
     Raises:
         RuntimeError: the process failed; the message ends with its standard error.
     """
+    # The usage of all children grows by that of the process that has just ended.
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     start = time.perf_counter()
     process = subprocess.run(
@@ -208,6 +211,7 @@ def make_environment(home: Path, python: Path, without_compiler: bool) -> dict[s
     Returns:
         Variables by name; no others are inherited, because they may change what commands do.
     """
+    # Programs of the environment are found first, as after its activation.
     path = str(python.parent)
     if not without_compiler:
         path = os.pathsep.join((path, os.environ.get("PATH", "")))
@@ -231,6 +235,7 @@ def measure_command(
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder) / "home"
         home.mkdir()
+        # Commands write their results beside the files, where the next round must not find them.
         work = shutil.copytree(files, Path(folder) / "files")
         python = find_python(options)
         environment = make_environment(home, python, options.without_compiler)
@@ -241,6 +246,7 @@ def measure_command(
         first = measure_process(*arguments)
         if options.first_only:
             return first, None
+        # Other programs disturb the fastest run least.
         later = [measure_process(*arguments) for _ in range(LATER_RUNS)]
         return first, min(later)
 
@@ -268,6 +274,8 @@ def print_environment(console: Console, python: Path, without_compiler: bool) ->
             return subprocess.run(
                 [str(python), *arguments],
                 env=environment,
+                # In an empty folder Python imports the osimlite of the environment, not that of the
+                # working folder.
                 cwd=home,
                 capture_output=True,
                 text=True,
@@ -317,6 +325,7 @@ def make_row(name: str, files: Path, options: argparse.Namespace) -> list[str]:
     """
     try:
         pairs = [measure_command(name, files, options) for _ in range(options.rounds)]
+    # A command that is slow or fails must not hide the times of the others.
     except subprocess.TimeoutExpired:
         return [name, f"> {options.limit:g}"]
     except RuntimeError as error:

@@ -72,7 +72,8 @@ def measure_frames(
         frame_count: number of frames, including `WARMUP_FRAMES`.
 
     Returns:
-        Times by the wall clock and processor times of this thread (s), without those of the warm-up.
+        Times by the wall clock and processor times of this thread (s), without those of the
+        warm-up.
     """
     wall_times = []
     processor_times = []
@@ -115,9 +116,11 @@ def make_solvers(
         model: model with markers; a sensor is added to each of its bodies.
         frame_count: number of frames to simulate.
     """
+    # In the default pose all sensors are aligned with ground.
     standing = {f"{body.name}_imu": np.eye(3) for body in model.components(osimlite.Body)}
     place_sensors(model, OrientationData.from_source(standing))
     mechanism = osimlite.mechanism(model)
+    # With a fixed seed each run of this script solves the same frames.
     rng = np.random.default_rng(1)
     marker_paths = [marker.path for marker in model.components(osimlite.Marker)]
     stations = [mechanism.stations[path] for path in marker_paths]
@@ -135,6 +138,7 @@ def make_solvers(
     positions += rng.normal(0.0, MARKER_NOISE_M, positions.shape)
     angles = rng.normal(0.0, ORIENTATION_NOISE_RAD, (frame_count * len(sensors), 3))
     errors = np.array([rotation_xyz(angle) for angle in angles]).reshape(rotations.shape)
+    # The errors are rotations about the axes of ground.
     rotations = errors @ rotations
     add_gaps(rng, positions)
     add_gaps(rng, rotations)
@@ -151,6 +155,7 @@ def make_solvers(
 def read_default_model() -> osimlite.Model:
     """Read Rajagopal2016 of the shared folder."""
     with tempfile.TemporaryDirectory() as folder:
+        # The model is in memory when the folder is removed.
         return osimlite.read(unpack_file(CORPUS / "m0954.osim.gz", Path(folder) / "model.osim"))
 
 
@@ -169,6 +174,7 @@ def main() -> None:
     parser.add_argument(
         "--frames",
         type=int,
+        # Ten of these frames are slower than the 0.999 quantile.
         default=10_000,
         metavar="N",
         help="number of frames, 10,000 by default",

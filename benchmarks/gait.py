@@ -8,8 +8,8 @@ NAMEs are built-in walkers, by default those of `ACCURACIES`. Three tables are p
    and how many of 60 random initial states near it walk 20 steps.
 2. How far each parameter of the model can change alone while the walker still walks for 60 s.
 3. The walk of 60 s by OpenSim and by osimlite: steps, scuffs, distance, and processor time. OpenSim
-   reads the file that `osimlite build` writes. Its foot strikes are found in the contact forces that
-   it reports at each step of its integrator.
+   reads the file that `osimlite build` writes. Its foot strikes are found in the contact forces
+   that it reports at each step of its integrator.
 """
 
 from __future__ import annotations
@@ -114,14 +114,15 @@ def measure_cycles(names: list[str]) -> Table:
 
 
 def measure_margins(names: list[str]) -> Table:
-    """Return the table of the least and largest value of each parameter with which a model walks."""
+    """Return the table of the range of each parameter in which a model walks."""
     title = f"Range of each parameter, changed alone, in which the model walks for {DURATION_S:g} s"
     headings = ("model", "parameter", "least", "value", "largest")
     table = make_table(title, headings, ["model", "parameter"])
     for name in names:
         for parameter, value in list_parameters(name).items():
-
+            # The default values keep the current name and parameter of the loop.
             def can_walk(number: float, name: str = name, parameter: str = parameter) -> bool:
+                # The text of the number has all its digits.
                 model = make_model(name, {parameter: repr(number)})
                 walk = simulate_walk(model, DURATION_S, MARGIN_ACCURACY)
                 return len(walk.steps) >= MIN_STEPS
@@ -146,6 +147,7 @@ def find_margin(can_walk: Callable[[float], bool], value: float, direction: floa
     step = 0.01 * abs(value)
     while can_walk(good + direction * step) and step < abs(value):
         good += direction * step
+        # The steps grow, because the size of the margin is unknown.
         step *= 1.5
     bad = good + direction * step
     while abs(bad - good) > MARGIN_RESOLUTION * abs(value):
@@ -176,6 +178,7 @@ def compare_with_opensim(names: list[str]) -> Table:
             path = Path(folder) / f"{name}.osim"
             osimlite.write(make_model(name), path)
             requests[name] = WalkRequest(path, DURATION_S, ACCURACIES[name])
+        # They run in parallel; processor times do not depend on each other.
         theirs = simulate_opensim_walks(requests)
     for name in names:
         start = time.process_time()
@@ -206,6 +209,7 @@ def simulate_walk(model: osimlite.Model, duration: float, accuracy: float) -> Wa
     with Simulation(model, "compiled") as simulation:
         engine: Any = simulation.engine
         start = simulation.initial_state({}, {})
+        # A walk is a sweep of one walker.
         (walk,) = walk_many(engine, [start], duration, accuracy=accuracy)
         return walk
 

@@ -9,10 +9,10 @@ either side of the surfaces. The table has a row for each combination of surface
 - median, 99.9 %, > 1e-9: errors of speeds (m/s) and moment arms (m) against differences of lengths:
   median, 0.999 quantile, and number of poses with a larger error than 1e-9;
 - jumps: how often a length changes in a small step by more than the end points move;
-- geodesic, as OpenSim: processor time (us) by which bent paths take longer than straight ones, along
-  geodesics and with OpenSim's wrapping algorithms in osimlite;
-- OpenSim: the same of OpenSim's own code (us). These times were measured once: of one PathWrap on the
-  machine of shared/oracle/muscles, of two on the machine of the other columns at that time.
+- geodesic, as OpenSim: processor time (us) by which bent paths take longer than straight ones,
+  along geodesics and with OpenSim's wrapping algorithms in osimlite;
+- OpenSim: the same of OpenSim's own code (us). These times were measured once: of one PathWrap on
+  the machine of shared/oracle/muscles, of two on the machine of the other columns at that time.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from osimlite.schema.paths import PathPoint, PathWrap
 from osimlite.simulation.paths import Paths
 
 SIZES: dict[str, dict[str, Any]] = {
+    # The cylinder is long, so that no path leaves it at an end.
     "Cylinder": {"radius": 0.03, "length": 9.0},
     "Sphere": {"radius": 0.04},
     "Ellipsoid": {"dimensions": (0.03, 0.05, 0.04)},
@@ -182,6 +183,7 @@ def differentiate_length(
         (length(ends + step / k * velocity) - length(ends - step / k * velocity)) * k / (2 * step)
         for k in (1, 2, 4)
     )
+    # The weights cancel the errors of second and fourth order.
     return (64 * quarter - 20 * half + full) / 45
 
 
@@ -223,6 +225,7 @@ def measure_error(
     )
     error = np.inf
     for step in DIFFERENCE_STEPS:
+        # Smaller steps have larger rounding errors: they are used only where they must be.
         if error > MAX_ERROR:
             rate = differentiate_length(length, ends, velocity, step)
             error = min(error, max(abs(rate - speed_by_moment_arms), abs(rate - speed)))
@@ -248,10 +251,12 @@ def measure_case(case: str) -> list[str]:
         for _ in range(SWEEP_COUNT)
     )
     all_coordinates = [to_coordinates(ends) for ends in poses]
+    # A path that touches no surface has two points, its ends.
     bent = [q for q in all_coordinates if len(geodesic.points(q)[name]) > 2]
     # Both ends are far away from the surfaces on the same side: the path touches none.
     straight = [to_coordinates(np.array((0.3, 0.0, 0.3, 0.3, 0.2, 0.3)))] * len(bent)
     times = [
+        # The difference is the cost of the surfaces alone.
         measure_evaluation(paths, bent) - measure_evaluation(paths, straight)
         for paths in (geodesic, as_opensim)
     ]

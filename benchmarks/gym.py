@@ -2,10 +2,10 @@
 
     python benchmarks/gym.py [COPIES]
 
-Each environment runs in COPIES copies (64 by default) for 100 steps of 10 ms. The actions are random
-excitations up to 0.3; a copy that falls starts again. For each environment a line gives the steps
-per second of wall time, which uses all cores, and per second of processor time, which is the rate of
-one core.
+Each environment runs in COPIES copies (64 by default) for 100 steps of 10 ms. The actions are
+random excitations up to 0.3; a copy that falls starts again. For each environment a line gives the
+steps per second of wall time, which uses all cores, and per second of processor time, which is the
+rate of one core.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ def measure_rates(name: str, copies: int) -> tuple[float, float]:
     envs = gymnasium.make_vec(f"osimlite/{name}", num_envs=copies)
     rng = np.random.default_rng(0)
     envs.reset(seed=0)
+    # All actions are drawn before the time starts, in single precision as the environments want.
     actions = [
         MAX_EXCITATION * rng.random(envs.action_space.shape, dtype=np.float32)
         for _ in range(STEP_COUNT)

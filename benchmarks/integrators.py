@@ -10,9 +10,9 @@ model for 0.1 s.
 The error is the largest difference of any state at the end from a simulation with accuracy 1e-9,
 relative to states above 1. Each integrator runs at several accuracies. Times are processor times of
 the integration alone, the median of several runs. The table gives for each integrator the time (ms)
-and the number of evaluations at an error of 1e-4, interpolated between the accuracies, and the ratio
-of the fastest integrators of OpenSim and of osimlite. --picture draws all errors and times. --cpodes
-adds OpenSim's CPodes, which takes minutes.
+and the number of evaluations at an error of 1e-4, interpolated between the accuracies, and the
+ratio of the fastest integrators of OpenSim and of osimlite. --picture draws all errors and times.
+--cpodes adds OpenSim's CPodes, which takes minutes.
 """
 
 from __future__ import annotations
@@ -106,8 +106,8 @@ class AccuracyRun(NamedTuple):
     evaluations: int
 
 
-class Cost(NamedTuple):
-    """Cost of an integrator at `TARGET_ERROR`.
+class IntegratorCost(NamedTuple):
+    """IntegratorCost of an integrator at `TARGET_ERROR`.
 
     Attributes:
         seconds: processor time (s), infinite if no accuracy reaches the error.
@@ -169,7 +169,7 @@ def write_driven_models(files: dict[str, Path], folder: Path) -> Iterator[tuple[
 
 
 def use_elastic_tendons(model: Any) -> None:
-    """Give the DeGrooteFregly2016 muscles of an OpenSim model elastic tendons, as explicit states."""
+    """Give the DeGrooteFregly2016 muscles of an OpenSim model tendons with explicit dynamics."""
     for index in range(model.getMuscles().getSize()):
         muscle = model.getMuscles().get(index)
         muscle.set_ignore_tendon_compliance(False)
@@ -255,7 +255,9 @@ def run_accuracy(simulate: Callable[[], Motion], exact: np.ndarray, rounds: int)
     while len(motions) < rounds and len(motions) * motions[0].seconds < MAX_TOTAL_TIME_S:
         motions.append(simulate())
     first = motions[0]
+    # Errors of states below 1 are absolute: otherwise states near zero would decide.
     error = float(np.max(np.abs(first.state - exact) / np.maximum(np.abs(exact), 1.0)))
+    # A NaN would compare as neither small nor large.
     if np.isnan(error):
         error = inf
     return AccuracyRun(error, median(motion.seconds for motion in motions), first.evaluations)
@@ -270,6 +272,7 @@ def prepare_osimlite(
     def simulate() -> Motion:
         settings = EngineSettings(accuracy=accuracy, integrator=integrator)
         began = time.process_time()
+        # The callback records nothing.
         stepper = simulation.engine.make_stepper(0.0, start, settings, lambda t, y: None)
         stepper.tabulate([DURATION_S])
         seconds = time.process_time() - began
@@ -314,6 +317,7 @@ def prepare_opensim(
         try:
             end = manager.integrate(DURATION_S)
         except RuntimeError:
+            # The integrator gives up: its error counts as infinite.
             return Motion(np.full(len(state_paths), np.nan), time.process_time() - began, 0)
         seconds = time.process_time() - began
         values = [model.getStateVariableValue(end, path) for path in state_paths]
@@ -322,7 +326,7 @@ def prepare_opensim(
     return simulate
 
 
-def interpolate_cost(runs: list[AccuracyRun]) -> Cost:
+def interpolate_cost(runs: list[AccuracyRun]) -> IntegratorCost:
     """Return the cost of an integrator at `TARGET_ERROR`.
 
     Time and evaluations are interpolated between the cheapest run with a smaller error and the most
@@ -330,13 +334,13 @@ def interpolate_cost(runs: list[AccuracyRun]) -> Cost:
     """
     good_runs = [run for run in runs if run.error <= TARGET_ERROR]
     if not good_runs:
-        return Cost(inf, 0.0)
+        return IntegratorCost(inf, 0.0)
     good = min(good_runs, key=lambda run: run.seconds)
     poor_runs = [
         run for run in runs if TARGET_ERROR < run.error < inf and run.seconds < good.seconds
     ]
     if not poor_runs:
-        return Cost(good.seconds, float(good.evaluations))
+        return IntegratorCost(good.seconds, float(good.evaluations))
     poor = max(poor_runs, key=lambda run: run.seconds)
     fraction = log(TARGET_ERROR / poor.error) / log(good.error / poor.error)
 
@@ -346,7 +350,7 @@ def interpolate_cost(runs: list[AccuracyRun]) -> Cost:
         return exp(log(start) + fraction * log(max(end, 1e-9) / start))
 
     seconds = interpolate(poor.seconds, good.seconds)
-    return Cost(seconds, round(interpolate(poor.evaluations, good.evaluations)))
+    return IntegratorCost(seconds, round(interpolate(poor.evaluations, good.evaluations)))
 
 
 def make_row(name: str, runs: dict[str, list[AccuracyRun]]) -> list[str]:
@@ -397,6 +401,7 @@ def draw_picture(results: dict[str, dict[str, list[AccuracyRun]]], path: Path) -
         axes.set_ylabel("error at the end")
     for axes in all_axes[len(results) :]:
         axes.axis("off")
+    # All diagrams have the same integrators.
     handles = all_axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=5, fontsize=8)
     figure.savefig(path)
@@ -406,6 +411,7 @@ def main() -> None:
     """Run the command line."""
     opensim.Logger.setLevelString("off")
     words = sys.argv[1:]
+    # The name of the picture may contain the sign of NAME=FILE.
     picture = Path(words.pop(words.index("--picture") + 1)) if "--picture" in words else None
     table = Table(
         title=f"{DURATION_S:g} s of motion at an error of {TARGET_ERROR:g}: "
@@ -418,6 +424,7 @@ def main() -> None:
         for name, path in write_driven_models(files, folder):
             runs = measure_model(path, with_cpodes="--cpodes" in words)
             results[name] = runs
+            # The names of the integrators are known after the first model.
             if not table.columns:
                 for heading in ("model", *runs, "OpenSim / osimlite"):
                     table.add_column(heading, justify="left" if heading == "model" else "right")

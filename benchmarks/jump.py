@@ -10,9 +10,10 @@ for the excitations of eight muscles, equal in both legs, at certain times:
 2. In addition, the feet come back under the mass center during the flight.
 3. With the excitations of the landing, the jumper stands at the end.
 
-The excitations and the model are written to the output folder. Then the jump is simulated by osimlite
-and by OpenSim at the same accuracies, and the script prints the height of the mass center, the
-largest distance of the mass centers of both programs, and the processor time of some simulations.
+The excitations and the model are written to the output folder. Then the jump is simulated by
+osimlite and by OpenSim at the same accuracies, and the script prints the height of the mass center,
+the largest distance of the mass centers of both programs, and the processor time of some
+simulations.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ FLIGHT_OBJECTIVE = (
     " + 0.2*end(pelvis_tilt + 0.35)^2 + 0.01*end(pelvis_tilt/speed)^2"
     f" + 0.1*end(knee_angle_r + 0.4)^2 + 0.1*end{FOOT_ANGLE}^2"
 )
-"""Height, and at the end of the flight feet under the mass center, a leaning trunk and bent knees."""
+"""Height, and at the end of the flight feet under the mass center, leaning trunk and bent knees."""
 
 LANDING_OBJECTIVE = (
     f"20*mean({LEAN}^2) + mean((pelvis_tilt + 0.35)^2) + end(center_of_mass_Y - 0.95)^2"
@@ -144,6 +145,7 @@ def find_excitations(folder: Path, seed: int) -> tuple[dict[str, float], int]:
         The excitations by the names of `get_variable`, and the number of simulations.
     """
     model = jumper(driven=False)
+    # The model has no controller: the excitations are parameters of the plan.
     excitations: dict[str, float] = {}
     simulation_count = 0
     for search in SEARCHES:
@@ -219,8 +221,10 @@ def simulate_opensim(file: Path, to: float, accuracy: float) -> np.ndarray:
     manager.setIntegratorAccuracy(accuracy)
     manager.initialize(state)
     positions = []
+    # The small number keeps the last time in spite of rounding.
     for t in np.arange(SAMPLE_TIME_S, to + 1e-9, SAMPLE_TIME_S):
         state = manager.integrate(t)
+        # OpenSim computes the mass center only after this.
         model.realizePosition(state)
         positions.append(model.calcMassCenterPosition(state).to_numpy())
     return np.array(positions)
@@ -302,6 +306,7 @@ def main() -> None:
         f"{processor_time:.0f} s of processor time: {simulation_count / processor_time:.1f} "
         "simulations/s of one core"
     )
+    # The files are named as those of the package, so that they can replace them.
     controls_file = folder / CONTROLS_FILE.name
     write_excitations(excitations, controls_file)
     model = write_model(folder, controls_file)
