@@ -224,7 +224,6 @@ def simulate_opensim(file: Path, to: float, accuracy: float) -> np.ndarray:
     # The small number keeps the last time in spite of rounding.
     for t in np.arange(SAMPLE_TIME_S, to + 1e-9, SAMPLE_TIME_S):
         state = manager.integrate(t)
-        # OpenSim computes the mass center only after this.
         model.realizePosition(state)
         positions.append(model.calcMassCenterPosition(state).to_numpy())
     return np.array(positions)
