@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _pair import Pair, pair, report
+from _pair import Pair, print_pairs, time_pair
 from osimlite import (
     Body,
     ContactHalfSpace,
@@ -96,7 +96,7 @@ def main() -> None:
                     size = len(simulation.engine.order)
             differences.add_row(name, str(size), *cells.values())
     console.print(differences)
-    report(f"{TO:g} s, warm, accuracy {ACCURACY:g}", times, console=console)
+    print_pairs(f"{TO:g} s, warm, accuracy {ACCURACY:g}", times, console=console)
 
 
 def compare(title: str, simulation: Simulation, opensim_model: Any) -> tuple[float, Pair]:
@@ -119,7 +119,7 @@ def compare(title: str, simulation: Simulation, opensim_model: Any) -> tuple[flo
     end = dict(zip(names, ours(), strict=True))
     opensim_end = dict(zip(opensim_names, theirs(), strict=True))
     difference = max(abs(end[name] - opensim_end[name]) for name in end)
-    times = pair(title, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
+    times = time_pair(title, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
     return difference, times
 
 

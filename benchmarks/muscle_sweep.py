@@ -26,7 +26,7 @@ from rich.console import Console
 
 import osimlite
 from _corpus import CORPUS
-from _pair import pair, report
+from _pair import print_pairs, time_pair
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.runner import Runner
@@ -71,7 +71,7 @@ def main() -> None:
         osimlite.write(variants.model, folder / "model.osim")
         names = [variable.name for variable in muscle_plan.variables]
         theirs = prepare_opensim_runs(folder / "model.osim", names, rows)
-        times = pair(
+        times = time_pair(
             f"{RUNS} runs of {TO:g} s, {len(names)} nodes",
             ours=partial(
                 sweep, muscle_plan, samples, folder / "runs.parquet", workers=1, force=True
@@ -81,7 +81,7 @@ def main() -> None:
             clock=time.process_time,
         )
     console = Console()
-    report(
+    print_pairs(
         "gait10dof18musc with other controls in each run, accuracy 1e-3, processor time",
         [times],
         console=console,

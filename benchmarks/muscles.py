@@ -36,7 +36,7 @@ from rich.table import Table
 
 import osimlite
 from _corpus import CORPUS
-from _pair import Pair, pair, report
+from _pair import Pair, print_pairs, time_pair
 from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation import Simulation
 from osimlite.simulation.system import System
@@ -112,7 +112,7 @@ def main() -> None:
             console.print(f"{name}: first use {measure_first_use(path)}", highlight=False)
         console.print(ends)
         for title, pairs in times.items():
-            report(f"{title}, processor time", pairs, console=console)
+            print_pairs(f"{title}, processor time", pairs, console=console)
         swept_file = dict(find_models(Path(folder))).get(SWEPT_MODEL)
         if swept_file is not None:
             compare_sweep(swept_file, console)
@@ -157,24 +157,24 @@ def compare_model(name: str, path: Path, times: dict[str, list[Pair]], ends: Tab
             theirs: Callable[[], Any] = prepare_opensim_poses(
                 opensim_model, opensim_model.realizeAcceleration
             )
-            times["evaluation"].append(time_pair(title, ours, theirs, POSES))
+            times["evaluation"].append(time_evaluations(title, ours, theirs, POSES))
             ours = prepare_motions(simulation)
             # One run for the differences, one as warm-up, and one for each round.
             theirs = prepare_opensim_motions(opensim_model, ROUNDS + 2)
             row = compare_ends(simulation, ours(), theirs())
             ends.add_row(name, str(opensim_model.getMuscles().getSize()), engine, *row)
-            times["motion"].append(time_pair(title, ours, theirs))
+            times["motion"].append(time_evaluations(title, ours, theirs))
             # Equilibria involve no dynamics of the bodies, so that one engine is enough.
             if engine == "compiled":
                 ours = prepare_equilibria(simulation)
                 theirs = prepare_opensim_poses(opensim_model, opensim_model.equilibrateMuscles)
-                times["equilibrium"].append(time_pair(name, ours, theirs, POSES))
+                times["equilibrium"].append(time_evaluations(name, ours, theirs, POSES))
     ours = prepare_moment_arms(model, opensim_model)
     theirs = prepare_opensim_moment_arms(opensim_model)
-    times["moment arms"].append(time_pair(name, ours, theirs))
+    times["moment arms"].append(time_evaluations(name, ours, theirs))
 
 
-def time_pair(
+def time_evaluations(
     name: str, ours: Callable[[], object], theirs: Callable[[], object], count: int = 1
 ) -> Pair:
     """Return the processor times of one evaluation (s).
@@ -185,7 +185,7 @@ def time_pair(
         theirs: evaluations with OpenSim.
         count: number of evaluations that one call makes.
     """
-    row = pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
+    row = time_pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
     return Pair(
         name,
         tuple(seconds / count for seconds in row.ours),
@@ -362,7 +362,7 @@ def compare_sweep(path: Path, console: Console) -> None:
     sweep_plan = plan(osimlite.read(path), {"hip_flexion_r": "-0.1:0.1"}, to=TO, accuracy=ACCURACY)
     runner = Runner(sweep_plan)
     rows = choose_samples(sweep_plan.variables, "sobol", SWEEP_RUNS).make_block(0, SWEEP_RUNS)
-    row = pair(
+    row = time_pair(
         f"{SWEEP_RUNS} runs of {SWEPT_MODEL}",
         ours=lambda: runner.run(rows),
         theirs=prepare_opensim_sweep(path, rows[: SWEEP_RUNS // OPENSIM_SHARE]),
@@ -370,7 +370,9 @@ def compare_sweep(path: Path, console: Console) -> None:
         clock=time.process_time,
     )
     opensim_times = tuple(float(OPENSIM_SHARE) * seconds for seconds in row.theirs)
-    report("A sweep, processor time", [Pair(row.name, row.ours, opensim_times)], console=console)
+    print_pairs(
+        "A sweep, processor time", [Pair(row.name, row.ours, opensim_times)], console=console
+    )
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     samples = choose_samples(sweep_plan.variables, "sobol", 10 * SWEEP_RUNS)
     for first in range(0, 10 * SWEEP_RUNS, SWEEP_RUNS):

@@ -18,8 +18,8 @@ import tracemalloc
 from pathlib import Path
 from statistics import median
 
-from _corpus import CORPUS, unpacked
-from _pair import Pair, pair, pair_commands, report
+from _corpus import CORPUS, unpack_models
+from _pair import Pair, print_pairs, time_command_pair, time_pair
 
 # Fixed costs dominate the time of small files, so that they say nothing about growth.
 MIN_GROWTH_SIZE = 50_000
@@ -64,7 +64,7 @@ def time_models(files: list[Path], rounds: int) -> list[Pair]:
     import osimlite
 
     return [
-        pair(
+        time_pair(
             f"{path.stem} {path.stat().st_size / 1e3:.0f} kB",
             ours=lambda path=path: osimlite.read(path),
             theirs=lambda path=path: opensim.Model(str(path)),
@@ -83,7 +83,7 @@ def time_processes(path: Path, rounds: int) -> Pair:
     """
     read = f"import osimlite; osimlite.read({str(path)!r})"
     load = f"import opensim; opensim.Logger.setLevelString('off'); opensim.Model({str(path)!r})"
-    return pair_commands(
+    return time_command_pair(
         f"complete process, {path.stem}",
         ours=[sys.executable, "-c", read],
         theirs=[sys.executable, "-c", load],
@@ -130,18 +130,18 @@ def main() -> None:
         )
     opensim.Logger.setLevelString("off")
     with tempfile.TemporaryDirectory() as temporary:
-        files = unpacked(options.folder, Path(temporary))
+        files = unpack_models(options.folder, Path(temporary))
         if not files:
             sys.exit(f"no .osim files in {options.folder}")
         rows = time_models(files, options.rounds)
-        report("Reading a model", rows)
+        print_pairs("Reading a model", rows)
         print_summary(files, rows)
         largest = max(files, key=lambda path: path.stat().st_size)
         size = largest.stat().st_size / 1e6
         memory = measure_peak_memory(largest)
         print(f"{largest.stem}: peak memory {memory:.1f} MB for {size:.2f} MB of text")
         if options.processes:
-            report("Complete processes", [time_processes(largest, options.rounds)])
+            print_pairs("Complete processes", [time_processes(largest, options.rounds)])
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _pair import Pair, pair, report
+from _pair import Pair, print_pairs, time_pair
 from osimlite.simulation import Simulation
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -86,7 +86,7 @@ def main() -> None:
     for simulation in simulations.values():
         simulation.close()
     console.print(errors)
-    report(f"Dynamic Walker, {TO:g} s, warm, by accuracy", times, console=console)
+    print_pairs(f"Dynamic Walker, {TO:g} s, warm, by accuracy", times, console=console)
 
 
 def measure_error(values: list[float], exact: list[float]) -> float:
@@ -105,7 +105,7 @@ def time_engines(
         theirs: one run of OpenSim.
     """
     return [
-        pair(
+        time_pair(
             f"{name}, {accuracy:g}",
             ours=run,
             theirs=theirs,

@@ -37,7 +37,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _pair import pair, report
+from _pair import print_pairs, time_pair
 from osimlite.studies.sweep.plan import Plan, plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.runner import Runner
@@ -107,7 +107,7 @@ def compare_with_opensim(starts: Plan, path: Path, console: Console) -> None:
     opensim.Logger.setLevelString("off")
     rows = choose_samples(starts.variables, "sobol", WALKERS).make_block(0, WALKERS)
     theirs = prepare_opensim_runs(opensim, rows)
-    times = pair(
+    times = time_pair(
         f"{WALKERS} walkers, processor time",
         ours=prepare_sweep(starts, path),
         theirs=theirs,
@@ -115,7 +115,7 @@ def compare_with_opensim(starts: Plan, path: Path, console: Console) -> None:
         warmup=0,
         clock=time.process_time,
     )
-    report(f"Dynamic Walkers, {TO:g} s, accuracy 1e-3", [times], console=console)
+    print_pairs(f"Dynamic Walkers, {TO:g} s, accuracy 1e-3", [times], console=console)
     console.print(compare_variables())
     ours = Runner(starts).run(rows).measures["distance"]
     differences = np.abs(ours - np.array(theirs()))

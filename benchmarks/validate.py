@@ -25,8 +25,8 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from _corpus import CORPUS, unpacked
-from _pair import Pair, pair, report
+from _corpus import CORPUS, unpack_models
+from _pair import Pair, print_pairs, time_pair
 
 ROOT = Path(__file__).resolve().parents[1]
 WALKER = ROOT / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -84,7 +84,7 @@ def time_single_models(rounds: int, files: list[Path], each: bool) -> None:
         except RuntimeError:
             continue
         size = path.stat().st_size
-        row = pair(
+        row = time_pair(
             f"{path.stem} {size / 1e3:.0f} kB",
             ours=lambda path=path: osimlite.validate(path),
             theirs=lambda path=path: initialize_in_opensim(path),
@@ -97,7 +97,7 @@ def time_single_models(rounds: int, files: list[Path], each: bool) -> None:
     else:
         shown = [row for row, _ in sorted(rows, key=lambda row: -row[1])[:LARGEST_SHOWN]]
     title = "Read and validate in one process"
-    report(title if each else f"{title}, the {LARGEST_SHOWN} largest models", shown)
+    print_pairs(title if each else f"{title}, the {LARGEST_SHOWN} largest models", shown)
     print(
         f"ratio over {len(rows)} models: median {median(ratios):.2f}, nine in ten below "
         f"{ratios[int(0.9 * (len(ratios) - 1))]:.2f}, greatest {ratios[-1]:.2f}"
@@ -194,7 +194,7 @@ def main() -> None:
             "this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'"
         )
     with tempfile.TemporaryDirectory() as temporary:
-        files = unpacked(options.folder, Path(temporary)) if options.folder.is_dir() else []
+        files = unpack_models(options.folder, Path(temporary)) if options.folder.is_dir() else []
         if files:
             # The corpus has many models, so that fewer rounds of each are enough.
             time_single_models(max(3, options.rounds // 2), files, options.each)
