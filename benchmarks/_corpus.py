@@ -44,7 +44,3 @@ def unpack_models(folder: Path, target_folder: Path) -> list[Path]:
         unpack_file(source, target_folder / source.name.removesuffix(".gz"))
         for source in sorted(folder.glob("*.osim*"))
     ]
-
-
-# Other scripts still import this name.
-unpacked = unpack_models

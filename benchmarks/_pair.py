@@ -185,10 +185,3 @@ def _format_ratio(value: float) -> str:
 
 def _format_milliseconds(times: Sequence[float]) -> str:
     return f"{min(times) * 1e3:.4g} / {median(times) * 1e3:.4g}"
-
-
-# Other scripts still import these names.
-pair = time_pair
-pair_commands = time_command_pair
-report = print_pairs
-_run = run_command
