@@ -1,8 +1,11 @@
-"""The picture of the rooms and their imports, `docs/images/architecture.svg`, drawn from the imports themselves.
+"""Draw the packages of osimlite and their imports into `docs/images/architecture.svg`.
 
-``python docs/_architecture.py`` writes it; ``python packaging/regenerate.py`` does so with all other generated files.
-A row holds the rooms whose longest chain of imports has the same length. An arrow leads from a room to one that it
-imports; arrows that follow from others (a imports b, b imports c, so a may import c) are left out.
+    python docs/_architecture.py
+
+``python packaging/regenerate.py`` does this with all other generated files. A package of the top level is
+called a room. A row has the rooms whose longest chain of imports has the same length. An arrow leads
+from a room to one that it imports. Arrows that follow from others are omitted: if a imports b and b
+imports c, the arrow from a to c is.
 """
 
 from __future__ import annotations
@@ -36,29 +39,37 @@ SUMMARIES = {
     "studies": "sweeps, gaits, learning",
     "cli": "commands, language server",
 }
-"""What stands below the name of each room."""
+"""Summary of each room, which is drawn below its name."""
 
-LEFT_OUT = {"__main__", "errors", "gym", "mjcf", "moco"}
-"""Modules of the top level that are no rooms: the errors, which all may import, and public names."""
+OTHER_MODULES = {"__main__", "errors", "gym", "mjcf", "moco"}
+"""Modules of the top level that are no rooms: errors, which every room may import, and public names."""
 
-BOX_WIDTH, BOX_HEIGHT = 206, 62
-COLUMN_WIDTH, ROW_HEIGHT = 230, 104
+BOX_WIDTH = 206
+BOX_HEIGHT = 62
+COLUMN_WIDTH = 230
+"""Distance of the centres of two boxes in a row."""
+ROW_HEIGHT = 104
+"""Distance of the centres of two rows."""
 MARGIN = 24
+
+# After four sweeps nothing changes any more.
 SWEEPS = 8
-"""How often the rows are ordered by the means of their neighbours; after four nothing changes."""
+"""Number of times that the rows are sorted by the mean columns of their neighbours."""
 
 Arrows = frozenset[tuple[str, str]]
 
 
 class Item(NamedTuple):
-    """A box, or the bend of an arrow where it passes a row between its ends (then `room` is empty)."""
+    """Item of a row: the box of a room, or the bend of an arrow that passes the row."""
 
     room: str
+    """Name of the room; empty for a bend."""
     arrow: tuple[str, str] = ("", "")
+    """Source with the level of the row, and target of the arrow that bends."""
 
 
 def find_rooms(graph: ImportGraph) -> list[str]:
-    """Return the rooms from the top to the bottom of the `layers` contract of pyproject.toml.
+    """Return the names of the rooms, from top to bottom of the `layers` contract of pyproject.toml.
 
     Raises:
         ValueError: `SUMMARIES` lacks a room, or has one that does not exist.
@@ -67,16 +78,27 @@ def find_rooms(graph: ImportGraph) -> list[str]:
         contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
     (layers,) = (contract["layers"] for contract in contracts if contract["type"] == "layers")
     names = [word.strip("() ") for layer in layers for word in layer.replace("|", ":").split(":")]
-    rooms = [name for name in names if f"osimlite.{name}" in graph.modules and name not in LEFT_OUT]
+    rooms = [
+        name for name in names if f"osimlite.{name}" in graph.modules and name not in OTHER_MODULES
+    ]
     if {*rooms} != {*SUMMARIES}:
         raise ValueError(
-            f"SUMMARIES of docs/_architecture.py differs from the rooms: {sorted({*rooms} ^ {*SUMMARIES})}"
+            "SUMMARIES of docs/_architecture.py differs from the rooms: "
+            f"{sorted({*rooms} ^ {*SUMMARIES})}"
         )
     return rooms
 
 
 def find_arrows(graph: ImportGraph, rooms: list[str]) -> Arrows:
-    """Return the pairs of rooms of which the first imports the second, without those that follow from others."""
+    """Return the imports between rooms that do not follow from others.
+
+    Args:
+        graph: graph of all imports.
+        rooms: names of the rooms, importing ones first.
+
+    Returns:
+        Pairs of the importing and the imported room.
+    """
     imports: dict[str, set[str]] = {room: set() for room in rooms}
     for module in graph.modules:
         for imported in graph.find_modules_directly_imported_by(module):
@@ -96,7 +118,15 @@ def find_arrows(graph: ImportGraph, rooms: list[str]) -> Arrows:
 
 
 def find_levels(rooms: list[str], arrows: Arrows) -> dict[str, int]:
-    """Return for each room the length of its longest chain of imports."""
+    """Compute the length of the longest chain of imports from each room.
+
+    Args:
+        rooms: names of the rooms, importing ones first.
+        arrows: imports between them.
+
+    Returns:
+        Lengths by room; 0 for rooms that import no other.
+    """
     levels: dict[str, int] = {}
     for room in reversed(rooms):
         levels[room] = 1 + max(
@@ -105,8 +135,16 @@ def find_levels(rooms: list[str], arrows: Arrows) -> dict[str, int]:
     return levels
 
 
-def arrange(rooms: list[str], arrows: Arrows, levels: Mapping[str, int]) -> list[list[Item]]:
-    """Return the rows from top to bottom, each in an order in which few arrows cross (method of Sugiyama 1981)."""
+def arrange_rows(rooms: list[str], arrows: Arrows, levels: Mapping[str, int]) -> list[list[Item]]:
+    """Return the rows from top to bottom, each in an order in which few arrows cross.
+
+    The method is that of Sugiyama et al. 1981: sort each row by the mean column of the neighbours.
+
+    Args:
+        rooms: names of the rooms.
+        arrows: imports between them.
+        levels: level of each room, which determines its row.
+    """
     top = max(levels.values())
     rows: list[list[Item]] = [
         [Item(room) for room in rooms if levels[room] == top - row] for row in range(top + 1)
@@ -116,7 +154,7 @@ def arrange(rooms: list[str], arrows: Arrows, levels: Mapping[str, int]) -> list
         source, target = arrow
         chain = [Item(source)]
         for level in range(levels[source] - 1, levels[target], -1):
-            # One bend in each row: the level makes it another item than those of the other rows.
+            # An arrow has a bend in each row that it passes; the level distinguishes these items.
             bend = Item("", (f"{source} {level}", target))
             rows[top - level].append(bend)
             chain.append(bend)
@@ -125,42 +163,42 @@ def arrange(rooms: list[str], arrows: Arrows, levels: Mapping[str, int]) -> list
             links.setdefault(lower, []).append(upper)
     for sweep in range(SWEEPS):
         for row in rows if sweep % 2 == 0 else reversed(rows):
-            places = {
-                item: place
+            columns = {
+                item: column
                 for each in rows
-                for item, place in zip(each, place_columns(len(each)), strict=True)
+                for item, column in zip(each, compute_columns(len(each)), strict=True)
             }
             row.sort(
                 key=lambda item: (
-                    sum(places[other] for other in links[item]) / max(1, len(links[item]))
+                    sum(columns[other] for other in links[item]) / max(1, len(links[item]))
                 )
             )
     return rows
 
 
-def place_columns(count: int) -> list[float]:
+def compute_columns(count: int) -> list[float]:
     """Return the columns of the items of a row, centred about 0."""
-    return [place - (count - 1) / 2 for place in range(count)]
+    return [index - (count - 1) / 2 for index in range(count)]
 
 
 def find_parts(graph: ImportGraph, room: str) -> str:
-    """Return the names of the packages inside a room, as they stand in its box."""
+    """Return the names of the packages in a room, as they are drawn in its box."""
     inner = [name for name in graph.find_children(f"osimlite.{room}") if graph.find_children(name)]
     return ", ".join(sorted(name.rpartition(".")[2] for name in inner))
 
 
-def draw(graph: ImportGraph) -> str:
-    """Return the picture as SVG."""
+def draw_graph(graph: ImportGraph) -> str:
+    """Return the picture of a graph of imports as SVG."""
     rooms = find_rooms(graph)
     arrows = find_arrows(graph, rooms)
     levels = find_levels(rooms, arrows)
-    rows = arrange(rooms, arrows, levels)
+    rows = arrange_rows(rooms, arrows, levels)
     width = round(2 * MARGIN + COLUMN_WIDTH * max(map(len, rows)))
     height = 2 * MARGIN + ROW_HEIGHT * (len(rows) - 1) + BOX_HEIGHT
     centres = {
         item: (width / 2 + COLUMN_WIDTH * column, MARGIN + ROW_HEIGHT * number + BOX_HEIGHT / 2)
         for number, row in enumerate(rows)
-        for item, column in zip(row, place_columns(len(row)), strict=True)
+        for item, column in zip(row, compute_columns(len(row)), strict=True)
     }
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
@@ -183,28 +221,47 @@ def draw(graph: ImportGraph) -> str:
 def draw_arrow(
     arrow: tuple[str, str], levels: Mapping[str, int], centres: Mapping[Item, tuple[float, float]]
 ) -> str:
-    """Return the element of an arrow, which bends in the rows that it passes."""
+    """Return the SVG element of an arrow, which bends in the rows that it passes.
+
+    Args:
+        arrow: importing and imported room.
+        levels: level of each room.
+        centres: centre of each item (pixels).
+    """
     source, target = arrow
     x, y = centres[Item(source)]
     y += BOX_HEIGHT / 2
     path = f"M{x:g} {y:g}"
     for level in range(levels[source] - 1, levels[target] - 1, -1):
-        last = level == levels[target]
-        new_x, middle = centres[Item(target) if last else Item("", (f"{source} {level}", target))]
+        is_last = level == levels[target]
+        item = Item(target) if is_last else Item("", (f"{source} {level}", target))
+        new_x, middle = centres[item]
         new_y = middle - BOX_HEIGHT / 2
         half = (y + new_y) / 2
         path += f"C{x:g} {half:g} {new_x:g} {half:g} {new_x:g} {new_y:g}"
-        x, y = new_x, new_y
-        if not last:
+        x = new_x
+        y = new_y
+        if not is_last:
+            # The arrow is vertical inside the row, so that it passes between the boxes.
             y = middle + BOX_HEIGHT / 2
             path += f"V{y:g}"
     return f'<path d="{path}" fill="none" stroke="#667" stroke-width="1.4" marker-end="url(#tip)"/>'
 
 
 def draw_box(room: str, parts: str, centre: tuple[float, float]) -> Iterator[str]:
-    """Yield the elements of the box of a room: its name, what it is, the packages inside it."""
+    """Draw the box of a room with its name, its summary and the packages inside.
+
+    Args:
+        room: name of the room.
+        parts: names of the packages inside.
+        centre: centre of the box (pixels).
+
+    Yields:
+        SVG elements.
+    """
     x, y = centre
-    left, top = x - BOX_WIDTH / 2, y - BOX_HEIGHT / 2
+    left = x - BOX_WIDTH / 2
+    top = y - BOX_HEIGHT / 2
     yield (
         f'<rect x="{left:g}" y="{top:g}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" rx="6" fill="#eef3fb" '
         'stroke="#38558c"/>'
@@ -216,8 +273,8 @@ def draw_box(room: str, parts: str, centre: tuple[float, float]) -> Iterator[str
 
 
 def make_picture() -> str:
-    """Return the picture of the working copy."""
-    return draw(build_graph("osimlite", exclude_type_checking_imports=True, cache_dir=None))
+    """Return the picture of the packages of this clone as SVG."""
+    return draw_graph(build_graph("osimlite", exclude_type_checking_imports=True, cache_dir=None))
 
 
 if __name__ == "__main__":

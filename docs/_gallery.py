@@ -1,9 +1,9 @@
-"""Make the pictures of the gallery by the lines below them.
+"""Make the pictures of the gallery with the commands and scripts below them.
 
     python docs/_gallery.py [WORD ...]     all pictures, or those whose names contain a WORD
 
-The pictures are tracked, small PNG files in ``docs/gallery``, so that a clone and the site show them,
-and a build of the site computes none. Run this after a change of what they show, and look at them.
+The pictures are small PNG files in ``docs/gallery``. They are tracked, so that clones and the site show
+them, and building the site computes none. Run this after a change of what they show, and look at them.
 """
 
 from __future__ import annotations
@@ -19,52 +19,66 @@ from tempfile import TemporaryDirectory
 
 PAGE = Path(__file__).with_name("gallery.md")
 FOLDER = PAGE.parent / "gallery"
-COMPARED = "Before and after\n"
-"""Heading of the part with pictures of an earlier version."""
+COMPARISON = "Before and after\n"
+"""Heading of the section with pictures of an earlier version."""
 MAX_WIDTH = 900
 """Largest width of a picture, pixels."""
+
+# More colors make the files larger, and look the same.
 COLORS = 128
-"""Colors of a picture; more make the file larger, and look the same."""
+"""Number of colors of a picture."""
+
+WORKERS = 2
+"""Number of pictures that are made at a time."""
 
 
-def sections(text: str) -> list[str]:
-    """Return the parts of the page, each of which makes its picture in a folder of its own.
+def find_sections(text: str) -> list[str]:
+    """Return the sections of the page, each of which has a picture.
 
-    The part "Before and after" is made by `docs/_compare.py`.
+    The section "Before and after" is omitted; `docs/_compare.py` makes its pictures.
     """
-    parts = re.split(r"^## ", text, flags=re.M)[1:]
-    return [part for part in parts if not part.startswith(COMPARED)]
+    sections = re.split(r"^## ", text, flags=re.M)[1:]
+    return [section for section in sections if not section.startswith(COMPARISON)]
 
 
-def name_of(section: str) -> str:
+def find_picture_name(section: str) -> str:
     """Return the file name of the picture of a section."""
     (name,) = re.findall(r"\]\(gallery/([^)]+)\)", section)
     return str(name)
 
 
-def made(section: str) -> tuple[str, bytes]:
-    """Return name and bytes of the picture that the blocks of a section make."""
-    name = name_of(section)
+def make_picture(section: str) -> tuple[str, bytes]:
+    """Run the code blocks of a section in an empty folder.
+
+    Args:
+        section: text of the section.
+
+    Returns:
+        File name and content of the picture that the blocks make.
+    """
+    name = find_picture_name(section)
+    # The commands of this environment come first, also where it is not activated.
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
+    environment = {
+        **os.environ,
+        "PATH": path,
+        "MPLBACKEND": "Agg",
+        "PYTHONPATH": str(PAGE.parents[1]),
+    }
     with TemporaryDirectory() as folder:
         for language, code in re.findall(r"^```(sh|python)\n(.*?)^```", section, re.M | re.S):
-            command = (
-                [sys.executable, "-c", code] if language == "python" else ["bash", "-euc", code]
-            )
-            environment = {
-                **os.environ,
-                "PATH": path,
-                "MPLBACKEND": "Agg",
-                "PYTHONPATH": str(PAGE.parents[1]),
-            }
+            if language == "python":
+                command = [sys.executable, "-c", code]
+            else:
+                command = ["bash", "-euc", code]
             subprocess.run(
                 command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL
             )
         return name, (Path(folder) / name).read_bytes()
 
 
-def shrink(picture: bytes) -> bytes:
-    """Return a picture as a small PNG file."""
+def shrink_picture(picture: bytes) -> bytes:
+    """Return the content of a small PNG file with the same picture."""
     from PIL import Image
 
     image = Image.open(io.BytesIO(picture)).convert("RGB")
@@ -76,23 +90,23 @@ def shrink(picture: bytes) -> bytes:
 
 
 def write_pictures(words: list[str]) -> None:
-    """Make the pictures whose names contain one of the words, or all, and write them."""
-    parts = [
-        part
-        for part in sections(PAGE.read_text(encoding="utf-8"))
-        if not words or any(word in name_of(part) for word in words)
+    """Make and write the pictures whose names contain one of the words, or all without words."""
+    sections = [
+        section
+        for section in find_sections(PAGE.read_text(encoding="utf-8"))
+        if not words or any(word in find_picture_name(section) for word in words)
     ]
-    with ThreadPoolExecutor(2) as pool:
-        for line in pool.map(write_picture, parts):
+    with ThreadPoolExecutor(WORKERS) as pool:
+        for line in pool.map(write_picture, sections):
             print(line, flush=True)
 
 
 def write_picture(section: str) -> str:
     """Make the picture of a section, write it, and return a line about it."""
-    name, picture = made(section)
+    name, picture = make_picture(section)
     path = FOLDER / name
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(shrink(picture))
+    path.write_bytes(shrink_picture(picture))
     return f"wrote {path} ({path.stat().st_size / 1000.0:.0f} kB)"
 
 

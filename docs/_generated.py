@@ -1,7 +1,7 @@
-"""Pages of the manual that are made from the program itself when the site is built, so that they cannot differ from it.
+"""Pages of the manual that are generated from the package when the site is built.
 
-A hook of MkDocs: commands from their `--help`, rules from their docstrings, components from their
-declarations.
+This is a hook of MkDocs. The page of commands consists of their `--help`, the pages of rules of their
+docstrings, and the page of components of the schema, so that the manual agrees with the package.
 """
 
 from __future__ import annotations
@@ -25,29 +25,35 @@ from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import FieldSpec
 
 WIDTH = 80
-"""Columns of the help texts."""
+"""Width of the help texts (columns)."""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages."""
-    for name, text in pages():
+    """Add the generated pages to the site, as an event of MkDocs."""
+    for name, text in generate_pages():
         files.append(File.generated(config, name, content=text))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Let the index of rules lead to their pages, which have no file in the repository."""
+    """Link the rules in their index to their pages, as an event of MkDocs."""
+    # The index cannot have these links itself: in a clone, the pages do not exist.
     if page.file.src_uri != "rules.md":
         return markdown
     return re.sub(r"^\| (OSIM\d+) \|", r"| [\1](rules/\1.md) |", markdown, flags=re.MULTILINE)
 
 
-def pages() -> Iterator[tuple[str, str]]:
-    """Yield the name and the text of each page."""
-    yield "reference/commands.md", commands()
-    yield "reference/components.md", components()
+def generate_pages() -> Iterator[tuple[str, str]]:
+    """Generate all pages.
+
+    Yields:
+        Name and text of each page.
+    """
+    yield "reference/commands.md", generate_commands()
+    yield "reference/components.md", generate_components()
     for rule in all_rules():
-        head = f"# {rule.name}\n\n`{rule.code}`, {rule.severity.value} ([all rules](../rules.md#{rule.family}))"
+        severity = f"{rule.severity.value} ([all rules](../rules.md#{rule.family}))"
+        head = f"# {rule.name}\n\n`{rule.code}`, {severity}"
         yield f"rules/{rule.code}.md", f"{head}\n\n{rule.page}\n"
     for group in rule_groups():
         members = [rule for rule in all_rules() if rule.group == group.name]
@@ -57,23 +63,23 @@ def pages() -> Iterator[tuple[str, str]]:
         yield f"rules/{group.code}.md", f"{format_group_page(group)}\n\n{listed}"
 
 
-def commands() -> str:
-    """What every command says of itself."""
+def generate_commands() -> str:
+    """Return the page of all commands with their help texts."""
     parts = [
         "# Commands",
         "Exit codes of all commands: 0 done, 1 problems found, 2 the command could not run.",
     ]
     for command in COMMANDS:
-        parts.append(f"## {command}\n\n```text\n{_help(command)}\n```")
+        parts.append(f"## {command}\n\n```text\n{_format_help(command)}\n```")
     return "\n\n".join(parts) + "\n"
 
 
-def _help(command: str) -> str:
+def _format_help(command: str) -> str:
     return format_help(command, load_command(command), WIDTH).rstrip()
 
 
-def components() -> str:
-    """Every class with its properties, by the area of OpenSim that it belongs to."""
+def generate_components() -> str:
+    """Return the page of all classes with their properties, by modules of the schema."""
     areas: dict[str, list[type[Object]]] = defaultdict(list)
     for tag in list_tags():
         cls = find_class(tag)
@@ -86,38 +92,40 @@ def components() -> str:
     ]
     for area, classes in sorted(areas.items()):
         parts.append(f"## {area.replace('_', ' ')}")
-        parts += [_component(cls) for cls in classes]
+        parts += [_format_component(cls) for cls in classes]
     return "\n\n".join(parts) + "\n"
 
 
-def _component(cls: type[Object]) -> str:
-    lines = [f"### {cls.tag}", "", _text(describe_class(cls))]
+def _format_component(cls: type[Object]) -> str:
+    lines = [f"### {cls.tag}", "", _convert_roles(describe_class(cls))]
     specs = [spec for spec in cls.field_specs().values() if spec.tag != "components"]
     if specs:
-        lines += ["", "| property | holds | default | meaning |", "|---|---|---|---|"]
+        lines += ["", "| property | value | default | meaning |", "|---|---|---|---|"]
         for spec in specs:
-            meaning = _cell(describe_property(spec))
+            meaning = _format_cell(describe_property(spec))
             lines.append(
-                f"| `{spec.tag}` | {_cell(describe_value(spec))} | {_default(spec)} | {meaning} |"
+                f"| `{spec.tag}` | {_format_cell(describe_value(spec))} | {_format_default(spec)} | {meaning} |"
             )
     return "\n".join(lines)
 
 
-def _default(spec: FieldSpec) -> str:
+def _format_default(spec: FieldSpec) -> str:
     if isinstance(spec.kind, ObjectField) or spec.default in (None, "", ()):
         return ""
     text = (
         " ".join(map(repr, spec.default)) if isinstance(spec.default, tuple) else str(spec.default)
     )
+    # OpenSim's files have "true" and "false".
     if isinstance(spec.kind, Value) and spec.kind.scalar == "bool":
         text = text.lower()
     return f"`{text}`"
 
 
-def _text(text: str) -> str:
-    """A docstring as Markdown: roles of other classes become plain words."""
+def _convert_roles(text: str) -> str:
+    """Return a docstring as Markdown, with names in backticks instead of Sphinx's roles."""
     return re.sub(r":[a-z]+:`~?([^`]+)`", r"`\1`", text)
 
 
-def _cell(text: str) -> str:
-    return _text(" ".join(text.split())).replace("|", "\\|")
+def _format_cell(text: str) -> str:
+    """Return a text as the cell of a table: one line, without bars."""
+    return _convert_roles(" ".join(text.split())).replace("|", "\\|")

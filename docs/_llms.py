@@ -1,6 +1,6 @@
-"""The manual for language models: ``llms.txt`` (https://llmstxt.org), and the pages as Markdown beside those in HTML.
+"""The manual for language models: ``llms.txt`` (https://llmstxt.org) and all pages as Markdown.
 
-A hook of MkDocs.
+This is a hook of MkDocs. Its list of pages and their Markdown are written next to the HTML of the site.
 """
 
 from __future__ import annotations
@@ -14,43 +14,50 @@ from mkdocs.structure.files import Files
 from mkdocs.structure.nav import Navigation, Section
 from mkdocs.structure.pages import Page
 
+# The last event of a build has no arguments with them.
 _site: dict[str, Any] = {}
-"""The navigation and the files, which the last step of a build is not given."""
+"""Navigation and files of the site that is being built."""
 
 
 def on_env(env: Any, config: MkDocsConfig, files: Files) -> None:
-    """Keep the files, all of whose pages have been read by now."""
+    """Save the files of the site, whose pages have been read at this event."""
     _site["files"] = files
 
 
 def on_nav(nav: Navigation, **_: Any) -> None:
-    """Keep the navigation."""
+    """Save the navigation of the site."""
     _site["nav"] = nav
 
 
 def on_post_build(config: MkDocsConfig) -> None:
-    """Write the list, and each page at the place that its file has in the folder of the manual."""
+    """Write the list, and the Markdown of each page under the path of its source file."""
     site = Path(config.site_dir)
     for file in _site["files"].documentation_pages():
         target = site / file.src_uri
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(file.page.markdown, encoding="utf-8")
-    (site / "llms.txt").write_text(listed(_site["nav"], config), encoding="utf-8")
+    (site / "llms.txt").write_text(format_list(_site["nav"], config), encoding="utf-8")
 
 
-def listed(nav: Navigation, config: MkDocsConfig) -> str:
-    """The pages of the navigation, each with its first sentence; they have to be read already."""
+def format_list(nav: Navigation, config: MkDocsConfig) -> str:
+    """Return ``llms.txt``: the pages of the navigation, each with its first sentence.
+
+    Args:
+        nav: navigation of the site, whose pages have been read.
+        config: configuration of the site.
+    """
     lines = [f"# {config.site_name}", "", f"> {config.site_description}"]
-    alone = [item for item in nav.items if isinstance(item, Page)]
-    lines += ["", "## Start", "", *(_entry(page, config) for page in alone)]
+    top_pages = [item for item in nav.items if isinstance(item, Page)]
+    lines += ["", "## Start", "", *(_format_entry(page, config) for page in top_pages)]
     for item in nav.items:
         if isinstance(item, Section):
             pages = [page for page in nav.pages if item in page.ancestors]
-            lines += ["", f"## {item.title}", "", *(_entry(page, config) for page in pages)]
+            lines += ["", f"## {item.title}", "", *(_format_entry(page, config) for page in pages)]
     return "\n".join(lines) + "\n"
 
 
-def _entry(page: Page, config: MkDocsConfig) -> str:
+def _format_entry(page: Page, config: MkDocsConfig) -> str:
+    # Remove comments, code blocks, headings, tables and pictures, which are no sentences.
     text = re.sub(
         r"<!--.*?-->|^```.*?^```|^#.*?$|^[|!].*?$", "", page.markdown or "", flags=re.M | re.S
     )

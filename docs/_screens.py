@@ -1,17 +1,17 @@
-"""Show what is on a terminal of 80 columns while each command works on something slow.
+"""Record what a terminal of 80 columns shows while slow commands work.
 
     python docs/_screens.py [WORD ...]               all commands, or those whose names contain a WORD
     python docs/_screens.py --page                   all commands, into the manual's page screens.md
     python docs/_screens.py --picture FILE NAME ...  draw the screens of the commands of these rows
 
 Each command runs at a terminal that this program emulates. The screen is read after 0.5, 2 and 5
-seconds, then Ctrl-C is sent; the command runs again to be stopped after 0.5 s, and after 2 s. The
-table has one row for each command: the time of the first sign of life, the last line on the screen
-at the three times, and the longest time between Ctrl-C and the end. A command that ended before has
-"finished" there. Run it after a change of what commands print while they work.
+seconds, and then Ctrl-C is sent. The command also runs until Ctrl-C after 0.5 s and after 2 s. The table
+has one row for each command: the time of its first output, the last line on the screen at the three
+times, and the longest time between Ctrl-C and the end. "finished" means that the command ended before.
+Run this after a change of what commands print while they work.
 
-On a machine that is busy with other work, set SCREENS_CLOCK=processor (on Linux): the times are then
-the seconds of processor time that the command has used, nearly those of a quiet machine.
+On a busy machine, set SCREENS_CLOCK=processor (Linux only): the times are then the processor time that
+the command has used, which is nearly the time on an idle machine.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ MOMENTS_S = (0.5, 2.0, 5.0)
 MAX_END_S = 20.0
 """Longest wait for the end of a command after Ctrl-C, s."""
 MAX_SLOWDOWN = 30.0
-"""Largest ratio of time to processor time that is waited for."""
+"""Largest ratio of time to processor time; after that, the time counts."""
 POLL_S = 0.02
-"""Time between two looks at the processor time, s."""
+"""Interval at which the processor time is read, s."""
 REPETITIONS = 60
 """Number of times that a recorded motion is repeated, so that work on it takes seconds."""
 MODELS = 40
@@ -110,10 +110,10 @@ COMMANDS = {
 
 @dataclass
 class Recording:
-    """What a terminal showed while a command worked.
+    """Screens of a terminal while a command worked.
 
     Attributes:
-        first: time at which the first character was on the screen, s; None without any.
+        first: time of the first output, s; None without any.
         screens: lines of the screen by the time at which it was read, s.
         ended: time after the start at which the command ended by itself, s; None if it did not.
         stopping: time between Ctrl-C and the end, s.
@@ -137,7 +137,7 @@ def record_command(
     moments: Sequence[float] = MOMENTS_S,
     height: int = LINES,
 ) -> Recording:
-    """Run osimlite at an emulated terminal, read its screen at some times, and send Ctrl-C.
+    """Run osimlite at an emulated terminal, read its screen at several times, and send Ctrl-C.
 
     Args:
         arguments: arguments of osimlite.
@@ -146,6 +146,9 @@ def record_command(
         clone: clone of the repository whose osimlite runs.
         moments: times at which the screen is read, s; the last one is that of Ctrl-C.
         height: height of the terminal.
+
+    Returns:
+        Recording of the screens and of the end.
     """
     started = time.monotonic()
     child, terminal = pty.fork()
@@ -187,7 +190,7 @@ def record_command(
 
 
 def _make_clock(process: int, started: float) -> Callable[[], float]:
-    """Return a function that returns how long a process has worked, s."""
+    """Return a function that returns the time since the start of a process, or its processor time (s)."""
     if os.environ.get("SCREENS_CLOCK") != "processor":
         return lambda: time.monotonic() - started
 
@@ -196,9 +199,9 @@ def _make_clock(process: int, started: float) -> Callable[[], float]:
         # program before them may have blanks, and ends with the last bracket.
         status = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2]
         fields = status.split()
-        used = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-        # A process that waits for its own processes uses no time.
-        return max(used, (time.monotonic() - started) / MAX_SLOWDOWN)
+        processor_time = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        # A process that waits for its child processes uses no time itself.
+        return max(processor_time, (time.monotonic() - started) / MAX_SLOWDOWN)
 
     return read_processor_time
 
@@ -210,13 +213,24 @@ def _feed_until(
     clock: Callable[[], float],
     notice_output: Callable[[], None] = lambda: None,
 ) -> bool:
-    """Feed the output of a command to a screen; return whether it still runs at the end time."""
+    """Feed the output of a command to a screen until a time.
+
+    Args:
+        terminal: descriptor of the terminal.
+        stream: stream of the screen.
+        end: time at which reading ends, s.
+        clock: function that returns the current time, s.
+        notice_output: function that is called at each output.
+
+    Returns:
+        Whether the command still runs.
+    """
     while (left := end - clock()) > 0.0:
         if select.select([terminal], [], [], min(left, POLL_S))[0]:
             try:
                 output = os.read(terminal, 65536)
             except OSError:
-                # Linux reports the end of the last program at a terminal as an error.
+                # Linux reports an error when the last program at a terminal has ended.
                 return False
             if not output:
                 return False
@@ -231,7 +245,7 @@ def _read_lines(screen: pyte.Screen) -> list[str]:
 
 
 def make_inputs(folder: Path) -> None:
-    """Write models, setups and long recordings into a folder."""
+    """Write models, setups and long motions into a folder."""
     for name in ("setups", "pipelines/walking"):
         for path in (ROOT / "fixtures" / name).iterdir():
             shutil.copy(path, folder)
@@ -249,9 +263,9 @@ def make_inputs(folder: Path) -> None:
     many = folder / "many"
     many.mkdir()
     for number in range(MODELS):
-        # Equal files would be checked once.
+        # The linter checks files of equal content only once.
         (many / f"model{number}.osim").write_bytes(model + b"<!-- %d -->\n" % number)
-    # The study of the third is written beside its model.
+    # The third command also writes a study.
     for name, file in (("human", "human"), ("jumper", "jumper"), ("human-walks", "walks")):
         command = [sys.executable, "-m", "osimlite", "build", name, "-o", f"{file}.osim"]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -259,7 +273,13 @@ def make_inputs(folder: Path) -> None:
 
 
 def repeat_rows(source: Path, target: Path, time_column: int) -> None:
-    """Write a table with its rows repeated, each second time backwards, so that nothing jumps."""
+    """Write a table with repeated rows, alternately forwards and backwards so that nothing jumps.
+
+    Args:
+        source: file of the table.
+        target: file to write.
+        time_column: index of the time; in a TRC file it is 1, after the number of the frame.
+    """
     lines = source.read_text(encoding="utf-8").splitlines()
     first = next(
         number
@@ -276,6 +296,7 @@ def repeat_rows(source: Path, target: Path, time_column: int) -> None:
             if time_column:
                 cells[0] = str(len(written) + 1)
             written.append("\t".join(cells))
+    # Headers have the number of rows.
     head = [
         line.replace(f"nRows={len(rows)}", f"nRows={len(written)}").replace(
             f"\t{len(rows)}\t", f"\t{len(written)}\t"
@@ -296,20 +317,20 @@ def _is_number(word: str) -> bool:
 
 
 def measure_command(arguments: list[str], inputs: Path) -> Recording:
-    """Run a command and stop it after each of `MOMENTS_S`; return the last recording.
+    """Run a command several times, and stop it after each of `MOMENTS_S`.
 
     Args:
         arguments: arguments of osimlite.
-        inputs: folder of models, setups and recordings, which stays as it is.
+        inputs: folder of models, setups and motions, which is not changed.
 
     Returns:
-        The recording of the longest run, with the longest time between Ctrl-C and the end.
+        Recording of the longest run, with the longest time of all runs between Ctrl-C and the end.
     """
     longest = 0.0
     for count in range(1, len(MOMENTS_S) + 1):
         with TemporaryDirectory() as name:
-            # Each run starts without results of the one before. Commands replace files as a whole,
-            # so that links are as good as copies.
+            # Each run starts without the results of the previous one. Commands replace files instead of
+            # changing them, so that links are enough.
             folder = shutil.copytree(inputs, Path(name) / "work", copy_function=os.link)
             recording = record_command(arguments, folder, moments=MOMENTS_S[:count])
         if recording.ended is not None:
@@ -331,8 +352,15 @@ def describe_row(name: str, recording: Recording) -> list[str]:
 
 
 def make_table(words: list[str]) -> Iterator[str]:
-    """Yield the lines of the table for the commands whose names contain one of the words, or for all."""
-    yield "| command | first sign, s | after 0.5 s | after 2 s | after 5 s | end after Ctrl-C, s |"
+    """Record commands.
+
+    Args:
+        words: parts of the names of the commands; all commands if empty.
+
+    Yields:
+        Lines of the table in Markdown.
+    """
+    yield "| command | first output, s | after 0.5 s | after 2 s | after 5 s | end after Ctrl-C, s |"
     yield "|---|---|---|---|---|---|"
     with TemporaryDirectory() as name:
         inputs = Path(name)
@@ -354,10 +382,10 @@ def write_page() -> None:
 
 
 def draw_screens(recordings: dict[str, Recording], path: str | Path) -> None:
-    """Draw what a terminal showed: each command, and the last line of its screen at each time.
+    """Draw a terminal with each command, and the last line of its screen at each time.
 
     Args:
-        recordings: recordings by the line that was typed.
+        recordings: recordings by the command line.
         path: PNG file to write.
     """
     import matplotlib
@@ -368,7 +396,7 @@ def draw_screens(recordings: dict[str, Recording], path: str | Path) -> None:
         lines.append((f"$ {command}"[:COLUMNS], "#7ee787"))
         for moment in MOMENTS_S:
             screen = recording.screens.get(moment)
-            # The line of progress is the last one.
+            # Progress is in the last line.
             shown = "(finished)" if screen is None else screen[-1]
             lines.append((f"{moment:>4g} s  {shown}", "#e6edf3"))
         lines.append(("", "#e6edf3"))
@@ -376,7 +404,9 @@ def draw_screens(recordings: dict[str, Recording], path: str | Path) -> None:
     font = ImageFont.truetype(
         str(Path(matplotlib.get_data_path()) / "fonts/ttf/DejaVuSansMono.ttf"), FONT_SIZE
     )
-    width, height = round(font.getlength("m" * (COLUMNS + 8))) + 24, round(1.35 * FONT_SIZE)
+    # The times before the lines need eight columns.
+    width = round(font.getlength("m" * (COLUMNS + 8))) + 24
+    height = round(1.35 * FONT_SIZE)
     image = Image.new("RGB", (width, height * len(lines) + 24), "#0d1117")
     draw = ImageDraw.Draw(image)
     for number, (text, color) in enumerate(lines):
@@ -385,7 +415,12 @@ def draw_screens(recordings: dict[str, Recording], path: str | Path) -> None:
 
 
 def draw_picture(path: str, rows: list[str]) -> None:
-    """Record the commands of some rows, and draw their screens."""
+    """Record commands, and draw their screens.
+
+    Args:
+        path: PNG file to write.
+        rows: names of the commands.
+    """
     with TemporaryDirectory() as name:
         folder = Path(name)
         make_inputs(folder)

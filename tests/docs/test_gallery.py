@@ -14,7 +14,7 @@ PNG = b"\x89PNG\r\n"
 
 
 def test_every_part_has_a_picture_what_makes_it_and_a_page() -> None:
-    parts = gallery.sections(gallery.PAGE.read_text(encoding="utf-8"))
+    parts = gallery.find_sections(gallery.PAGE.read_text(encoding="utf-8"))
     assert len(parts) > 5
     for part in parts:
         (name,) = re.findall(r"^!\[[^]]+\]\(gallery/(.+\.png)\)$", part, re.M)
@@ -26,16 +26,17 @@ def test_a_part_makes_its_picture() -> None:
     pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
     (elbow,) = (
         part
-        for part in gallery.sections(gallery.PAGE.read_text(encoding="utf-8"))
+        for part in gallery.find_sections(gallery.PAGE.read_text(encoding="utf-8"))
         if "elbow.png" in part
     )
-    name, picture = gallery.made(elbow)
+    name, picture = gallery.make_picture(elbow)
     assert name == "elbow.png" and picture.startswith(PNG)
 
 
 def test_every_picture_is_in_the_repository_and_small() -> None:
     names = [
-        gallery.name_of(part) for part in gallery.sections(gallery.PAGE.read_text(encoding="utf-8"))
+        gallery.find_picture_name(part)
+        for part in gallery.find_sections(gallery.PAGE.read_text(encoding="utf-8"))
     ]
     files = {path.relative_to(gallery.FOLDER).as_posix() for path in gallery.FOLDER.rglob("*.png")}
     assert files == {*names}
@@ -74,4 +75,4 @@ def test_pictures_are_shrunk() -> None:
 
     out = io.BytesIO()
     image.new("RGB", (1800, 90), "white").save(out, format="png")
-    assert image.open(io.BytesIO(gallery.shrink(out.getvalue()))).size == (900, 45)
+    assert image.open(io.BytesIO(gallery.shrink_picture(out.getvalue()))).size == (900, 45)

@@ -23,7 +23,7 @@ def test_every_page_is_listed_with_its_first_sentence() -> None:
     nav = get_navigation(get_files(config), config)
     for page in nav.pages:
         page.read_source(config)
-    text = llms.listed(nav, config)
+    text = llms.format_list(nav, config)
     head, *parts = re.split(r"^## ", text, flags=re.M)
     assert re.fullmatch(r"# osimlite\n\n> .+\n\n", head)
     entry = re.compile(r"- \[([^]]+)\]\(([\w/-]+\.md)\): (\S.+)")
