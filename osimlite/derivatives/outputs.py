@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.points import (
     station,
     velocity,
 )
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
@@ -52,7 +52,7 @@ def locate_stations(
     Returns:
         Path, link and point in the link (3,), m, of each station.
     """
-    link_placements = Places(mechanism, {}, packed.placements)
+    link_placements = LinkMap(mechanism, {}, packed.placements)
     return [
         (path, *link_placements.station(body, point.tolist()))
         for path, (body, point) in mechanism.stations.items()
@@ -69,7 +69,7 @@ def locate_frames(mechanism: Mechanism, packed: PackedModel) -> dict[str, tuple[
     Returns:
         Link, and axes and origin in the link (12,), of each frame by its path.
     """
-    link_placements = Places(mechanism, {}, packed.placements)
+    link_placements = LinkMap(mechanism, {}, packed.placements)
     return {
         path: link_placements.frame(frame_placement.body, frame_placement.transform)
         for path, frame_placement in mechanism.frames.items()

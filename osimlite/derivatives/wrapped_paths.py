@@ -21,7 +21,7 @@ from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.kernels.function_paths import FUNCTION_PATH_WORK, FUNCTION_WORK
 from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME
 from osimlite.mechanics.kernels.paths import PATH_WORK
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements import Forces
@@ -59,7 +59,7 @@ class SymbolicPath:
         """Number of symbols: the length, and moment arm and speed for each coordinate."""
         return 1 + 2 * len(self.coordinates)
 
-    def make_records(self, link_placements: Places) -> list[ForceRecord]:
+    def make_records(self, link_placements: LinkMap) -> list[ForceRecord]:
         """Return the records of a path that is a function of coordinates.
 
         See :mod:`osimlite.mechanics.kernels.function_paths`.

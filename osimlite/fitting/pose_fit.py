@@ -22,7 +22,7 @@ from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
 from osimlite.mechanics.kernels.pose_record import FIT
 from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.functions import SmoothFunction
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.constrained import find_free_coordinates
@@ -118,7 +118,7 @@ class PoseFit:
         )
         self.system = _System(unlocked, Forces(()), code=code)
         self.order = list(self.system.order)
-        placements = Places(
+        placements = LinkMap(
             unlocked, {index: k for k, index in enumerate(self.order)}, self.system.placements
         )
         active_goals = [goals[number] for number in self._goals]

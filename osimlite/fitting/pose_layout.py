@@ -14,7 +14,7 @@ from osimlite.mechanics.kernels.pose_fit import POSES
 from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.function_tables import function_table
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.simulation.system import System
 
@@ -106,7 +106,7 @@ class FitLayout:
     def __init__(
         self,
         system: System,
-        placements: Places,
+        placements: LinkMap,
         markers: Sequence[MarkerTarget],
         sensors: Sequence[SensorTarget],
         goals: Sequence[CoordinateTarget],
@@ -214,7 +214,7 @@ class FitLayout:
 
     @staticmethod
     def _list_marker_links(
-        placements: Places, markers: Sequence[MarkerTarget], numbers: list[float]
+        placements: LinkMap, markers: Sequence[MarkerTarget], numbers: list[float]
     ) -> Iterator[int]:
         """Yield the link of each marker; append its point and weight to the numbers."""
         for marker in markers:
@@ -224,7 +224,7 @@ class FitLayout:
 
     @staticmethod
     def _list_sensor_links(
-        placements: Places, sensors: Sequence[SensorTarget], numbers: list[float]
+        placements: LinkMap, sensors: Sequence[SensorTarget], numbers: list[float]
     ) -> Iterator[int]:
         """Yield the link of each sensor; append its rotation and weight to the numbers."""
         for sensor in sensors:

@@ -21,7 +21,7 @@ from osimlite.schema.smooth_muscles import DeGrooteFregly2016Muscle
 
 Range = tuple[float, float]
 """Lower and upper bound."""
-FREE: Range = (-math.inf, math.inf)
+UNBOUNDED: Range = (-math.inf, math.inf)
 """Range without bounds."""
 MIN_TENDON_FORCE = 0.0
 """Lower bound of a normalized tendon force, from ``statebounds_normalized_tendon_force``."""
@@ -45,7 +45,7 @@ class Bounds:
 
     @classmethod
     def from_ranges(
-        cls, motion_range: Range, start_range: Range = FREE, end_range: Range = FREE
+        cls, motion_range: Range, start_range: Range = UNBOUNDED, end_range: Range = UNBOUNDED
     ) -> Bounds:
         """Return bounds in which the ends of the motion are never wider than the motion, as in Moco.
 
@@ -118,8 +118,8 @@ class _VariableInfos:
             return Bounds.from_ranges(default)
         return Bounds.from_ranges(
             read_range(info.bounds) or default,
-            read_range(info.initial_bounds) or FREE,
-            read_range(info.final_bounds) or FREE,
+            read_range(info.initial_bounds) or UNBOUNDED,
+            read_range(info.final_bounds) or UNBOUNDED,
         )
 
 
@@ -143,7 +143,7 @@ def find_control_bounds(
         limits = (
             (actuator.min_control, actuator.max_control)
             if isinstance(actuator, ScalarActuator)
-            else FREE
+            else UNBOUNDED
         )
         result[name] = infos.bounds(name, limits)
     return result
@@ -172,12 +172,12 @@ def find_state_bounds(
     infos = _VariableInfos(phase.state_infos_pattern, phase.state_infos, names)
     # Coordinates have a range, but the schema of coordinates has none for speeds: the phase gives
     # one for all of them.
-    speeds = read_range(phase.default_speed_bounds) or FREE
+    speeds = read_range(phase.default_speed_bounds) or UNBOUNDED
     result = {}
     for name in names:
         path, _, quantity = name.rpartition("/")
         component: Any = components.get(path)
-        default = FREE
+        default = UNBOUNDED
         if quantity == "value":
             default = tuple(component.range)
         elif quantity == "speed":

@@ -228,10 +228,10 @@ def _resample_column(times: Array, column: Array, new_times: Array) -> Array:
     # On the same grid the values are kept, so that a solution evaluates to what was written.
     if len(times) == len(new_times) and np.allclose(times, new_times, rtol=0.0, atol=1e-12):
         return column
-    is_known = np.isfinite(column)
-    if is_known.sum() < MIN_SPLINE_TIMES:
-        return np.interp(new_times, times[is_known], column[is_known])
-    return SampledCurves(times[is_known], column[is_known][:, None]).derivatives(new_times, (0,))[
+    is_finite = np.isfinite(column)
+    if is_finite.sum() < MIN_SPLINE_TIMES:
+        return np.interp(new_times, times[is_finite], column[is_finite])
+    return SampledCurves(times[is_finite], column[is_finite][:, None]).derivatives(new_times, (0,))[
         0
     ][:, 0]
 

@@ -84,7 +84,7 @@ class PointSymbols:
         slacks: velocity corrections or projection slacks, if the point has them.
         p: values of the model's parameters, one for each number of the model.
         parameters: parameters of the problem; each may stand for several of `p`.
-        known: data of the functions of time: the time of the expansion, and value, first and second
+        time_data: data of the functions of time: the time of the expansion, and value, first and second
             derivative of each function there.
         projections: values and speeds at the end of the interval before they are projected onto the
             constraints, if the point has them.
@@ -101,7 +101,7 @@ class PointSymbols:
     slacks: Formula
     p: Formula
     parameters: Formula
-    known: Formula
+    time_data: Formula
     projections: Formula = field(default_factory=lambda: casadi.SX(0, 1))
     linear_systems: list[tuple[Formula, Formula]] = field(default_factory=list)
     _outputs: dict[str, Any] = field(default_factory=dict)
@@ -124,7 +124,7 @@ class PointSymbols:
 
     def evaluate(self, series: TimeFunction) -> Formula:
         """Return the value of a function of time at this point."""
-        value = series.expand(self.t[0], self.known)
+        value = series.expand(self.t[0], self.time_data)
         return value if series.factor is None else self.parameters[series.factor] * value
 
     @cached_property

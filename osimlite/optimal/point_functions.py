@@ -102,7 +102,7 @@ class PointFormula:
         s = SX.sym("s", layout.shared)
         z = SX.sym("z", size)
         fraction = SX.sym("fraction")
-        time_data = SX.sym("known", program.known_size)
+        time_data = SX.sym("known", program.time_data_size)
         point = program.point(s, z, fraction, time_data, number)
         # Rates are per fraction of the motion, as the duration may vary.
         duration = s[1] - s[0]

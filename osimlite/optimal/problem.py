@@ -17,7 +17,7 @@ from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import (
-    FREE,
+    UNBOUNDED,
     Range,
     compute_scaling,
     find_control_bounds,
@@ -149,7 +149,7 @@ class Problem(StudyContext):
         if motion is None and not self.functions.states:
             raise self.invalid_error(self.phase, "the model has no states")
         self.parameters: dict[str, Range] = {
-            parameter.name: read_range(parameter.moco_bounds) or FREE
+            parameter.name: read_range(parameter.moco_bounds) or UNBOUNDED
             for parameter in self.phase.parameters
         }
         # A parameter may stand for several equal numbers of the model.
@@ -267,8 +267,8 @@ class Problem(StudyContext):
         Raises:
             DocumentError: the motion cannot end after its start.
         """
-        initial = read_range(self.phase.time_initial_bounds) or FREE
-        final = read_range(self.phase.time_final_bounds) or FREE
+        initial = read_range(self.phase.time_initial_bounds) or UNBOUNDED
+        final = read_range(self.phase.time_final_bounds) or UNBOUNDED
         if final[1] <= initial[0]:
             raise self.invalid_error(
                 self.phase.time_final_bounds,
@@ -397,7 +397,7 @@ class Problem(StudyContext):
             if is_active:
                 # Moco's costs are squares of the scaled variables.
                 scaling = (
-                    compute_scaling(*(read_range(bounds) or FREE))
+                    compute_scaling(*(read_range(bounds) or UNBOUNDED))
                     if solver.scale_variables_using_bounds
                     else (1.0, 0.0)
                 )
@@ -550,7 +550,7 @@ class Problem(StudyContext):
                 )
             if factor.name in self.parameters:
                 raise self.invalid_error(factor, "another parameter has this name")
-            self.parameters[factor.name] = read_range(factor) or FREE
+            self.parameters[factor.name] = read_range(factor) or UNBOUNDED
 
     @property
     def model_weight(self) -> float:

@@ -38,7 +38,7 @@ class Program:
     Attributes:
         problem: optimal control problem.
         layout: layout of the variables w.
-        known_size: number of data of the functions of time at a point.
+        time_data_size: number of data of the functions of time at a point.
         integrals: goals with an integrand, with their terms.
         groups: groups of points with the same variables.
         labels: labels of the rows of g (m,).
@@ -64,7 +64,7 @@ class Program:
         self.times: Array = np.zeros(0)
         self.lower: Array = np.zeros(0)
         self.upper: Array = np.zeros(0)
-        self.known_size = 1 + 3 * len(problem.time_functions)
+        self.time_data_size = 1 + 3 * len(problem.time_functions)
         self.integrals: list[Any] = [
             (goal, terms) for goal, terms in problem.goals if terms.integrand is not None
         ]
@@ -127,7 +127,7 @@ class Program:
             projections=variables["projections"],
             p=casadi.vertcat(*parameters) if parameters else SX(0, 1),
             parameters=s[2:],
-            known=time_data,
+            time_data=time_data,
         )
 
     def _make_ends(self) -> None:
@@ -140,7 +140,7 @@ class Program:
         z0 = SX.sym("z0", len(layout.point_indices[0]))
         z1 = SX.sym("z1", len(layout.point_indices[last_point]))
         totals = SX.sym("integrals", len(self.integrals))
-        time_data = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
+        time_data = [SX.sym(f"known{k}", self.time_data_size) for k in range(2)]
         start = self.point(s, z0, SX(0.0), time_data[0], 0)
         end = self.point(s, z1, SX(1.0), time_data[1], last_point)
         costs = []

@@ -26,16 +26,16 @@ class SimulationCheck:
 
     Attributes:
         times: times of the solution (n,), s.
-        apart: absolute difference of each coordinate (n,) by its path, rad or m.
+        deviations: absolute difference of each coordinate (n,) by its path, rad or m.
     """
 
     times: Array
-    apart: dict[str, Array]
+    deviations: dict[str, Array]
 
     @property
     def largest(self) -> Array:
         """Return the largest difference of all coordinates at each time (n,), rad or m."""
-        result: Array = np.max([*self.apart.values()], axis=0)
+        result: Array = np.max([*self.deviations.values()], axis=0)
         return result
 
     @property
@@ -48,7 +48,7 @@ class SimulationCheck:
 
     def __str__(self) -> str:
         """Return the summary line of the command ``run --simulate``."""
-        at_end = {path: float(column[-1]) for path, column in self.apart.items()}
+        at_end = {path: float(column[-1]) for path, column in self.deviations.items()}
         worst_path = max(at_end, key=lambda path: at_end[path])
         return (
             f"within {MATCH_TOLERANCE:g} rad or m of the solution until {self.matches_until:.4g} s of {self.times[-1]:.4g} s; "

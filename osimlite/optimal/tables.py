@@ -180,14 +180,14 @@ def _append_coupled_values(
         for name in independent:
             problem.check_name(operator, name, table.columns, "column", owner="the table")
         arguments = np.column_stack([table[name] for name in independent])
-        kept_columns = [
+        other_columns = [
             k for k, name in enumerate(table.columns) if name != paths[coupler.dependent]
         ]
         # Couplers are functions of rad and m, hence the refusal of degrees before.
         values = [coupler.function.evaluate(row)[0] for row in arguments]
-        columns = (*(table.columns[k] for k in kept_columns), paths[coupler.dependent])
+        columns = (*(table.columns[k] for k in other_columns), paths[coupler.dependent])
         table = replace(
-            table, columns=columns, rows=np.column_stack([table.rows[:, kept_columns], values])
+            table, columns=columns, rows=np.column_stack([table.rows[:, other_columns], values])
         )
     return table
 

@@ -66,7 +66,7 @@ class BatchOptions(IntegrationOptions):
         event_states: whether states at events are recorded.
         most_tries: largest number of attempted steps of a run.
         threads: number of threads; by default one for each core.
-        held: controllers of the runs; the last function of each of their controls is a constant.
+        controllers: controllers of the runs; the last function of each of their controls is a constant.
     """
 
     to: float = 2.0
@@ -76,7 +76,7 @@ class BatchOptions(IntegrationOptions):
     event_states: bool = False
     most_tries: int = UNLIMITED_TRIES
     threads: int | None = None
-    held: Sequence[KernelController] = ()
+    controllers: Sequence[KernelController] = ()
 
     def check(self) -> None:
         """Check the values, since machine code might never end with wrong ones.
@@ -162,17 +162,17 @@ class UpdatedModel:
         mechanism: mechanism of the model.
         forces: forces of the model.
         numbers: numbers of the model, see `BatchEngine.numbers` (m,).
-        given: engine of the model before the change.
+        engine: engine of the model before the change.
     """
 
     mechanism: Mechanism
     forces: Forces
     numbers: Floats
-    given: Any
+    engine: Any
 
     def make_engine(self) -> Any:
         """Return an engine with these numbers."""
-        return self.given.copy_with_numbers(self.mechanism, self.forces, self.numbers)
+        return self.engine.copy_with_numbers(self.mechanism, self.forces, self.numbers)
 
 
 class ModelUpdater(Protocol):

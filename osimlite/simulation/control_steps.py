@@ -91,8 +91,8 @@ class KernelController:
     paths: tuple[str, ...]  # paths of the controls, in the controller's order
     step: float  # length of a control step, s
     sensors: tuple[str, ...]  # labels of the recorded sensors
-    senses: Ints  # plan of the sensor row, see :mod:`osimlite.mechanics.kernels.sensors`
-    known: Floats  # numbers of the sensor row
+    sensor_plan: Ints  # plan of the sensor row, see :mod:`osimlite.mechanics.kernels.sensors`
+    sensor_numbers: Floats  # numbers of the sensor row
     plan: Ints  # integers of the reflexes, see :mod:`osimlite.mechanics.kernels.reflexes`
     numbers: Floats  # numbers of the reflexes
     gains: Mapping[str, float]  # gains by name, from which the numbers follow
@@ -251,7 +251,7 @@ class ControllerRuns:
         self._before = earlier_record
         self.next_step: float | None = None
         plan = first_controller.plan.copy()
-        senses = first_controller.senses
+        sensor_plan = first_controller.sensor_plan
         # All runs use the memory of the longest delay.
         plan[REFLEXES.KEPT] = max(controller.plan[REFLEXES.KEPT] for controller in controllers)
         plan[REFLEXES.MEMORY_SIZE] = max(
@@ -261,7 +261,7 @@ class ControllerRuns:
             [controls.names.index(path) for path in first_controller.paths]
         ]
         self._memory = np.zeros((count, plan[REFLEXES.MEMORY_SIZE]))
-        rows = np.zeros((count, senses[SENSES.SIZE]))
+        rows = np.zeros((count, sensor_plan[SENSES.SIZE]))
         # UNKNOWN lets the first sensors decide the state of a leg; legs without states keep 0.
         self._memory[:, :LEGS] = (
             LEG_STATE.UNKNOWN if plan[REFLEXES.HAS_STATES] else LEG_STATE.EARLY_STANCE
@@ -274,10 +274,10 @@ class ControllerRuns:
             plan[REFLEXES.ROWS] = first_controller.count_steps(to) + 2 - plan[REFLEXES.FIRST]
         self._record = np.empty((plan[REFLEXES.ROWS], len(first_controller.columns)))
         self._plan = plan
-        known = np.stack([controller.known for controller in controllers])
+        sensor_numbers = np.stack([controller.sensor_numbers for controller in controllers])
         numbers = np.concatenate([controller.numbers for controller in controllers])
         self.parts = (
-            *(senses, known, control_offsets, plan, numbers),
+            *(sensor_plan, sensor_numbers, control_offsets, plan, numbers),
             *(self._memory, rows, self._excitations, self._record, self._progress),
         )
 

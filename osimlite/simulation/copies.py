@@ -38,7 +38,7 @@ class Copies:
     Attributes:
         states: states of all copies (w, y) in the engine's order; they are changed in place.
         controls: names of the actuators, in the order of the controls.
-        places: offsets of the controls in the numbers of the model (c,).
+        control_offsets: offsets of the controls in the numbers of the model (c,).
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Copies:
         )
         self.engine.set_controls(constant_controls)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
-        self.places = find_constant_offsets(engine, constant_controls)
+        self.control_offsets = find_constant_offsets(engine, constant_controls)
         batch_options = BatchOptions(to=step, **options.integration_choices())
         batch_options.check()
         self.batch = BatchWorkspace(
@@ -109,9 +109,9 @@ class Copies:
         self._run_on_all_cores(
             "hold_several",
             self._parts,
-            self.places,
+            self.control_offsets,
             np.array(controls, dtype=np.float64, order="C"),
-            len(self.places),
+            len(self.control_offsets),
             running,
         )
         return running > 0

@@ -92,7 +92,7 @@ class StateEvaluator:
         self._items, self._owners = packed.items, packed.owners
         item_offsets = {owner: index for index, owner in packed.owners.items()}
         probes = (k for k, item in enumerate(forces.elements) if isinstance(item, DeclaredProbe))
-        self._probe_places = [item_offsets.get(k, 0) for k in probes]
+        self._probe_offsets = [item_offsets.get(k, 0) for k in probes]
         self._w = np.zeros(self.structure[MODEL.WORK_SIZE])
         self._links = self._view_rows(MODEL.WORK_LINK, MODEL.LINKS, LINK_WORK.SIZE)
         self._pairs = self._view_rows(MODEL.WORK_CONTACT, MODEL.CONTACTS, CONTACT_WORK.SIZE)

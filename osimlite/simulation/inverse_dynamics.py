@@ -136,16 +136,16 @@ def inverse_dynamics(
     """
     external_loads = resolve_loads(external_loads, applied_to)
     excluded = [*exclude]
-    pushed = model
+    evaluated_model = model
     if find_excluded_forces(model, excluded):
         # The caller's model stays as it is; a copy is needed only if forces are switched off.
-        pushed = model.copy_deep()
-        exclude_forces(pushed, excluded)
-    mechanism = build_mechanism(pushed, opensim_derivatives=opensim_derivatives)
+        evaluated_model = model.copy_deep()
+        exclude_forces(evaluated_model, excluded)
+    mechanism = build_mechanism(evaluated_model, opensim_derivatives=opensim_derivatives)
     recorded = prepare_motion(mechanism, motion, times, False, lowpass, start, end)
     # Forces that the caller excludes were switched off in the copy.
     forces = force_elements(
-        pushed, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder
+        evaluated_model, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder
     )
     table = recorded.inverse_dynamics(forces)
     return GeneralizedForces(table.name, table.times, table.columns, table.rows, motion=recorded)

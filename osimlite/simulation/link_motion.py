@@ -124,8 +124,8 @@ class LinkMotion:
         Returns:
             Rotations (t, 3, 3) and origins (t, 3), m, in ground.
         """
-        link, placed = self._get_link(body)
-        frame = placed @ frame
+        link, body_in_link = self._get_link(body)
+        frame = body_in_link @ frame
         if link is None:
             count = len(self.links)
             return np.tile(frame[:3, :3], (count, 1, 1)), np.tile(frame[:3, 3], (count, 1))

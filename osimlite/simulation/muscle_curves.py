@@ -300,16 +300,16 @@ class _Muscle(NamedTuple):
                 y[index] = self.activation
         try:
             y = system.equilibrate_muscles(0.0, y)
-            is_settled = system.realize(0.0, y, STAGE.FORCE) == OUTCOME.OK
+            is_computed = system.realize(0.0, y, STAGE.FORCE) == OUTCOME.OK
         except SimulationError:
-            is_settled = False
+            is_computed = False
         record = {
             name: system.read_record(element.path, index)
             for name, index in element.force_type.record_offsets.items()
         }
         # The path has a length also where the muscle has no equilibrium; other columns stay NaN.
         result = {"length": record["length"]}
-        if is_settled:
+        if is_computed:
             cos, fibers = record["cos_pennation"], record["fiber_length"]
             result |= {
                 "fiber_length": fibers,

@@ -103,7 +103,7 @@ class Packer(LinkPacker):
     def pack_model(self) -> PackedModel:
         """Write all records of the model, and return the packed model."""
         ints = self.ints
-        self.mechanism_records(*select_constraints(self.places.mechanism, self.order))
+        self.mechanism_records(*select_constraints(self.link_map.mechanism, self.order))
         if self.chain is not None:
             from osimlite.simulation.pack_chain import pack_chain
 
@@ -122,7 +122,7 @@ class Packer(LinkPacker):
         laws = tuple(dict.fromkeys(self.laws))
         offset_tables = self.kernels, self.equilibria, self.responses, self.runs, self.owners
         return PackedModel(
-            structure, numbers, laws, *offset_tables, self.order, self.places.placements, result
+            structure, numbers, laws, *offset_tables, self.order, self.link_map.placements, result
         )
 
     def write_items(self) -> list[list[tuple[int, int]]]:
@@ -134,7 +134,7 @@ class Packer(LinkPacker):
         Returns:
             Records of the items of each element in the work vector, as (offset, length).
         """
-        groups = [element.make_records(self.places) for element in self.elements]
+        groups = [element.make_records(self.link_map) for element in self.elements]
         self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)
         contact = self.ints[MODEL.WORK_CONTACT] = self.reserve_work(
             CONTACT_WORK.SIZE * self.ints[MODEL.CONTACTS]

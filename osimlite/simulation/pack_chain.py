@@ -104,7 +104,7 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
     """
     function = joint.function
     coordinates = list(joint.coordinates)
-    freedoms = [packer.places.freedom(coordinate) for coordinate in coordinates]
+    freedoms = [packer.link_map.freedom(coordinate) for coordinate in coordinates]
     for number, operation in enumerate(packer.operations):
         if operation.joint != joint.source:
             continue
@@ -118,7 +118,7 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
         if is_ball and isinstance(function, EllipsoidPoint):
             return JOINT_KIND.ELLIPSOID, number, function.component, freedoms
         if is_ball and len(coordinates) == 1 and coordinates[0] in operation.arguments:
-            angles = [packer.places.freedom(coordinate) for coordinate in operation.arguments]
+            angles = [packer.link_map.freedom(coordinate) for coordinate in operation.arguments]
             return JOINT_KIND.ANGLE, number, operation.arguments.index(coordinates[0]), angles
         if operation.function is function and operation.arguments == coordinates:
             return JOINT_KIND.AMOUNT_OF, number, 0, freedoms
@@ -182,7 +182,7 @@ def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[i
     """
     result: list[int] = []
     for body, moment in excess:
-        link = carrier = packer.places.placements[body].link
+        link = carrier = packer.link_map.placements[body].link
         # Links without a degree of freedom of their own move with their parents.
         while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
             carrier = packer.links[carrier].parent

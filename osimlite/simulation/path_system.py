@@ -14,7 +14,7 @@ from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.mechanics.kernels.paths import NODE_WORK, PATH_WORK
 from osimlite.mechanics.kernels.wrapping import WRAP_WORK
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.force_records import ForceRecord, Silent
 from osimlite.simulation.elements.geometries.path import Path as Along
@@ -49,16 +49,16 @@ class MeasuredPath(Silent):
         """Return the subject of the message for a pose in which the path has no length."""
         return f"'{self.path}': the path has no length in this pose"
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the force records of the path.
 
         Args:
-            places: links and offsets of the packed mechanism.
+            link_map: links and offsets of the packed mechanism.
 
         Returns:
             The records; the last one, the path, is evaluated although no force uses it.
         """
-        *inner_records, path_record = self.along.make_records(places)
+        *inner_records, path_record = self.along.make_records(link_map)
         return [*inner_records, replace(path_record, is_part=False)]
 
 

@@ -12,7 +12,7 @@ from osimlite.mechanics.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.mechanics.multibody.constraints import Lock
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.force_records import ForceRecord
@@ -54,11 +54,11 @@ class TraceablePath(Protocol):
             Index of the body (-1 for ground), and the position (3,), m.
         """
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the force records of the path.
 
         Args:
-            places: links and offsets of the packed mechanism.
+            link_map: links and offsets of the packed mechanism.
 
         Returns:
             The records; the last one is the path, those before it are its points and surfaces.
@@ -110,7 +110,7 @@ class Polylines:
         self._calls: list[int] = []
         for route in routes:
             offset = len(ints)
-            for item in route.make_records(program.tree.places):
+            for item in route.make_records(program.tree.link_map):
                 offset = len(ints)
                 ints += [
                     self._number_law(item.kernel, offset),

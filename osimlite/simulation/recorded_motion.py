@@ -222,9 +222,9 @@ class RecordedMotion(Movement):
             )
             if column is not None:
                 result[index] = column
-                turned = table.in_degrees and info.motion_type == "rotational"
+                is_in_degrees = table.in_degrees and info.motion_type == "rotational"
                 values[:, index] = (
-                    np.radians(table.rows[:, column]) if turned else table.rows[:, column]
+                    np.radians(table.rows[:, column]) if is_in_degrees else table.rows[:, column]
                 )
         # Speeds in a file of states are recomputed from the values, and states of forces do not
         # belong to a pose.

@@ -252,7 +252,7 @@ class Simulation:
             fixed_step=fixed_step,
             route=self.engine.route,
             show=options.show,
-            held=runs,
+            controller_runs=runs,
             **options.integration_choices(),
         )
         recorder, stepper, states = self._integrate_motion(y, settings, times, options.progress)
@@ -289,7 +289,7 @@ class Simulation:
         )
         # An error without a single step has no motion to show.
         if isinstance(stepper.ended, SimulationError):
-            stepper.ended.trajectory = trajectory if stepper.taken else None
+            stepper.ended.trajectory = trajectory if stepper.accepted else None
             raise stepper.ended
         if stepper.ended is not None:
             raise Interrupted(trajectory)

@@ -210,13 +210,13 @@ class Extreme:
 
     Args:
         operation: a key of `EXTREME_RULES`.
-        is_known: whether the search starts at 0, as in OpenSim for a prescribed motion, which is
+        starts_at_zero: whether the search starts at 0, as in OpenSim for a prescribed motion, which is
             not integrated.
     """
 
-    def __init__(self, operation: str, *, is_known: bool = False) -> None:
+    def __init__(self, operation: str, *, starts_at_zero: bool = False) -> None:
         self._extreme, self._is_new = EXTREME_RULES[operation]
-        if is_known:
+        if starts_at_zero:
             self._extreme = 0.0
 
     def evaluate(self, t: float, value: float) -> float:
@@ -310,7 +310,9 @@ def compute_probe_rows(
 
     def make_memory(operation: str) -> Rate | Extreme:
         """Return the state of a measure that depends on earlier steps."""
-        return Rate() if operation == "differentiate" else Extreme(operation, is_known=not steps)
+        return (
+            Rate() if operation == "differentiate" else Extreme(operation, starts_at_zero=not steps)
+        )
 
     memories = [
         [make_memory(probe.operation) for _ in probe.reading.labels] if need_steps([probe]) else []
@@ -359,7 +361,7 @@ def summarize_integration(
     return {
         "integrator": stepper.name,
         "settings": dict(settings),
-        "steps": stepper.taken,
+        "steps": stepper.accepted,
         "attempted_steps": stepper.attempted,
         "evaluations": stepper.evaluations,
         "wall_time_s": wall,

@@ -52,7 +52,7 @@ class SharedForces:
         """Return the activations as a table."""
         return StoTable(TITLE, self.times, self.names, self.activations)
 
-    def describe_lack(self, row: int) -> str:
+    def describe_missing_force(self, row: int) -> str:
         """Describe which coordinates lack force at a time without a solution.
 
         Args:
@@ -82,5 +82,5 @@ class SharedForces:
         counts = f"{len(failed)} of {format_count(len(self.times), 'time')}"
         return (
             f"no solution at {counts} (the first is {self.times[failed[0]]:g} s), where the tables have NaN; "
-            f"at {self.times[worst]:g} s the actuators lack {self.describe_lack(worst)}"
+            f"at {self.times[worst]:g} s the actuators lack {self.describe_missing_force(worst)}"
         )

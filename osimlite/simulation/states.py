@@ -50,14 +50,14 @@ def sort_by_component(model: Model, paths: Sequence[str]) -> list[str]:
     components = model.tree().by_path
     rank = {path: number for number, path in enumerate(components)}
 
-    def place(path: str) -> int:
+    def get_sort_index(path: str) -> int:
         owner = path.rpartition("/")[0]
         # OpenSim lists a joint's coordinates where the joint is.
         if isinstance(components.get(owner), Coordinate):
             owner = owner.rpartition("/")[0]
         return rank.get(owner, len(rank))
 
-    return sorted(paths, key=place)
+    return sorted(paths, key=get_sort_index)
 
 
 class StateLayout:

@@ -112,14 +112,14 @@ class StaticOptimization:
         # Coordinates that constraints determine need no balance of their own: their forces act on
         # the free ones by `directions`.
         dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
-        self._free = [
+        self._free_indices = [
             index
             for index, info in enumerate(mechanism.coordinates)
             if not (info.locked or info.prescribed is not None or index in dependent)
             and not tree.find(info.path).is_free_to_satisfy_constraints
         ]
         self.names = tuple(item.name for item in self._actuators)
-        free_coordinates = [mechanism.coordinates[index] for index in self._free]
+        free_coordinates = [mechanism.coordinates[index] for index in self._free_indices]
         self.coordinates = tuple(coordinate.name for coordinate in free_coordinates)
         self.units = tuple(
             "N m" if coordinate.motion_type == "rotational" else "N"
@@ -402,7 +402,7 @@ class StaticOptimization:
             Accelerations (t, n), and the motion of all coordinates with each free one (t, n, m).
         """
         size = len(self.mechanism.coordinates)
-        free = self._free
+        free = self._free_indices
         directions = np.zeros((len(times), size, len(free)))
         directions[:, free, range(len(free))] = 1.0
         udot = target_accelerations.copy()
@@ -488,12 +488,12 @@ class StaticOptimization:
         )
         # The null space of G: all motions that the constraints allow.
         directions = right_vectors[rank:].T
-        free = directions[self._free]
+        free = directions[self._free_indices]
         if np.linalg.matrix_rank(free) < directions.shape[1]:
             names = [
                 info.name
                 for index, info in enumerate(self.mechanism.coordinates)
-                if index not in self._free
+                if index not in self._free_indices
             ]
             raise UnsupportedError(
                 f"{join_words(names)} can move while all other coordinates rest; lock or couple them"
@@ -502,7 +502,7 @@ class StaticOptimization:
         start = np.linalg.pinv(equations) @ targets
         free_inverse = np.linalg.pinv(free)
         return start + directions @ (
-            free_inverse @ (target_accelerations - start)[self._free]
+            free_inverse @ (target_accelerations - start)[self._free_indices]
         ), directions @ free_inverse
 
     def report_forces(self, shared: SharedForces, values: Array, speeds: Array) -> StoTable:

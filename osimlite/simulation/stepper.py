@@ -56,7 +56,7 @@ class Stepper(ABC):
         state: state y at this time; every step makes a new list.
         derivative: function f(time, state) that returns the derivative of the state.
         evaluations: number of calls of f so far.
-        taken: number of accepted steps so far.
+        accepted: number of accepted steps so far.
         ended: exception that ended a table before its last time: Ctrl-C, or an error of the motion.
     """
 
@@ -77,7 +77,7 @@ class Stepper(ABC):
         self.state = list(y)
         self.derivative = self._evaluate(t, self.state)
         self.evaluations = 1
-        self.taken = 0
+        self.accepted = 0
         if len(self.derivative) != len(self.state):
             raise ValueError(
                 f"f returns {len(self.derivative)} derivatives for {len(self.state)} states"
@@ -92,7 +92,7 @@ class Stepper(ABC):
     @property
     def attempted(self) -> int:
         """Number of attempted steps: more than accepted ones if steps are repeated with a smaller length."""
-        return self.taken
+        return self.accepted
 
     def catch_up(self) -> None:  # noqa: B027
         """Make the outstanding calls of `observe`.
@@ -181,7 +181,7 @@ class Stepper(ABC):
         self.time = t
         self.state = y
         self.evaluations += 1
-        self.taken += 1
+        self.accepted += 1
         if self._observe is not None:
             self._observe(t, y)
 

@@ -51,7 +51,7 @@ class System(StateEvaluator):
         """
         self.compute_applied_forces(t, y)
         result = []
-        for probe, item_offset in zip(self.probes, self._probe_places, strict=True):
+        for probe, item_offset in zip(self.probes, self._probe_offsets, strict=True):
             # Some probes, such as of momentum, are computed in Python from the links; the others
             # have a kernel.
             if probe.probe_type.measure is not None:

@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody.constraints import ConstraintEquations, Couple
 from osimlite.mechanics.multibody.dynamics import mass_matrix
 from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 from osimlite.mechanics.multibody.linear import solve_least_norm
-from osimlite.mechanics.multibody.links import Link, LinkTree, Placement, Places
+from osimlite.mechanics.multibody.links import Link, LinkMap, LinkTree, Placement
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.program import PackedMechanism
@@ -120,7 +120,7 @@ def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> PackedMecha
     """
     count = len(mechanism.bodies)
     links = [Link(GROUND, []) for _ in range(count)]
-    placements = Places(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
+    placements = LinkMap(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
     return PackedMechanism(
         LinkTree(links, [*range(0, 6 * count + 1, 6)], tuple(range(6 * count)), placements),
         (constraint,),

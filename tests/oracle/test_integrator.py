@@ -67,7 +67,7 @@ def manager_run(model, until, accuracy=None, method=None):
 
 
 def counts(integrator):
-    return integrator.taken, integrator.attempted, integrator.evaluations
+    return integrator.accepted, integrator.attempted, integrator.evaluations
 
 
 @pytest.mark.parametrize("code", [MACHINE_CODE, PYTHON_CODE], ids=lambda code: code.name)

@@ -262,8 +262,8 @@ def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
     )
     (end,), steps = ours.tabulate([2.0]).tolist(), list(theirs.iterate_steps(2.0))
     assert end == steps[-1][1]
-    assert (ours.taken, ours.attempted, ours.evaluations) == (
-        theirs.taken,
+    assert (ours.accepted, ours.attempted, ours.evaluations) == (
+        theirs.accepted,
         theirs.attempted,
         theirs.evaluations,
     )

@@ -154,7 +154,7 @@ def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
     # Rosenbrock's method takes 30 times as many steps at 1e-8 as at 1e-5.
     accuracies = (1e-5, 1e-8) if order > 2 else choose((1e-4, 1e-6), (1e-5, 1e-7))
     loose, tight = (
-        steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in accuracies
+        steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].accepted for accuracy in accuracies
     )
     assert tight / loose == pytest.approx(
         (accuracies[0] / accuracies[1]) ** (1.0 / power), rel=0.25
@@ -179,7 +179,7 @@ def test_rosenbrock_has_order_3():
 def test_error_follows_the_accuracy(method, accuracy):
     y, stepper = steps_of(oscillator, [1.0, 0.0], accuracy, method)
     error = max(abs(y[0] - math.cos(3.0)), abs(y[1] + math.sin(3.0)))
-    assert 1e-3 * accuracy < error < 2.0 * accuracy * stepper.taken
+    assert 1e-3 * accuracy < error < 2.0 * accuracy * stepper.accepted
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -76,7 +76,7 @@ def test_error_follows_the_accuracy(accuracy):
     error = max(abs(y[0] - math.cos(10.0)), abs(y[1] + math.sin(10.0)))
     # No step may err by more than the accuracy; an oscillator does not amplify what was erred
     # before.
-    assert error < 2.0 * accuracy * integrator.taken
+    assert error < 2.0 * accuracy * integrator.accepted
     assert error > 1e-3 * accuracy
 
 
@@ -195,11 +195,11 @@ def test_counts():
     f = Counting(pendulum)
     integrator = runge_kutta_merson(f, 0.0, [3.0, 0.0], 1)
     steps = list(integrator.iterate_steps(10.0))
-    assert len(steps) == integrator.taken
-    assert integrator.attempted > integrator.taken
-    assert integrator.evaluations == 1 + 4 * integrator.attempted + integrator.taken
+    assert len(steps) == integrator.accepted
+    assert integrator.attempted > integrator.accepted
+    assert integrator.evaluations == 1 + 4 * integrator.attempted + integrator.accepted
     # A step that is taken by itself looks at its start once more.
-    assert f.calls == integrator.evaluations + integrator.taken
+    assert f.calls == integrator.evaluations + integrator.accepted
     together = Counting(pendulum)
     runge_kutta_merson(together, 0.0, [3.0, 0.0], 1).tabulate([10.0])
     assert integrator.evaluations < together.calls < f.calls
@@ -244,7 +244,7 @@ def test_no_number_in_a_trial_step_only():
     integrator = runge_kutta_merson(f, 0.0, [0.0], 0)
     _, y = last(integrator.iterate_steps(0.1))
     assert y[0] == pytest.approx(1.0, abs=1e-3)
-    assert integrator.attempted > integrator.taken
+    assert integrator.attempted > integrator.accepted
 
 
 def test_overflow_in_a_trial_step_only():
@@ -260,7 +260,7 @@ def test_overflow_in_a_trial_step_only():
     integrator = runge_kutta_merson(steep, 0.0, [8.0], 0)
     _, y = last(integrator.iterate_steps(0.1))
     assert y[0] == pytest.approx(0.0, abs=5e-3)
-    assert failures and integrator.attempted > integrator.taken
+    assert failures and integrator.attempted > integrator.accepted
 
 
 def test_overflow_for_good():

@@ -208,7 +208,7 @@ class _Search:
     def __init__(
         self, mechanism: Mechanism, target: Array, time: float, fixed_values: Mapping[int, float]
     ) -> None:
-        self.mechanism, self.wanted, self.time = mechanism, target, time
+        self.mechanism, self.target, self.time = mechanism, target, time
         self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
         self.free = [index for index in range(len(target)) if index not in fixed_values]
         self.start = target.copy()
@@ -235,12 +235,12 @@ class _Search:
 
     def compute_cost(self, q: Array) -> float:
         """Return half the sum of squared changes of the coordinates that count."""
-        return 0.5 * float(np.sum(self.counted * (q - self.wanted) ** 2))
+        return 0.5 * float(np.sum(self.counted * (q - self.target) ** 2))
 
     def compute_step(self, q: Array) -> Array:
         """Return Newton's step (n,) along the surface, with the curvature of the constraints."""
         rows = self._compute_rows(self._compute_state(q))
-        gradient = (self.counted * (q - self.wanted))[self.free]
+        gradient = (self.counted * (q - self.target))[self.free]
         weights = self.counted[self.free]
         # Multipliers by least squares, so that redundant constraints do no harm.
         multipliers = np.asarray(
@@ -332,7 +332,7 @@ class _Search:
         return (ahead - behind) / 2e-6
 
     def _spread_over_coordinates(self, step: Array) -> Array:
-        full = np.zeros(len(self.wanted))
+        full = np.zeros(len(self.target))
         full[self.free] = step
         return full
 

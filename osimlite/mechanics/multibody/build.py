@@ -141,21 +141,21 @@ class _Builder:
         ground = self.placements.path(self.model.ground)
         index = {body.path: number for number, body in enumerate(bodies)} | {ground: GROUND}
         self._build_constraints(index)
-        placed = self.placements
-        for path, (base, _) in placed.found.items():
+        placements = self.placements
+        for path, (base, _) in placements.resolved.items():
             if base not in index:
                 raise UnsupportedError(
                     f"the frame '{path}' is neither a body of the model nor fixed to one; remove it"
                 )
         frames = {
             path: FramePlacement(index[base], matrix)
-            for path, (base, matrix) in placed.found.items()
+            for path, (base, matrix) in placements.resolved.items()
         }
         stations = {}
         for component in self.tree.components:
             if isinstance(component, Station) and not self.tree.is_internal(component):
-                base, location = placed.resolve_station(component)
-                stations[placed.path(component)] = StationPlacement(index[base], location)
+                base, location = placements.resolve_station(component)
+                stations[placements.path(component)] = StationPlacement(index[base], location)
         gravity = np.array(self.model.gravity, dtype=float)
         return Mechanism(
             self.model.name,
@@ -359,7 +359,7 @@ class _Builder:
             )
         )
         part_indices.append(len(bodies) - 1)
-        part_mass = complete_mass.share(len(part_indices))
+        part_mass = complete_mass.divide(len(part_indices))
         for part_index in part_indices:
             # OpenSim gives all parts but the body itself the inertia about the origin per kg of
             # body.

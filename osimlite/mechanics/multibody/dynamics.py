@@ -91,9 +91,9 @@ class MassCentres:
 
     def _spins(self) -> Array:
         """Return the angular momenta of the bodies about their mass centres (b, 3), in kg m²/s."""
-        turned = self.state.rotations[:-1]
+        rotations = self.state.rotations[:-1]
         # Inertias are stored along body axes: R I Rᵀ along those of ground.
-        inertias = turned @ self.state.mechanism.inertial[2] @ turned.transpose(0, 2, 1)
+        inertias = rotations @ self.state.mechanism.inertial[2] @ rotations.transpose(0, 2, 1)
         return (inertias @ self.state.velocities[:-1, :3, None])[:, :, 0]
 
 

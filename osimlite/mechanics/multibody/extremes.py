@@ -38,11 +38,11 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
                 return function(*values, **named)
         except (ArithmeticError, ValueError) as fault:
             # Errors of osimlite have messages for users; others come from the arithmetic.
-            is_meant = isinstance(fault, OsimliteError)
+            is_expected = isinstance(fault, OsimliteError)
             is_numeric = (
                 isinstance(fault, ArithmeticError | np.linalg.LinAlgError) or str(fault) in _OF_MATH
             )
-            if is_meant or not is_numeric:
+            if is_expected or not is_numeric:
                 raise
             models = [value for value in (*values, *named.values()) if isinstance(value, Model)]
             extreme_number = next(

@@ -109,7 +109,7 @@ class Formula:
                 name, equals, body = definition.partition("=")
                 if not name or not equals:
                     raise FormulaError(f"'{definition}' has no name; write name = formula")
-                reader.known[name] = reader.read(body)
+                reader.step_numbers[name] = reader.read(body)
             steps = reader.ending_with(reader.read(main))
         except FormulaError as wrong:
             error_class = (
@@ -133,7 +133,7 @@ class Formula:
         derivatives = {variable: reader.add("number", value=1.0)}
         for index, step in enumerate(self.steps, start=first):
             # The rules are formulas in x and y, which are the registers of the arguments here.
-            reader.known = dict(zip("xy", step.arguments, strict=False))
+            reader.step_numbers = dict(zip("xy", step.arguments, strict=False))
             for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
                 if argument in derivatives:
                     contribution = reader.add("*", reader.read(rule), derivatives[argument])
@@ -182,14 +182,14 @@ class _FormulaReader(SimplifiedSteps):
         Raises:
             FormulaError: the text is no formula.
         """
-        called, wants_operand = "", True
+        function_name, wants_operand = "", True
         for token in _TOKEN.finditer(text):
             word = token.group()
             if wants_operand and token["name"] and text.startswith("(", token.end()):
-                called = word
+                function_name = word
             elif wants_operand and word == "(":
-                self._open_parenthesis(called)
-                called = ""
+                self._open_parenthesis(function_name)
+                function_name = ""
             elif wants_operand and word == "-":
                 self._push_operation("negative", SIGN, 0)
             elif wants_operand and not token["sign"]:
@@ -220,12 +220,12 @@ class _FormulaReader(SimplifiedSteps):
         word = token.group()
         if token["number"]:
             return self.add("number", value=float(word))
-        if word not in self.known:
+        if word not in self.step_numbers:
             # It may be simplified away, or be in an unused definition.
             if word not in self.unknown:
                 self.unknown.append(word)
             return self.add(UNKNOWN, value=float(self.unknown.index(word)))
-        return self.known[word]
+        return self.step_numbers[word]
 
     def _push_operation(
         self, law: str, precedence: int, operand_count: int, name: str = ""

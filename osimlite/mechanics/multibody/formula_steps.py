@@ -56,13 +56,13 @@ class SimplifiedSteps:
         variables: names of the variables, which are in the first registers.
 
     Attributes:
-        known: registers of the names that may be used.
+        step_numbers: registers of the names that may be used.
         unknown: unknown names that were used.
         steps: steps of all formulas so far.
     """
 
     def __init__(self, variables: Sequence[str]) -> None:
-        self.known = {name: index for index, name in enumerate(variables)}
+        self.step_numbers = {name: index for index, name in enumerate(variables)}
         self.unknown: list[str] = []
         self.steps: list[FormulaStep] = []
         self._registers: dict[FormulaStep, int] = {}
@@ -396,9 +396,11 @@ class SimplifiedSteps:
         """
         if step.law == UNKNOWN:
             word = self.unknown[int(step.value)]
-            suggestion = suggest_name(word, self.known)
+            suggestion = suggest_name(word, self.step_numbers)
             available = (
-                f"there is {join_words(list(self.known))}" if self.known else "it has no variables"
+                f"there is {join_words(list(self.step_numbers))}"
+                if self.step_numbers
+                else "it has no variables"
             )
             raise UnknownNameError(f"there is no '{word}'{suggestion}; {available}")
         if step.law == "number" and math.isnan(step.value):

@@ -28,7 +28,7 @@ from osimlite.mechanics.multibody.motions import (
     JointMotion,
     SimbodyAccelerationError,
     SphericalMotion,
-    place,
+    make_fixed_transform,
     rotate_about,
     translate,
 )
@@ -110,12 +110,12 @@ def make_scapulothoracic_motions(
     x, y = np.asarray(winging_origin, dtype=float).tolist()
     axis = (-math.sin(winging_direction), math.cos(winging_direction), 0.0)
     return (
-        place(quarter),
+        make_fixed_transform(quarter),
         SphericalMotion((0, 1, 2), np.asarray(radii, dtype=float)[[1, 0, 2]]),
-        place(quarter.T),
-        place(None, (x, y, 0.0)),
+        make_fixed_transform(quarter.T),
+        make_fixed_transform(None, (x, y, 0.0)),
         rotate_about(axis, 3),
-        place(None, (-x, -y, 0.0)),
+        make_fixed_transform(None, (-x, -y, 0.0)),
     )
 
 

@@ -131,8 +131,8 @@ class MechanismKinematics:
     def origins(self) -> Array:
         """Origin of each body in ground (b + 1, 3), m."""
         rows = self._links
-        turned = rows[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, 3:]
-        return rows[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + turned[:, :, 0]
+        rotated_offsets = rows[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, 3:]
+        return rows[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + rotated_offsets[:, :, 0]
 
     @cached_property
     def jacobians(self) -> Array:

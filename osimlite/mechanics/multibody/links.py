@@ -66,7 +66,7 @@ class Placement(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Places:
+class LinkMap:
     """Degrees of freedom of coordinates, and links of bodies."""
 
     mechanism: Mechanism  # mechanism of the model
@@ -134,8 +134,8 @@ class Operation:
     function: Any = None  # function that gives the amount, None if a coordinate does
     radii: Array = field(default_factory=lambda: np.zeros(3))  # half axes of an ellipsoid, m
     axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # axis of a slide
-    turns: list[Operation | None] = field(default_factory=list)  # rotations of a drift's joint
-    looked_at: list[int] = field(default_factory=list)  # sign and two coordinates of a drift
+    rotations: list[Operation | None] = field(default_factory=list)  # rotations of a drift's joint
+    drift_inputs: list[int] = field(default_factory=list)  # sign and two coordinates of a drift
     joint: str = ""  # path of the joint
 
 
@@ -156,7 +156,7 @@ class LinkTree(NamedTuple):
     links: list[Link]  # links, parents first
     ends: list[int]  # 0, then the end of the degrees of freedom of each link
     order: tuple[int, ...]  # index in the mechanism of the coordinate of each degree of freedom
-    places: Places  # degrees of freedom and links by coordinates and bodies
+    link_map: LinkMap  # degrees of freedom and links by coordinates and bodies
 
 
 def tree_of(
@@ -194,7 +194,7 @@ def tree_of(
         order += sorted(indices & free)
         ends.append(len(order))
     freedoms = {index: number for number, index in enumerate(order)}
-    return LinkTree(links, ends, tuple(order), Places(mechanism, freedoms, placements))
+    return LinkTree(links, ends, tuple(order), LinkMap(mechanism, freedoms, placements))
 
 
 def _list_operations(
@@ -239,7 +239,7 @@ def _list_operations(
                         MOTION.ACCELERATION_ERROR,
                         frame,
                         [],
-                        looked_at=[sign, *joint_coordinates[:2]],
+                        drift_inputs=[sign, *joint_coordinates[:2]],
                     )
                 )
                 drifts.append((result[-1], motion))
@@ -276,7 +276,7 @@ def _list_operations(
     for operation in result:
         operation.joint = mobilizer.joint
     for operation, drift in drifts:
-        operation.turns = [of_motion.get(id(turn)) for turn in drift.turns]
+        operation.rotations = [of_motion.get(id(turn)) for turn in drift.rotations]
     return result, frame
 
 
@@ -336,11 +336,11 @@ class LinkPacker:
     """Packer of a mechanism into the vectors of the kernels."""
 
     def __init__(self, tree: LinkTree) -> None:
-        self.links, self.ends, self.order, self.places = tree
+        self.links, self.ends, self.order, self.link_map = tree
         self.operations = [operation for link in self.links for operation in link.operations]
         # The head of the model, and the addresses of all laws, which are filled in later.
         self.ints: list[int] = [0] * (MODEL.LAWS + len(LAW_NUMBERS))
-        self.numbers: list[float] = [float(x) for x in self.places.mechanism.gravity]
+        self.numbers: list[float] = [float(x) for x in self.link_map.mechanism.gravity]
         self.work = WORK.SIZE
         self.entries = 0
         self.balls: dict[tuple[int, ...], int] = {}
@@ -443,7 +443,7 @@ class LinkPacker:
         """Degrees of freedom that are the amount of a single one-axis operation only."""
         users: dict[int, list[Operation]] = {}
         for item in self.operations:
-            for freedom in {self.places.freedom(index) for index in item.arguments}:
+            for freedom in {self.link_map.freedom(index) for index in item.arguments}:
                 users.setdefault(freedom, []).append(item)
         return {
             freedom
@@ -461,20 +461,20 @@ class LinkPacker:
         for number, item in enumerate(self.operations):
             freedom, law, gradient = -1, OPERATION.ALONE, 0
             extra = len(self.numbers)
-            freedoms = [self.places.freedom(index) for index in item.arguments]
-            looked_at: list[int] = []
+            freedoms = [self.link_map.freedom(index) for index in item.arguments]
+            drift_ints: list[int] = []
             if item.kind == MOTION.ACCELERATION_ERROR:
                 law = self.require_law("place_drift")
                 # The number of the law that moves follows that of the law that places, see
                 # `BALL_MOVES`.
                 self.require_law("move_drift")
-                sign, *watched = item.looked_at
-                looked_at = [
+                sign, *watched = item.drift_inputs
+                drift_ints = [
                     sign,
-                    *(self.places.freedom(index) for index in watched),
+                    *(self.link_map.freedom(index) for index in watched),
                     *[-1] * (2 - len(watched)),
                 ]
-                looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
+                drift_ints += [-1 if turn is None else numbers[id(turn)] for turn in item.rotations]
             elif item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 law = self.require_law("place_ball")
                 self.require_law("move_ball")
@@ -483,7 +483,7 @@ class LinkPacker:
                 freedom = freedoms[0]
                 law = OPERATION.ALONE if freedom in self.simple_freedoms else OPERATION.TOGETHER
             else:
-                infos = [self.places.mechanism.coordinates[index] for index in item.arguments]
+                infos = [self.link_map.mechanism.coordinates[index] for index in item.arguments]
                 table = function_table(
                     item.function, f"the function of an axis of the joint '{infos[0].joint}'"
                 )
@@ -491,7 +491,7 @@ class LinkPacker:
                 self.numbers += [*(info.default_value for info in infos), *table]
                 gradient = self.reserve_work(len(freedoms))
             arguments = len(self.ints)
-            self.ints += [*freedoms, *looked_at]
+            self.ints += [*freedoms, *drift_ints]
             if item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 self.balls[tuple(freedoms)] = arguments
             self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = (
@@ -520,7 +520,7 @@ class LinkPacker:
         size = self.ints[MODEL.DOFS]
         self.ints[MODEL.CONSTRAINED] = start
         self.ints += [0] * CONSTRAINED.SIZE
-        constraints = [constraint_record(item, self.places, self.balls) for item in enforced]
+        constraints = [constraint_record(item, self.link_map, self.balls) for item in enforced]
         records: list[int] = []
         equations = 0
         for constraint in constraints:

@@ -194,8 +194,8 @@ class Mechanism(MechanismStructure):
             frame: name of a frame or body.
             q: coordinate values.
         """
-        body, placed = self.placement(frame)
-        return self.at(q).transform(body) @ placed
+        body, frame_in_body = self.placement(frame)
+        return self.at(q).transform(body) @ frame_in_body
 
     def station_position(self, frame: str, station: ArrayLike, q: Values) -> Array:
         """Return the position in ground of a point of a frame (3,), m.
@@ -217,7 +217,7 @@ class Mechanism(MechanismStructure):
             Position (3,) in m, by absolute path.
         """
         state = self.at(q)
-        return {path: state.point(*placed) for path, placed in self.stations.items()}
+        return {path: state.point(*placement) for path, placement in self.stations.items()}
 
     def station_velocity(self, frame: str, station: ArrayLike, q: Values, u: Values) -> Array:
         """Return the velocity in ground of a point of a frame (3,), m/s.
@@ -494,8 +494,8 @@ class Mechanism(MechanismStructure):
         """
         total = self._convert_to_array(forces, "force")
         for name, (force, torque) in wrenches.items():
-            body, placed = self.placement(name)
+            body, frame_in_body = self.placement(name)
             # Spatial vectors have the angular part first.
             load = np.concatenate((make_vector(torque, "torque"), make_vector(force, "force")))
-            total = total + load @ state.point_jacobian(body, placed[:3, 3])
+            total = total + load @ state.point_jacobian(body, frame_in_body[:3, 3])
         return total

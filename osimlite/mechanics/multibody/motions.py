@@ -142,11 +142,11 @@ class SimbodyAccelerationError(JointMotion):
     angle of the same number.
 
     Attributes:
-        turns: the three rotations of the joint, which follow this motion.
-        coordinates: empty, because the motion depends on those of `turns`.
+        rotations: the three rotations of the joint, which follow this motion.
+        coordinates: empty, because the motion depends on those of `rotations`.
     """
 
-    turns: tuple[AxisMotion, ...]
+    rotations: tuple[AxisMotion, ...]
     coordinates: tuple[int, ...] = ()
 
     def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
@@ -156,18 +156,20 @@ class SimbodyAccelerationError(JointMotion):
             The rotations; none where Simbody makes no error.
         """
         # A constant drives nothing, whatever its arguments.
-        turned = [
-            set() if isinstance(turn.function, ConstantValue) else set(turn.coordinates)
-            for turn in self.turns
+        drivers = [
+            set() if isinstance(rotation.function, ConstantValue) else set(rotation.coordinates)
+            for rotation in self.rotations
         ]
         # No error if the second rotation is constant, or only the first coordinate drives the first
         # rotation and none of the others; the same for the third rotation and the first two
         # coordinates.
         if (
-            not turned[1] or (turned[0] <= {0} and not turned[1] & {0} and not turned[2] & {0})
-        ) and (not turned[2] or (turned[0] | turned[1] <= {0, 1} and not turned[2] & {0, 1})):
+            not drivers[1] or (drivers[0] <= {0} and not drivers[1] & {0} and not drivers[2] & {0})
+        ) and (not drivers[2] or (drivers[0] | drivers[1] <= {0, 1} and not drivers[2] & {0, 1})):
             return ()
-        coordinates = tuple(sorted(set().union(*(turn.coordinates for turn in self.turns))))
+        coordinates = tuple(
+            sorted(set().union(*(rotation.coordinates for rotation in self.rotations)))
+        )
         return tuple(
             AxisMotion(
                 "rotate",
@@ -184,7 +186,7 @@ class AccelerationErrorAngle(SmoothFunction):
     """Angle of zero with a rate of zero, whose acceleration is a component of Simbody's error."""
 
     drift: SimbodyAccelerationError
-    places: tuple[int, ...]  # indices of its arguments among the coordinates of the joint
+    argument_indices: tuple[int, ...]  # indices of its arguments among the coordinates of the joint
     component: int  # component of the error, 0, 1 or 2
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
@@ -316,7 +318,7 @@ def translate(axis: Sequence[float], coordinate: int) -> AxisMotion:
     return AxisMotion("translate", np.array(axis), (coordinate,))
 
 
-def place(
+def make_fixed_transform(
     rotation: Array | None = None, translation: Sequence[float] | None = None
 ) -> FixedTransform:
     """Return a fixed transform.

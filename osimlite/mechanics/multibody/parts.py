@@ -29,7 +29,7 @@ class MassProperties:
         c = self.center
         return self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
 
-    def share(self, count: int) -> MassProperties:
+    def divide(self, count: int) -> MassProperties:
         """Return one of `count` equal parts in the same position."""
         return MassProperties(self.mass / count, self.center, self.inertia / count)
 

@@ -67,11 +67,11 @@ class PackedMechanism:
         self.constraints = {id(item): number for number, item in enumerate(constraints)}
         self.bound = frozenset(index for item in constraints for index in item.coordinates)
         self.on_bodies = any(item.bodies for item in constraints)
-        placements = [*tree.places.placements, tree.places.placement(GROUND)]
+        placements = [*tree.link_map.placements, tree.link_map.placement(GROUND)]
         self.links = np.array([item.link for item in placements])
         self.frames = np.array([item.frame for item in placements])
         # Keep a reference to each constraint, so that its identity is not given to another object.
-        self._kept = [*constraints]
+        self._references = [*constraints]
         self._others: dict[int, PackedMechanism] = {}
 
     def find_program(self, constraint: ConstraintEquations) -> PackedMechanism:

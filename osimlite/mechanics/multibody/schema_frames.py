@@ -24,7 +24,7 @@ class Placements:
 
     def __init__(self, tree: Tree) -> None:
         self.tree = tree
-        self.found: dict[str, tuple[str, Array]] = {}
+        self.resolved: dict[str, tuple[str, Array]] = {}
         """Body (or ground) of each frame so far, and the frame's transform in it (4, 4), by path."""
 
     def resolve_frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
@@ -44,19 +44,19 @@ class Placements:
         # Each waiting frame is fixed to the next one. A list instead of recursion, because a chain
         # of frames may be of any length.
         frame_path = self.path(frame)
-        waiting = {} if frame_path in self.found else {frame_path: frame}
+        waiting = {} if frame_path in self.resolved else {frame_path: frame}
         while waiting:
             path, unresolved = next(reversed(waiting.items()))
             parent_frame = next(
                 (
                     item
                     for item in self._list_parent_frames(unresolved)
-                    if self.path(item) not in self.found
+                    if self.path(item) not in self.resolved
                 ),
                 None,
             )
             if parent_frame is None:
-                self.found[path] = self._place_frame(unresolved, path)
+                self.resolved[path] = self._resolve_in_parent(unresolved, path)
                 del waiting[path]
             elif (parent_path := self.path(parent_frame)) in waiting:
                 raise ModelError(
@@ -64,7 +64,7 @@ class Placements:
                 )
             else:
                 waiting[parent_path] = parent_frame
-        return self.found[frame_path]
+        return self.resolved[frame_path]
 
     def _list_parent_frames(self, frame: PhysicalFrame) -> list[PhysicalFrame]:
         """Return the frames that a frame is defined by."""
@@ -77,7 +77,7 @@ class Placements:
             ]
         return []
 
-    def _place_frame(self, frame: PhysicalFrame, path: str) -> tuple[str, Array]:
+    def _resolve_in_parent(self, frame: PhysicalFrame, path: str) -> tuple[str, Array]:
         """Return the body that a frame is fixed to, and the frame in it.
 
         Args:

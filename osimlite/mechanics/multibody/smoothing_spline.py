@@ -121,8 +121,8 @@ class SampledCurves:
         # Points that are nearly equal determine no slope between them within rounding: drop the
         # later ones.
         is_distinct = np.diff(scaled_points, prepend=-1.0) > TOUCHING
-        self._start, self._places = points[0], scaled_points[is_distinct]
-        self._pieces = _compute_pieces(self._places, values[is_distinct], half_order)
+        self._start, self._scaled_points = points[0], scaled_points[is_distinct]
+        self._pieces = _compute_pieces(self._scaled_points, values[is_distinct], half_order)
 
     def derivatives(self, arguments: ArrayLike, orders: Sequence[int]) -> tuple[Array, ...]:
         """Return derivatives of the splines.
@@ -136,7 +136,10 @@ class SampledCurves:
         """
         scaled_arguments = (np.asarray(arguments, dtype=float) - self._start) / self._scale
         scaled_derivatives = (
-            (order, _evaluate_derivative(self._places, self._pieces, scaled_arguments, order))
+            (
+                order,
+                _evaluate_derivative(self._scaled_points, self._pieces, scaled_arguments, order),
+            )
             for order in orders
         )
         return tuple(values / self._scale**order for order, values in scaled_derivatives)

@@ -65,7 +65,7 @@ class MechanismStructure:
                 raise ModelError(
                     f"body '{body.name}' stands before the body that carries it; sort the bodies from ground outwards"
                 )
-        indices = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
+        indices = sorted(index for body in self.bodies for index in body.mobilizer.coordinates)
         if indices != list(range(len(self.coordinates))):
             raise ModelError(
                 f"the joints of '{self.name}' do not share out its coordinates one by one"
@@ -101,16 +101,16 @@ class MechanismStructure:
             ModelError: the name is unknown or ambiguous.
         """
         try:
-            return self._coordinate_places[name]
+            return self._coordinate_indices[name]
         except KeyError:
-            alike = [info.path for info in self.coordinates if info.name == name]
-            if alike:
+            same_named = [info.path for info in self.coordinates if info.name == name]
+            if same_named:
                 raise ModelError(
-                    f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(alike)}"
+                    f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(same_named)}"
                 ) from None
             names = self.coordinate_names
-            known = join_words(names, max_count=MAX_NAMED_COORDINATES)
-            suggestion = suggest_name(name, names) or (f"; it has {known}" if names else "")
+            name_list = join_words(names, max_count=MAX_NAMED_COORDINATES)
+            suggestion = suggest_name(name, names) or (f"; it has {name_list}" if names else "")
             raise ModelError(f"'{self.name}' has no coordinate '{name}'{suggestion}") from None
 
     def placement(self, name: str) -> FramePlacement:
@@ -137,7 +137,7 @@ class MechanismStructure:
         return self._convert_to_array(u, "speed", self._default_speeds)
 
     @cached_property
-    def _coordinate_places(self) -> dict[str, int]:
+    def _coordinate_indices(self) -> dict[str, int]:
         indices = {info.path: index for index, info in enumerate(self.coordinates)}
         indices.update((name, index) for index, name in enumerate(self.coordinate_names))
         return indices
@@ -176,8 +176,10 @@ class MechanismStructure:
             frame: name of a frame or body.
             station: point in the frame (3,), m.
         """
-        body, placed = self.placement(frame)
-        point: Array = placed[:3, :3] @ make_vector(station, "station") + placed[:3, 3]
+        body, frame_in_body = self.placement(frame)
+        point: Array = (
+            frame_in_body[:3, :3] @ make_vector(station, "station") + frame_in_body[:3, 3]
+        )
         return body, point
 
     def _convert_to_array(

@@ -129,11 +129,11 @@ def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -
     tracked = [name for name in measured_names if name in paths or not goal.allow_unused_references]
     for name in tracked:
         problem.check_name(goal, name, paths, "marker")
-    given_weights = {
+    explicit_weights = {
         marker_weight.name: marker_weight.weight
         for marker_weight in reference.marker_weights.objects
     }
-    weights = [given_weights.get(name, reference.default_weight) for name in tracked]
+    weights = [explicit_weights.get(name, reference.default_weight) for name in tracked]
     labels = [f"{name}_{k}" for name in tracked for k in (1, 2, 3)]
     series = fit_splines(problem, table, labels)
 

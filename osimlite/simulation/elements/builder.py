@@ -40,7 +40,7 @@ class ElementBuilder:
         mechanism: mechanism of the model.
         folder: folder of the model's file.
         early_return: whether to reproduce Simbody's defect in contact of several surfaces.
-        own_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
+        own_activation_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
         wrapping: "opensim" or "geodesic".
         rigid_tendons: whether muscles are computed with rigid tendons and without states.
 
@@ -51,7 +51,7 @@ class ElementBuilder:
         reads_files: whether an element has used a file.
         drives: drives of the controllers that were read so far, by the paths of the controllers.
         early_return: whether to reproduce Simbody's defect in contact of several surfaces.
-        own_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
+        own_activation_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
         geodesic: whether paths bend around surfaces along geodesics.
         rigid_tendons: whether muscles are computed with rigid tendons and without states.
 
@@ -65,7 +65,7 @@ class ElementBuilder:
         mechanism: Mechanism,
         folder: Path,
         early_return: bool = False,
-        own_times: bool = False,
+        own_activation_times: bool = False,
         wrapping: str = OPENSIM,
         rigid_tendons: bool = False,
     ) -> None:
@@ -80,7 +80,7 @@ class ElementBuilder:
         self._of: dict[type, list[Any]] = {}
         self.drives: dict[str, list[Drive]] = {}
         self.early_return = early_return
-        self.own_times = own_times
+        self.own_activation_times = own_activation_times
         self.geodesic = wrapping == GEODESIC
         self.rigid_tendons = rigid_tendons
 

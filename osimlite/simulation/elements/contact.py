@@ -13,7 +13,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, ITEM
 from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_energy
 from osimlite.mechanics.laws.vectors import cross, minus, plus, vector
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import HuntCrossleyForce
@@ -107,7 +107,7 @@ class PairContact:
     vt: float
     early_return: bool = False
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records that the kernels compute.
 
         Args:
@@ -164,7 +164,7 @@ class PairContact:
         return result
 
     def pack_pair(
-        self, pair: ContactPair, places: Places
+        self, pair: ContactPair, places: LinkMap
     ) -> tuple[tuple[int, int], tuple[float, ...]]:
         """Return links and numbers of a pair.
 
@@ -192,7 +192,7 @@ class PairContact:
             self.vt,
         )
 
-    def _make_early_return(self, places: Places) -> ForceRecord:
+    def _make_early_return(self, places: LinkMap) -> ForceRecord:
         """Return the record that computes the pairs one by one in Simbody's order.
 
         Args:
@@ -348,7 +348,7 @@ class HuntCrossley(PairContact):
         return cls(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
 
 
-def _pack_shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
+def _pack_shape(surface: ContactSurface, places: LinkMap) -> tuple[float, ...]:
     """Return an ellipsoid or a sphere as numbers of a kernel.
 
     Args:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.states import StateVariable
 
 
@@ -86,7 +86,7 @@ class ForceElement(Protocol):
             One entry for each state.
         """
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records that the kernels compute.
 
         Args:

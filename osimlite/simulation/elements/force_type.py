@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.schema.resolution import derives_from, is_a
 from osimlite.schema.states import list_states
 from osimlite.simulation.elements.builder import ElementBuilder
@@ -252,7 +252,7 @@ class ForceType:
         """Generator of the kernels of this type."""
         return KernelText(self)
 
-    def make_records(self, force: DeclaredForce, places: Places) -> list[ForceRecord]:
+    def make_records(self, force: DeclaredForce, places: LinkMap) -> list[ForceRecord]:
         """Return the records of a force: the parts of its geometry, then the force itself.
 
         Args:
@@ -344,7 +344,7 @@ class DeclaredForce:
         """
         return tuple(state for state in self.optional_states if state is not None)
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records that the kernels compute; none if the force type has no outputs."""
         return (
             self.force_type.make_records(self, places)
@@ -451,7 +451,7 @@ class ForceOff(Silent, DeclaredForce):
 
     form = OFF
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records of the force; none if its states do not change."""
         return super().make_records(places) if self.force_type.states_change_when_off else []
 

@@ -22,7 +22,7 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import angular_velocity, station, velocity
 from osimlite.mechanics.laws.elastic_foundation import FoundationSpring, spring_load
 from osimlite.mechanics.laws.vectors import ZERO, Vector, minus, plus, times
-from osimlite.mechanics.multibody.links import Placement, Places
+from osimlite.mechanics.multibody.links import LinkMap, Placement
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.schema.contact_forces import ElasticFoundationForce
@@ -90,7 +90,7 @@ class ElasticFoundation(PairContact):
             force.transition_velocity,
         )
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return a contact record for each pair, then the records that compute them."""
         contacts = [
             ForceRecord("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True)
@@ -100,7 +100,7 @@ class ElasticFoundation(PairContact):
             self._make_pair(number, pair, places) for number, pair in enumerate(self.pairs)
         ]
 
-    def _make_pair(self, number: int, pair: ContactPair, places: Places) -> ForceRecord:
+    def _make_pair(self, number: int, pair: ContactPair, places: LinkMap) -> ForceRecord:
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
         links, numbers = self.pack_pair(pair, places)
         # The kernel takes the springs of one mesh; two meshes are computed in Python.

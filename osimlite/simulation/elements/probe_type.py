@@ -26,7 +26,7 @@ from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.table import PARAMETERS, compile_text
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import SmoothFunction
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import CONTROLS, ForceElement, ForceRecord, Silent
 from osimlite.simulation.elements.force_type import DeclaredForce
@@ -183,7 +183,7 @@ class DeclaredProbe(Silent):
         labels = self.reading.labels if self.operation == INTEGRATE else ()
         return tuple(StateVariable(f"{self.path}/{label}", is_named=False) for label in labels)
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the record that the kernels compute; none if the probe has no law."""
         if self.probe_type.law is None:
             return []

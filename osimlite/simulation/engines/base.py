@@ -114,7 +114,9 @@ class KernelEngine(System):
                 names=self.state.names,
                 projected=self.project_state,
             )
-        return ControlledSteps(self, t, y, settings, observe, held=settings.held)
+        return ControlledSteps(
+            self, t, y, settings, observe, controller_runs=settings.controller_runs
+        )
 
     def project_state(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
         """Return the nearest state that fulfils the constraints.

@@ -44,7 +44,7 @@ class BatchWorkspace:
         most_logged: largest number of steps in the log, which all runs share.
         start_holds: whether the initial states fulfil the constraints; otherwise the runs start
             from the nearest states that do.
-        held: controllers of the runs, which write into the numbers of each run; None without
+        controller_runs: controllers of the runs, which write into the numbers of each run; None without
             controllers.
 
     Attributes:
@@ -74,14 +74,14 @@ class BatchWorkspace:
         levels: Floats = NO_WATCH_LEVELS,
         most_logged: int = 0,
         start_holds: bool = False,
-        held: ControllerRuns | None = None,
+        controller_runs: ControllerRuns | None = None,
     ) -> None:
         self.states = engine.state.to_table(states)
         (count, size), pairs = self.states.shape, len(engine.contacts)
         self._engine = engine
         self._kinds = kinds
         self._levels = levels
-        self._held = held
+        self._controller_runs = controller_runs
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
         self._settings = options.to, options.accuracy, *engine.error_counts, *options.step_bounds
@@ -153,7 +153,9 @@ class BatchWorkspace:
         run_arrays = self._sizes, self.clocks, self.counts, self.states
         records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
         law, controller_parts = (
-            ("run_several", ()) if self._held is None else ("run_by_reflexes", self._held.parts)
+            ("run_several", ())
+            if self._controller_runs is None
+            else ("run_by_reflexes", self._controller_runs.parts)
         )
         further_arrays = *records, self._kinds, self._levels, self.endings, *controller_parts
         self._call_law(

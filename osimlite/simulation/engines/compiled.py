@@ -84,15 +84,23 @@ def run_many(
         )
     kinds, levels = _encode_watches(engine, options.watches)
     controller_runs = None
-    if options.held:
-        if len(options.held) != count:
-            raise OsimliteError(f"{len(options.held)} controllers are given for {count} runs")
-        first, *others = options.held
+    if options.controllers:
+        if len(options.controllers) != count:
+            raise OsimliteError(
+                f"{len(options.controllers)} controllers are given for {count} runs"
+            )
+        first, *others = options.controllers
         controller_runs = first.make_runs(engine, engine.forces.controls, other_controllers=others)
         # Each run writes its held controls into its own numbers.
         vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
     batch = BatchWorkspace(
-        engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=controller_runs
+        engine,
+        starts,
+        options,
+        vectors=vectors,
+        kinds=kinds,
+        levels=levels,
+        controller_runs=controller_runs,
     )
 
     def work(first: int) -> None:
@@ -147,12 +155,12 @@ def locate_contacts(
         if rows is None
         else np.array(rows, dtype=np.int64)
     )
-    places = np.zeros((len(state_table), len(engine.contacts), 9))
+    contact_points = np.zeros((len(state_table), len(engine.contacts), 9))
     w = np.zeros(engine.structure[MODEL.WORK_SIZE])
     derivative = np.zeros(engine.state.size)
-    arrays = vectors, w, vectors.shape[1], which, state_table, derivative, places
+    arrays = vectors, w, vectors.shape[1], which, state_table, derivative, contact_points
     engine.program.code.get_entry("contact_places")(engine.program.ints, *arrays, len(state_table))
-    return places
+    return contact_points
 
 
 def get_contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
@@ -200,12 +208,12 @@ def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[I
                 f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them"
             )
         if watch.coordinate:
-            place = mechanism.coordinate_index(watch.coordinate)
-            if place not in engine.order:
+            coordinate = mechanism.coordinate_index(watch.coordinate)
+            if coordinate not in engine.order:
                 raise OsimliteError(
                     f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked"
                 )
-            kinds[row] = record.WATCH.COORDINATE, engine.order.index(place), watch.stops
+            kinds[row] = record.WATCH.COORDINATE, engine.order.index(coordinate), watch.stops
             levels[row, 6] = watch.level
         elif watch.contact:
             if watch.contact not in engine.contacts:
@@ -214,10 +222,10 @@ def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[I
             kinds[row] = record.WATCH.TOUCH, engine.contacts.index(watch.contact), watch.stops
         else:
             body, frame = mechanism.placement(watch.body)
-            link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]
+            link, body_in_link = (-1, np.eye(4)) if body < 0 else engine.placements[body]
             # The kernels know links, not bodies, so the point is expressed in the frame of the
             # link.
-            station = (placed @ frame @ np.array((*watch.station, 1.0)))[:3]
+            station = (body_in_link @ frame @ np.array((*watch.station, 1.0)))[:3]
             kinds[row] = record.WATCH.HEIGHT, link, watch.stops
             levels[row] = (*station, *watch.direction, watch.level)
     return kinds, levels

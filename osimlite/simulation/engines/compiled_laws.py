@@ -32,8 +32,8 @@ from osimlite.mechanics.codegen.toolchain import (
     library_suffix,
 )
 from osimlite.simulation.elements.laws import find_law, get_symbol
-from osimlite.simulation.engines.kept_results import cache_folders
 from osimlite.simulation.engines.private_files import read_private, write_private
+from osimlite.simulation.engines.result_cache import cache_folders
 
 _log = logging.getLogger(__name__)
 
@@ -160,14 +160,14 @@ def _save_library(library: Path) -> Path | None:
             return path
         except OsimliteError as error:
             refusals.append(str(error))
-    warn_once(
+    warn_first_time(
         f"machine code is compiled again in every run, because it cannot be saved: {'; '.join(refusals)}"
     )
     return None
 
 
 @cache
-def warn_once(sentence: str) -> None:
+def warn_first_time(sentence: str) -> None:
     """Log a warning, the first time that the process meets this sentence."""
     _log.warning(sentence)
 

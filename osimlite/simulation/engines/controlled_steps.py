@@ -60,10 +60,10 @@ class ControlledSteps(Stepper):
         options: accuracy, integrator and other options of the integration.
         observe: function that is called with time and state after each step. For the steps of a
             table it is called only when a result needs them.
-        held: controller of the run; None without a controller.
+        controller_runs: controller of the run; None without a controller.
 
     Attributes:
-        attempted: number of attempted steps so far; `taken` counts the accepted ones.
+        attempted: number of attempted steps so far; `accepted` counts the accepted ones.
 
     Raises:
         SettingError: an option has no meaning.
@@ -79,21 +79,21 @@ class ControlledSteps(Stepper):
         options: IntegrationOptions,
         observe: Observer | None = None,
         *,
-        held: ControllerRuns | None = None,
+        controller_runs: ControllerRuns | None = None,
     ) -> None:
         options.check_integration()
         super().__init__(engine.compute_derivative, t, y, observe, engine.state.names)
         self._engine = engine
         self._options = options
         self._accuracy = options.accuracy
-        self._held = held
+        self._controller_runs = controller_runs
         # A resumed controller continues with the step of the earlier run, so that both together
         # equal one run.
-        resumed_step = held.next_step if held is not None else None
+        resumed_step = controller_runs.next_step if controller_runs is not None else None
         self.next_step = options.initial_step if resumed_step is None else resumed_step
         self._workspace: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
-        self._seen: tuple[float, list[float], Sequence[float]] = (
+        self._last_observed: tuple[float, list[float], Sequence[float]] = (
             self.time,
             self.state,
             self.derivative,
@@ -165,13 +165,13 @@ class ControlledSteps(Stepper):
         end = self.state
         now = self.time
         for log, forces in waiting:
-            for row, pushes in zip(log.tolist(), forces, strict=True):
+            for row, contact_loads in zip(log.tolist(), forces, strict=True):
                 t = row[0]
                 y = row[1 : 1 + size]
                 f = row[1 + size :]
-                self.previous = self._seen
-                self.time, self.state, self.derivative = self._seen = t, y, f
-                self._engine.store_contact_loads(pushes)
+                self.previous = self._last_observed
+                self.time, self.state, self.derivative = self._last_observed = t, y, f
+                self._engine.store_contact_loads(contact_loads)
                 if self._observe is not None:
                     self._observe(t, y)
         self.time, self.state = now, end
@@ -194,9 +194,9 @@ class ControlledSteps(Stepper):
             next_step=self.next_step,
             most_logged=LOGGED_STEPS,
             start_holds=True,
-            held=self._held,
+            controller_runs=self._controller_runs,
         )
-        batch.counts[0, : record.COUNTS.REPORTED] = self.taken, self.attempted, self.evaluations
+        batch.counts[0, : record.COUNTS.REPORTED] = self.accepted, self.attempted, self.evaluations
         batch.reports[0, : bisect_right(times, self.time)] = self.state
         return batch
 
@@ -214,14 +214,15 @@ class ControlledSteps(Stepper):
         while ending == record.ENDING.FULL:
             started = perf_counter()
             time_before = self.time
-            steps_before = self.taken
+            steps_before = self.accepted
             ending = self._call_kernels(batch, steps)
             # The number of steps follows the allowed time, but grows at most eightfold.
             next_steps = min(
-                8.0 * steps, (self.taken - steps_before) * MAX_CALL_S / (perf_counter() - started)
+                8.0 * steps,
+                (self.accepted - steps_before) * MAX_CALL_S / (perf_counter() - started),
             )
             steps = _steps_per_call[self._engine] = min(max(1, int(next_steps)), LOGGED_STEPS)
-            yield (self.time - time_before) / max(self.taken - steps_before, 1)
+            yield (self.time - time_before) / max(self.accepted - steps_before, 1)
 
     def _call_kernels(self, batch: BatchWorkspace, steps: int) -> int:
         """Take some steps in one call of the kernels.
@@ -252,7 +253,7 @@ class ControlledSteps(Stepper):
         # interruption finds all of them set, or none of them.
         self._put_off += (log,)
         (self.time, self.next_step), self.state = clock, state
-        self.taken, self.attempted, self.evaluations = counts
+        self.accepted, self.attempted, self.evaluations = counts
         if ending == record.ENDING.FAILED:
             self._raise_failure(batch.errors.tolist())
         return int(ending)

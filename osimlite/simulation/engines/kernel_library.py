@@ -19,7 +19,7 @@ from osimlite.mechanics.codegen.processor import processor_features, supports_v3
 from osimlite.mechanics.codegen.sources import compute_digest
 from osimlite.mechanics.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, library_suffix
 from osimlite.simulation.elements.laws import find_law, get_symbol
-from osimlite.simulation.engines.kept_results import KeptResults
+from osimlite.simulation.engines.result_cache import ResultCache
 
 PACKAGE = Path(__file__).parents[2]
 """Folder of the package."""
@@ -78,10 +78,10 @@ class KernelLibrary:
         ]
         if not doubtful:
             return []
-        changed: list[str] | None = self.kept.get("changed files")
+        changed: list[str] | None = self.result_cache.get("changed files")
         if changed is None:
             changed = [name for name in doubtful if self.has_changed(name)]
-            self.kept.keep("changed files", changed)
+            self.result_cache.keep("changed files", changed)
         return changed
 
     @cached_property
@@ -97,7 +97,7 @@ class KernelLibrary:
         return states
 
     @cached_property
-    def kept(self) -> KeptResults:
+    def result_cache(self) -> ResultCache:
         """Cached results about the sources in their present state.
 
         Without them, every process after an edit, or after `git pull`, computes the digests of the
@@ -105,7 +105,7 @@ class KernelLibrary:
         """
         library = os.stat(self.path)
         key = self._states, library.st_size, library.st_mtime_ns
-        return KeptResults(f"{PACKAGE} {self.path}", repr(key))
+        return ResultCache(f"{PACKAGE} {self.path}", repr(key))
 
     def has_changed(self, name: str) -> bool:
         """Return whether the content of a source file differs from that in the library."""
@@ -122,10 +122,10 @@ class KernelLibrary:
         if any(file.startswith("mechanics/codegen/") for file in self.changed_files):
             # With another translator the same law gives other code.
             return False
-        present: str | None = self.kept.get(name)
+        present: str | None = self.result_cache.get(name)
         if present is None:
             present = compute_digest(find_law(name)[0])
-            self.kept.keep(name, present)
+            self.result_cache.keep(name, present)
         return present == digest
 
 

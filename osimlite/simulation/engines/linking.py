@@ -336,15 +336,15 @@ class Program:
         # Batched kernels are faster as machine code only.
         runs = runs if code is MACHINE_CODE else {}
         self.failures: list[Exception] = []
-        self._kept: list[Any] = []
+        self._callbacks: list[Any] = []
         code.make_ready(functions)
         # Kernels call each other by addresses that they read here, so that one kernel serves all
         # models.
         for name in packed.laws:
             self.ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
         self._count = len(packed.numbers)
-        for place, kernel in [*packed.kernels.items(), *runs.items()]:
-            self._link_kernel(place, kernel)
+        for offset, kernel in [*packed.kernels.items(), *runs.items()]:
+            self._link_kernel(offset, kernel)
 
     def set_controls(self, structure: Ints, kernel: str | Callable[..., None]) -> None:
         """Replace the record of the controls, the last one, by that of another structure.
@@ -353,23 +353,23 @@ class Program:
             structure: the new structure without addresses.
             kernel: kernel of the controls: a name, or a Python function.
         """
-        place = int(structure[MODEL.CONTROLS])
+        offset = int(structure[MODEL.CONTROLS])
         # The controls are the last record; what lies before it keeps its addresses.
-        self.ints = np.concatenate((self.ints[:place], structure[place:]))
+        self.ints = np.concatenate((self.ints[:offset], structure[offset:]))
         if isinstance(kernel, str):
             self.code.make_ready((kernel,))
-        self._link_kernel(place, kernel)
+        self._link_kernel(offset, kernel)
 
-    def _link_kernel(self, place: int, kernel: str | Callable[..., None]) -> None:
+    def _link_kernel(self, offset: int, kernel: str | Callable[..., None]) -> None:
         """Write the address of a kernel at an offset of the structure."""
         if isinstance(kernel, str):
-            self.ints[place] = self.code.get_address(kernel)
+            self.ints[offset] = self.code.get_address(kernel)
             return
         size = int(self.ints[MODEL.STATE_SIZE])
         sizes = len(self.ints), self._count, int(self.ints[MODEL.WORK_SIZE]), size, size
-        self.ints[place], callback = self.code.make_callback(self._catch_errors(kernel), sizes)
+        self.ints[offset], callback = self.code.make_callback(self._catch_errors(kernel), sizes)
         # ctypes frees a callback that Python does not refer to, while the kernels still call it.
-        self._kept.append(callback)
+        self._callbacks.append(callback)
 
     def link_responses(self, method: str) -> None:
         """Prepare an implicit method and the derivatives that it needs.
@@ -378,16 +378,16 @@ class Program:
             method: name of the integrator.
         """
         self.code.make_ready((method, *dict.fromkeys(self.responses.values())))
-        for place, kernel in self.responses.items():
+        for offset, kernel in self.responses.items():
             # An address other than 0: the response is linked already.
-            if not self.ints[place]:
-                self._link_kernel(place, kernel)
+            if not self.ints[offset]:
+                self._link_kernel(offset, kernel)
 
     def link_equilibria(self) -> None:
         """Prepare the kernels that bring states into equilibrium."""
         self.code.make_ready(("equilibrate", *dict.fromkeys(self._equilibria.values())))
-        for place, kernel in self._equilibria.items():
-            self._link_kernel(place, kernel)
+        for offset, kernel in self._equilibria.items():
+            self._link_kernel(offset, kernel)
 
     def run(self, function: Callable[..., int], *parts: Any) -> int:
         """Call a kernel.
@@ -403,7 +403,7 @@ class Program:
             Outcome of the kernel.
         """
         # Without Python kernels no signal handler can run inside the call.
-        if not any(self._kept):
+        if not any(self._callbacks):
             return function(*parts)
         with defer_sigint():
             return function(*parts)

@@ -13,7 +13,7 @@ from osimlite.mechanics.kernels.layout import ITEM, MODEL
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.build import mass_properties
 from osimlite.mechanics.multibody.constraints import Lock
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
 from osimlite.schema.forces import Force
@@ -52,9 +52,9 @@ class NumberUpdater:
         self._components = model.tree().by_path
         self._builder = ElementBuilder(model, engine.mechanism, folder, wrapping=wrapping)
         dof_indices = {offset: number for number, offset in enumerate(engine.order)}
-        self._places = Places(engine.mechanism, dof_indices, engine.placements)
+        self._link_map = LinkMap(engine.mechanism, dof_indices, engine.placements)
         self._items = {
-            element.path: element.make_records(self._places) for element in engine.forces.elements
+            element.path: element.make_records(self._link_map) for element in engine.forces.elements
         }
         # Elements change at fixed offsets. Their numbers precede those of the controls, which are
         # last, in the same order as here.
@@ -149,22 +149,22 @@ class NumberUpdater:
         """
         numbers = self._engine.numbers.copy()
         for path, element in new_elements.items():
-            items = element.make_records(self._places)
+            items = element.make_records(self._link_map)
             if [_describe_structure(item) for item in items] != [
                 _describe_structure(item) for item in self._items[path]
             ]:
                 return None
-            place = self._first[path]
-            numbers[place : place + _count_numbers(items)] = [
+            offset = self._first[path]
+            numbers[offset : offset + _count_numbers(items)] = [
                 x for item in items for x in item.numbers
             ]
         if controls is not self._forces.controls:
             structure = self._engine.structure
-            place = structure[MODEL.CONTROLS]
+            offset = structure[MODEL.CONTROLS]
             ints, control_numbers, _ = controls.make_record()
-            if structure[place + ITEM.OWN :].tolist() != ints:
+            if structure[offset + ITEM.OWN :].tolist() != ints:
                 return None
-            numbers[structure[place + ITEM.NUMBERS] :] = control_numbers
+            numbers[structure[offset + ITEM.NUMBERS] :] = control_numbers
         return numbers
 
     def _replace_masses(self) -> Mechanism | None:
@@ -198,8 +198,8 @@ class NumberUpdater:
             The numbers (m,); None if the structure differs from the engine's.
         """
         packed = pack(mechanism, forces)
-        is_alike = np.array_equal(packed.structure, self._engine.structure)
-        return packed.numbers if is_alike and packed.order == self._engine.order else None
+        has_same_structure = np.array_equal(packed.structure, self._engine.structure)
+        return packed.numbers if has_same_structure and packed.order == self._engine.order else None
 
 
 def _count_numbers(items: Sequence[ForceRecord]) -> int:

@@ -91,7 +91,7 @@ class _Tools:
 
         # The kernels address parts of vectors and call functions by address, which Python and numba
         # cannot express. Two intrinsics generate the machine instructions.
-        def offset_pointer(context: Any, vector: Any, place: Any) -> Any:
+        def offset_pointer(context: Any, vector: Any, index: Any) -> Any:
             def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
                 return builder.gep(arguments[0], [arguments[1]])
 
@@ -105,7 +105,7 @@ class _Tools:
             data: Any,
             y: Any,
             f: Any,
-            place: Any,
+            index: Any,
         ) -> Any:
             def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
                 parts = [context.get_value_type(part) for part in signature.args[1:]]
@@ -150,14 +150,14 @@ def _link_callees(function: Any, tools: _Tools) -> Any:
         tools: numba's functions.
     """
     scope = dict(function.__globals__)
-    for called in {
+    for callee in {
         item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"
     }:
-        value = scope.get(called)
+        value = scope.get(callee)
         if isinstance(value, FunctionType) and value.__module__.startswith("osimlite."):
-            scope[called] = tools.replacements.get(value) or _compile_callee(value)
+            scope[callee] = tools.replacements.get(value) or _compile_callee(value)
         elif isinstance(value, Record):
-            scope[called] = _to_module(value)
+            scope[callee] = _to_module(value)
     code = function.__code__
     if code.co_filename.startswith("<"):
         # Numba caches only functions that have a file; a generated kernel belongs to the module

@@ -55,9 +55,9 @@ def write_private(path: Path, content: bytes) -> None:
     """
     folder = Path(os.path.realpath(path.parent))
     try:
-        for place in (*reversed(folder.parents), folder):
-            if not place.exists():
-                place.mkdir(mode=0o700, exist_ok=True)
+        for ancestor in (*reversed(folder.parents), folder):
+            if not ancestor.exists():
+                ancestor.mkdir(mode=0o700, exist_ok=True)
         if (why := find_other_writers(folder)) is not None:
             raise OsimliteError(why)
         handle, name = tempfile.mkstemp(dir=folder)
@@ -81,16 +81,16 @@ def find_other_writers(folder: Path) -> str | None:
     Returns:
         The reason why they can; None if they cannot.
     """
-    for place in (folder, *folder.parents):
+    for ancestor in (folder, *folder.parents):
         try:
-            info = place.lstat()
+            info = ancestor.lstat()
         except OSError as error:
-            return f"'{place}' cannot be examined: {error.strerror}"
+            return f"'{ancestor}' cannot be examined: {error.strerror}"
         # In a sticky folder such as /tmp anyone can create files, but can move or replace only
         # their own.
-        is_passage = place != folder and info.st_mode & stat.S_ISVTX
+        is_passage = ancestor != folder and info.st_mode & stat.S_ISVTX
         if (why := _describe_other_writers(info, is_passage=bool(is_passage))) is not None:
-            return f"'{place}' {why}"
+            return f"'{ancestor}' {why}"
     return None
 
 

@@ -34,14 +34,14 @@ class EngineSettings(IntegrationOptions):
             engine select it.
         show: whether a window shows the motion meanwhile.
         visuals: shapes of the bodies in the window.
-        held: controllers of the runs.
+        controller_runs: controllers of the runs.
     """
 
     fixed_step: float | None = None
     route: str = "auto"
     show: bool = False
     visuals: Visuals | None = None
-    held: ControllerRuns | None = None
+    controller_runs: ControllerRuns | None = None
 
 
 class Engine(Protocol):

@@ -71,7 +71,7 @@ class _RobotBuilder:
     """Builder of one robot; for the arguments see :func:`build_robot`.
 
     Attributes:
-        taken: names of links and joints so far.
+        used_names: names of links and joints so far.
         body_names: name of the link of each body.
         coordinate_names: name of the joint of each coordinate; None once it is used.
         links: links so far.
@@ -86,7 +86,7 @@ class _RobotBuilder:
         self.values = values
         self.still = frozenset(still)
         # Bodies and coordinates get their own names; names that are invented give way.
-        self.taken = {WORLD}
+        self.used_names = {WORLD}
         self.body_names = [self._unique(body.name) for body in mechanism.bodies]
         self.coordinate_names = [
             None if k in self.still else self._unique(info.name)
@@ -114,14 +114,14 @@ class _RobotBuilder:
             )
         )
         # Link and frame in it, of ground (-1) and every body so far.
-        placed: dict[int, tuple[str, Array]] = {-1: (WORLD, np.eye(4))}
+        link_frames: dict[int, tuple[str, Array]] = {-1: (WORLD, np.eye(4))}
         for index, body in enumerate(self.mechanism.bodies):
-            name, frame = self._body(index, *placed[body.parent])
-            placed[index] = name, frame
+            name, frame = self._body(index, *link_frames[body.parent])
+            link_frames[index] = name, frame
             self.links[-1] = replace(
                 self.links[-1],
-                visuals=_place_link(visuals.get(body.path, ()), frame),
-                collisions=_place_link(collisions.get(body.path, ()), frame),
+                visuals=_transform_visuals(visuals.get(body.path, ()), frame),
+                collisions=_transform_visuals(collisions.get(body.path, ()), frame),
             )
         return Robot(self.mechanism.name, tuple(self.links), tuple(self.joints), self.mechanism)
 
@@ -146,9 +146,9 @@ class _RobotBuilder:
             _carry_back(motions, frames)
         last = frames.pop()
         off_axis = bool(motions) and self.body_frames and not np.array_equal(last, np.eye(4))
-        for place, (motion, origin) in enumerate(zip(motions, frames, strict=True)):
+        for number, (motion, origin) in enumerate(zip(motions, frames, strict=True)):
             # The other joints of a mobilizer lead to massless links.
-            carries_body = place == len(motions) - 1 and not off_axis
+            carries_body = number == len(motions) - 1 and not off_axis
             joint = self._joint(
                 motion, mobilizer, origin, parent, "" if carries_body else None, name
             )
@@ -195,13 +195,13 @@ class _RobotBuilder:
             child: None if the child is a new massless link, else the child is the body's link.
             body_name: name of the body's link.
         """
-        places = tuple(mobilizer.coordinates[place] for place in motion.coordinates)
-        name = self.coordinate_names[places[0]] if motion.coordinate is not None else None
+        indices = tuple(mobilizer.coordinates[argument] for argument in motion.coordinates)
+        name = self.coordinate_names[indices[0]] if motion.coordinate is not None else None
         if name is not None:
             # A second joint driven by the same coordinate needs a name of its own.
-            self.coordinate_names[places[0]] = None
+            self.coordinate_names[indices[0]] = None
         else:
-            name = self._unique(f"{self.mechanism.coordinates[places[0]].name}_{_letter(motion)}")
+            name = self._unique(f"{self.mechanism.coordinates[indices[0]].name}_{_letter(motion)}")
         return RobotJoint(
             name=name,
             kind="revolute" if motion.kind == "rotate" else "prismatic",
@@ -209,7 +209,7 @@ class _RobotBuilder:
             child=body_name if child is not None else self._unique(f"{body_name}_{name}"),
             origin=origin,
             axis=motion.axis,
-            coordinates=places,
+            coordinates=indices,
             function=motion.function,
             source=mobilizer.joint,
         )
@@ -251,7 +251,7 @@ class _RobotBuilder:
         if isinstance(part, FixedTransform):
             yield part
         elif _is_constant(part.function) or all(
-            coordinate_indices[place] in self.still for place in part.coordinates
+            coordinate_indices[argument] in self.still for argument in part.coordinates
         ):
             yield FixedTransform(part.transform(self.values[coordinate_indices]))
         elif part.function == IDENTITY or (line := find_line(part.function)) is None:
@@ -270,8 +270,8 @@ class _RobotBuilder:
             )
 
     def _unique(self, name: str) -> str:
-        unique = make_unique_name(name, self.taken)
-        self.taken.add(unique)
+        unique = make_unique_name(name, self.used_names)
+        self.used_names.add(unique)
         return unique
 
 
@@ -297,7 +297,7 @@ def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
         frames[-2:] = [frames[-2] @ last, np.eye(4)]
 
 
-def _place_link(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
+def _transform_visuals(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
     return tuple(replace(shape, origin=frame @ shape.origin) for shape in shapes)
 
 

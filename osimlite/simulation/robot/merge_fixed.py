@@ -47,22 +47,24 @@ def merge_fixed(robot: Robot) -> Robot:
     )
 
 
-def _weld_links(link: RobotLink, other: RobotLink, placed: Array, *, massless: bool) -> RobotLink:
+def _weld_links(
+    link: RobotLink, other: RobotLink, other_frame: Array, *, massless: bool
+) -> RobotLink:
     """Return a link with another one welded to it.
 
     Args:
         link: the link.
         other: the other link.
-        placed: frame of the other link in the first (4, 4).
+        other_frame: frame of the other link in the first (4, 4).
         massless: whether the mass of the other link is left out.
     """
-    turn = placed[:3, :3]
-    shift = placed[:3, 3]
+    turn = other_frame[:3, :3]
+    shift = other_frame[:3, 3]
     visuals, collisions = (
-        tuple(replace(shape, origin=placed @ shape.origin) for shape in shapes)
+        tuple(replace(shape, origin=other_frame @ shape.origin) for shape in shapes)
         for shapes in (other.visuals, other.collisions)
     )
-    bodies = {path: placed @ frame for path, frame in other.bodies.items()}
+    bodies = {path: other_frame @ frame for path, frame in other.bodies.items()}
     merged = replace(
         link,
         visuals=link.visuals + visuals,

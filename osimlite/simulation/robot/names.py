@@ -45,7 +45,7 @@ class UniqueNames:
     """Function that makes names legal and never returns the same name twice."""
 
     def __init__(self) -> None:
-        self._taken: set[str] = set()
+        self._used_names: set[str] = set()
 
     def __call__(self, name: str) -> str:
         """Return a legal name that was not returned before.
@@ -53,8 +53,8 @@ class UniqueNames:
         Args:
             name: any name; a number is appended if necessary.
         """
-        word = make_unique_name(legal(name), self._taken)
-        self._taken.add(word)
+        word = make_unique_name(legal(name), self._used_names)
+        self._used_names.add(word)
         return word
 
 

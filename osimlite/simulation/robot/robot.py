@@ -200,8 +200,8 @@ class Robot:
         values = self.mechanism.values(q)
         jacobian = np.zeros((len(self.moving), len(values)))
         for row, joint in enumerate(self.moving):
-            places = list(joint.coordinates)
-            jacobian[row, places] = joint.function.evaluate(values[places])[1]
+            columns = list(joint.coordinates)
+            jacobian[row, columns] = joint.function.evaluate(values[columns])[1]
         return jacobian
 
     def link_transforms(self, q: Values) -> dict[str, Array]:
@@ -215,12 +215,12 @@ class Robot:
         """
         values = self.mechanism.values(q)
         # The root is first, and joints come in the order from it.
-        placed = {self.links[0].name: np.eye(4)}
+        transforms = {self.links[0].name: np.eye(4)}
         for joint in self.joints:
-            placed[joint.child] = placed[joint.parent] @ joint.compute_transform(
+            transforms[joint.child] = transforms[joint.parent] @ joint.compute_transform(
                 joint.value(values)
             )
-        return placed
+        return transforms
 
 
 class Box(NamedTuple):
@@ -310,7 +310,7 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     order = list(
         max(
             permutations(range(3)),
-            key=lambda p: sum(weights[row][place] for row, place in enumerate(p)),
+            key=lambda p: sum(weights[row][column] for row, column in enumerate(p)),
         )
     )
     moments = moments[order]

@@ -250,9 +250,9 @@ def _wrap_tag(words: Sequence[str], end: str) -> Iterator[str]:
         words: the tag and its attributes.
         end: end of the tag.
     """
-    whole = " ".join(words) + end
-    if len(whole) <= LONGEST_LINE:
-        yield whole
+    tag_text = " ".join(words) + end
+    if len(tag_text) <= LONGEST_LINE:
+        yield tag_text
         return
     for word, following in pairwise([*words, ""]):
         yield word if following else word + end

@@ -97,14 +97,14 @@ class _Collector:
         self.mechanism = mechanism
         self.note = note
         self.mesh_files = mesh_files
-        self.found = Visuals(files=mesh_files.files)
+        self.visuals = Visuals(files=mesh_files.files)
 
     def collect(self) -> Visuals:
         # Axes of frames are no shapes of bodies.
         for component in self.tree.components:
             if isinstance(component, Geometry) and not isinstance(component, FrameGeometry):
                 self._add(component, self.tree.path_of(component) or component.name)
-        return self.found
+        return self.visuals
 
     def _add(self, geometry: Geometry, path: str) -> None:
         note = self.note
@@ -119,7 +119,7 @@ class _Collector:
         shape_and_frame = self._shape(geometry, path)
         if shape_and_frame is None:
             return
-        shape, placed = shape_and_frame
+        shape, shape_frame = shape_and_frame
         surface = appearance.surface_properties
         # 3 is OpenSim's number for filled surfaces.
         if surface.representation != 3 or surface.texture:
@@ -135,8 +135,8 @@ class _Collector:
         red, green, blue, opacity = (
             min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity)
         )
-        visual = Visual(shape, where @ placed, (red, green, blue, opacity), path)
-        self.found.by_body.setdefault(owner, []).append(visual)
+        visual = Visual(shape, where @ shape_frame, (red, green, blue, opacity), path)
+        self.visuals.by_body.setdefault(owner, []).append(visual)
 
     def _shape(self, geometry: Geometry, path: str) -> tuple[Shape, Array] | None:
         """Return the shape of a geometry, and its frame in the frame of the geometry.

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
-from osimlite.simulation.engines import compiled_laws, kept_results
+from osimlite.simulation.engines import compiled_laws, result_cache
 from osimlite.simulation.engines.compiled_laws import compile_function, load_function
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler is installed")
@@ -84,7 +84,7 @@ def test_code_that_others_could_have_written_is_neither_loaded_nor_kept(folder, 
     for mode in (0o775, 0o1777, 0o757):
         folder.chmod(mode)
         assert load_function("answer", answer, 0) is None
-    compiled_laws.warn_once.cache_clear()
+    compiled_laws.warn_first_time.cache_clear()
     for path in folder.iterdir():
         path.unlink()
     assert run(compile_function("answer", answer, 0)) == 48
@@ -95,7 +95,7 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     monkeypatch.setattr(compiled_laws, "cache_folders", lambda: [blocked / "inside"])
-    compiled_laws.warn_once.cache_clear()
+    compiled_laws.warn_first_time.cache_clear()
     for _ in range(2):
         assert run(compile_function("answer", answer, 0)) == 48
     (message,) = caplog.messages
@@ -104,25 +104,25 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
 
 def test_folders(monkeypatch, tmp_path):
     """The one that is named, or the package's own and then the user's."""
-    monkeypatch.setenv(kept_results.CACHE_VARIABLE, str(tmp_path / "named"))
-    assert list(kept_results.cache_folders()) == [tmp_path / "named"]
-    monkeypatch.delenv(kept_results.CACHE_VARIABLE)
+    monkeypatch.setenv(result_cache.CACHE_VARIABLE, str(tmp_path / "named"))
+    assert list(result_cache.cache_folders()) == [tmp_path / "named"]
+    monkeypatch.delenv(result_cache.CACHE_VARIABLE)
     monkeypatch.delenv("LOCALAPPDATA", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    first, last = kept_results.cache_folders()
+    first, last = result_cache.cache_folders()
     assert (first.parent.name, last) == ("kernels", tmp_path / "home" / "osimlite")
 
 
 def test_a_user_without_a_home(monkeypatch):
     """As in a container that runs under a number of no user."""
-    for name in (kept_results.CACHE_VARIABLE, "LOCALAPPDATA", "XDG_CACHE_HOME"):
+    for name in (result_cache.CACHE_VARIABLE, "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
 
     def nowhere():
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setattr(compiled_laws.Path, "home", nowhere)
-    (only,) = kept_results.cache_folders()
+    (only,) = result_cache.cache_folders()
     assert only.parent.name == "kernels"
 
 
@@ -149,7 +149,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
     kept = {
         **os.environ,
         "OSIMLITE_KERNELS": "compiler",
-        kept_results.CACHE_VARIABLE: str(tmp_path),
+        result_cache.CACHE_VARIABLE: str(tmp_path),
     }
     for compiler in ({}, {"CXX": "no-such-compiler"}):
         done = subprocess.run(

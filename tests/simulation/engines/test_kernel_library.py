@@ -11,8 +11,8 @@ import pytest
 from osimlite.mechanics.codegen.toolchain import NATIVE, library_suffix
 from osimlite.simulation.elements.laws import DIRECTIONS, list_library_laws
 from osimlite.simulation.engines import kernel_library
-from osimlite.simulation.engines.kept_results import CACHE_VARIABLE
 from osimlite.simulation.engines.kernel_library import KernelLibrary, load_library
+from osimlite.simulation.engines.result_cache import CACHE_VARIABLE
 
 LIBRARY = load_library()
 needs_library = pytest.mark.skipif(
@@ -85,7 +85,7 @@ def test_another_translator_concerns_all_laws(library, tmp_path):
 def test_the_next_process_computes_no_digest_again(library, tmp_path, monkeypatch):
     edited = edit(library, tmp_path / "mechanics/kernels/dynamics.py")
     address = edited.get_address("evaluate")
-    edited.kept.save()
+    edited.result_cache.save()
 
     def fail(*_):
         raise AssertionError("computed again")

@@ -90,7 +90,9 @@ def _find_activation_owner(
     OpenSim stores them in static variables, so that all muscles use those of the first muscle that the
     process computes: the first in the model, if the process computes no other.
     """
-    muscles = [] if builder.own_times else builder.model.components(DeGrooteFregly2016Muscle)
+    muscles = (
+        [] if builder.own_activation_times else builder.model.components(DeGrooteFregly2016Muscle)
+    )
     return next((muscle for muscle in muscles if not muscle.ignore_activation_dynamics), force)
 
 

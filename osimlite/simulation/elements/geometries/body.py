@@ -28,7 +28,7 @@ from osimlite.mechanics.laws.vectors import (
     times,
     vector,
 )
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.simulation.elements.builder import ElementBuilder, Triple, to_triple
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
@@ -216,7 +216,7 @@ class Anchors(NamedTuple):
 class OnBodies(ForceGeometry):
     """Base of geometries with bodies, and points and directions fixed to them or to ground."""
 
-    def pack(self, location: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Anchors, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the bodies, points and directions, and the vectors in these links.
 
         Args:
@@ -359,7 +359,9 @@ class AtStation(ForceGeometry):
         builder.check_finite(force, point)
         return NamedStation(result.name, body, point)
 
-    def pack(self, location: NamedStation, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, location: NamedStation, places: LinkMap
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the link of the station and the position in it.
 
         Returns:

@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
@@ -53,7 +53,7 @@ class OnCoordinate(ForceGeometry):
         """Return the index of the coordinate in the mechanism."""
         return builder.find_coordinate(force, self.field)
 
-    def pack(self, location: int, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: int, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the degree of freedom and the value of a locked coordinate.
 
         Args:

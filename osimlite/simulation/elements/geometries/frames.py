@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.points import (
 )
 from osimlite.mechanics.laws.bushing import xyz_angles, xyz_moment, xyz_rates
 from osimlite.mechanics.laws.vectors import minus, rotate, rotate_back, store_vector, times, vector
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
@@ -171,7 +171,7 @@ class BetweenFrames(ForceGeometry):
         return tuple(frames)
 
     def pack(
-        self, location: tuple[Frame, ...], places: Places
+        self, location: tuple[Frame, ...], places: LinkMap
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the frames, and axes and origin of each frame in its link.
 

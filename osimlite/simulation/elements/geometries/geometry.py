@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceRecord
 
@@ -56,7 +56,7 @@ class ForceGeometry:
             UnsupportedError: osimlite cannot compute a force there.
         """
 
-    def make_parts(self, location: Any, places: Places) -> list[ForceRecord]:
+    def make_parts(self, location: Any, places: LinkMap) -> list[ForceRecord]:
         """Return records that the code of the geometry calls.
 
         `item - g[0]` is the offset of the last of them.
@@ -67,7 +67,7 @@ class ForceGeometry:
         """
         return []
 
-    def pack(self, location: Any, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Any, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the integers and numbers of a location.
 
         Args:

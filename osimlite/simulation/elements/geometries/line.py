@@ -10,7 +10,7 @@ from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import apply_force, station, velocity
 from osimlite.mechanics.laws.vectors import dot, minus, norm, store_vector, times, vector
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.elements.builder import ElementBuilder, Triple, to_triple
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
@@ -125,7 +125,7 @@ class BetweenPoints(ForceGeometry):
         )
         return Ends((names[0], names[1]), (one, two), points, (first_point, second_point))
 
-    def pack(self, location: Ends, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Ends, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the ends, and points and reported points in them.
 
         Returns:

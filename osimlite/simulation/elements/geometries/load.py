@@ -12,7 +12,7 @@ from osimlite.mechanics.kernels.points import apply_force, apply_torque, directi
 from osimlite.mechanics.laws.vectors import dot, minus, plus, rotate_back, store_vector, vector
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import SmoothFunction
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.mechanism import FramePlacement
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
@@ -121,7 +121,7 @@ class GivenLoad(ForceGeometry):
     apply_code = ("apply_load(model, data, g, gp, work, data[WORK.TIME])",)
     called_functions = (apply_load,)
 
-    def pack(self, location: Load, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Load, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return links and placements of the frames, and the tables of the functions.
 
         Returns:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from osimlite.mechanics.kernels.paths import last_length, path_length, pull_path
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.geometries.geometry import ForceGeometry
@@ -22,7 +22,7 @@ class Path(Protocol):
 
     coupled: bool
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records of the path; the last one is the path itself.
 
         See :mod:`osimlite.mechanics.kernels.paths`.
@@ -63,7 +63,7 @@ class AlongPath(ForceGeometry):
         path: Path = read_path(builder, force)
         return path
 
-    def make_parts(self, location: Path, places: Places) -> list[ForceRecord]:
+    def make_parts(self, location: Path, places: LinkMap) -> list[ForceRecord]:
         """Return the records of the path."""
         return location.make_records(places)
 

@@ -19,7 +19,7 @@ from osimlite.mechanics.laws.vectors import (
     times,
     vector,
 )
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.contact import ContactSurface, read_surface
@@ -125,7 +125,7 @@ class SphereOnPlane(ForceGeometry):
         return surfaces[0], surfaces[1]
 
     def pack(
-        self, location: tuple[ContactSurface, ContactSurface], places: Places
+        self, location: tuple[ContactSurface, ContactSurface], places: LinkMap
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links, a point of the plane and its normal, and centre and radius of the sphere.
 

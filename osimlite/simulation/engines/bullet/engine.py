@@ -104,12 +104,12 @@ class BulletEngine(KernelEngine):
         if route not in ROUTES:
             raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
         free = find_free_coordinates(mechanism)
-        fixed = [place for place in range(len(mechanism.coordinates)) if place not in free]
+        fixed = [index for index in range(len(mechanism.coordinates)) if index not in free]
         shapes = {} if visuals is None else visuals.by_body
         robot = legal_names(
             merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes))
         )
-        is_plain = _has_own_coordinates(mechanism, robot)
+        is_plain = _has_one_coordinate_per_joint(mechanism, robot)
         # Adding moments to invalid inertias and subtracting them again loses digits.
         is_exact = is_plain and any(compute_inertia_excess(link) > 0.0 for link in robot.links)
         self.route = (ARTICULATED_BODY if is_exact else MASS_MATRIX) if route == "auto" else route
@@ -148,10 +148,10 @@ class BulletEngine(KernelEngine):
         # Bullet accepts invalid inertias, but not for mass matrices.
         self._steps_itself = is_plain and (is_exact or not added)
         count = len(body.joints)
-        self._moves = (
+        self._motion_offset = (
             self.structure[self.structure[MODEL.CHAIN] + CHAIN.WORK_JOINTS] if count else 0
         )
-        self._forces = self._moves + 3 * count
+        self._forces = self._motion_offset + 3 * count
         self._pack_forces: Any = Struct(f"{count}d").pack_into
         self._pack_matrix: Any = Struct(f"{count * count}d").pack_into
         self.coordinates = [joint.coordinates[0] for joint in body.joints]
@@ -162,7 +162,7 @@ class BulletEngine(KernelEngine):
     ) -> None:
         """Write mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
         robot, client, first = self.world.id, self.world.client, self._forces
-        values, rates, accelerations = data[self._moves : first].reshape(3, -1).tolist()
+        values, rates, accelerations = data[self._motion_offset : first].reshape(3, -1).tolist()
         try:
             forces = bullet.calculateInverseDynamics(robot, values, rates, accelerations, 0, client)
         except SystemError:
@@ -186,7 +186,7 @@ class BulletEngine(KernelEngine):
         """
         first = self._forces
         size = len(self.order)
-        values, rates, biases = data[self._moves : first].reshape(3, -1)
+        values, rates, biases = data[self._motion_offset : first].reshape(3, -1)
         count = len(values)
         applied = f[size : 2 * size]
         forces = self.compute_joint_forces(y.tolist(), applied)
@@ -226,10 +226,10 @@ class BulletEngine(KernelEngine):
         """
         window = self.window
         if window is not None:
-            tell = observe
+            observe_step = observe
 
             def observe(t: float, y: list[float]) -> None:
-                tell(t, y)
+                observe_step(t, y)
                 window.show(t, y)
 
         if settings.fixed_step is not None and self._steps_itself:
@@ -252,19 +252,19 @@ class BulletEngine(KernelEngine):
             self.window.hold()
 
 
-def _has_own_coordinates(mechanism: Mechanism, robot: Robot) -> bool:
+def _has_one_coordinate_per_joint(mechanism: Mechanism, robot: Robot) -> bool:
     """Return whether each joint of the robot equals a coordinate of its own, without constraints.
 
     Args:
         mechanism: the mechanism.
         robot: robot form of the mechanism.
     """
-    places = [joint.coordinates[0] for joint in robot.moving]
+    indices = [joint.coordinates[0] for joint in robot.moving]
     return (
         all(joint.coordinate is not None for joint in robot.moving)
-        and len(set(places)) == len(places)
+        and len(set(indices)) == len(indices)
         and all(isinstance(item, Lock) for item in mechanism.constraints)
-        and not any(mechanism.coordinates[place].locked for place in places)
+        and not any(mechanism.coordinates[index].locked for index in indices)
     )
 
 
@@ -296,11 +296,15 @@ class BulletStepper(SemiImplicitEuler):
             observe=observe,
             names=engine.state.names,
         )
-        self._engine, self.world, self._places = engine, engine.world, engine.coordinates
+        self._engine, self.world, self._coordinate_indices = (
+            engine,
+            engine.world,
+            engine.coordinates,
+        )
         q, u = engine.state.values(y), engine.state.speeds(y)
         # Bullet's joints have rates of coordinates, the state has generalized speeds.
-        rates = engine.mechanism.coordinate_rates(q, u)[self._places]
-        self.world.set_state([q[place] for place in self._places], rates.tolist())
+        rates = engine.mechanism.coordinate_rates(q, u)[self._coordinate_indices]
+        self.world.set_state([q[index] for index in self._coordinate_indices], rates.tolist())
 
     def _take_step(self, h: float) -> list[float]:
         layout, mechanism, count = self._engine.state, self._engine.mechanism, self._nq
@@ -308,7 +312,7 @@ class BulletStepper(SemiImplicitEuler):
         self.world.step(h, self._engine.compute_joint_forces(self.state, forces))
         q = np.array(layout.values(self.state))
         rates = np.zeros(len(mechanism.coordinates))
-        q[self._places], rates[self._places] = self.world.get_state()
+        q[self._coordinate_indices], rates[self._coordinate_indices] = self.world.get_state()
         z = [
             x + h * rate
             for x, rate in zip(self.state[2 * count :], self.derivative[2 * count :], strict=True)

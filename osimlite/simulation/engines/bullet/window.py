@@ -154,25 +154,25 @@ class Window:
     def draw(self, values: Sequence[float]) -> None:
         """Show the robot with these joint values."""
         client = self.client
-        rest = [(0.0,)] * len(values)
+        speeds = [(0.0,)] * len(values)
         bullet.resetJointStatesMultiDof(
-            self._robot, self._joints, [(x,) for x in values], rest, client
+            self._robot, self._joints, [(x,) for x in values], speeds, client
         )
         if not self._links:
             return
         states = bullet.getLinkStates(self._robot, self._links, physicsClientId=client)
-        places = np.array([state[0] for state in states])
+        positions = np.array([state[0] for state in states])
         if self._view is None:
             self._view = (
                 YAW_DEG,
                 PITCH_DEG,
-                max(0.5, DISTANCE_FACTOR * float(np.ptp(places, axis=0).max())),
+                max(0.5, DISTANCE_FACTOR * float(np.ptp(positions, axis=0).max())),
             )
         elif selected_view := self._get_selected_view():
             self._view = selected_view
         yaw, pitch, distance = self._view
         bullet.resetDebugVisualizerCamera(
-            distance, yaw, pitch, places.mean(axis=0).tolist(), physicsClientId=client
+            distance, yaw, pitch, positions.mean(axis=0).tolist(), physicsClientId=client
         )
 
     def _get_selected_view(self) -> tuple[float, float, float] | None:

@@ -40,15 +40,15 @@ def mute_output(descriptor: int = 2) -> Iterator[None]:
         # Programs without standard error have nothing to mute.
         yield
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null_device = os.open(os.devnull, os.O_WRONLY)
     (sys.stderr if descriptor == 2 else sys.stdout).flush()
-    os.dup2(nowhere, descriptor)
+    os.dup2(null_device, descriptor)
     try:
         yield
     finally:
         os.dup2(saved_descriptor, descriptor)
         os.close(saved_descriptor)
-        os.close(nowhere)
+        os.close(null_device)
 
 
 with mute_output():

@@ -131,7 +131,7 @@ def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
     count = len(q)
     # By coordinate: what a unit speed of it does to each angle.
     axes, shares, rotation = [], np.zeros((3, count)), np.eye(3)
-    for row, turn in enumerate(error.turns):
+    for row, turn in enumerate(error.rotations):
         own = list(turn.coordinates)
         amount, gradient, _ = turn.function.evaluate(q[own])
         shares[row, own] = gradient

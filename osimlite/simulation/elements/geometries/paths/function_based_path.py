@@ -17,7 +17,7 @@ from osimlite.mechanics.multibody.functions import (
     SmoothFunction,
     WeightedSum,
 )
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.function_types import ExpressionBasedFunction
 from osimlite.schema.functions import Constant, MultiplierFunction
@@ -49,7 +49,7 @@ class CoordinatePath:
 
     coupled: ClassVar[bool] = False
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records of the path.
 
         Args:

@@ -23,7 +23,7 @@ from osimlite.mechanics.kernels.wrap_curves import MOST
 from osimlite.mechanics.kernels.wrapping import ELLIPSOID_METHOD
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import SmoothFunction
-from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import (
@@ -67,7 +67,7 @@ class Node:
     name: str = ""
 
     def pack(
-        self, places: Places, of: int, first: int, path: str, piece: int
+        self, places: LinkMap, of: int, first: int, path: str, piece: int
     ) -> tuple[list[int], list[float]]:
         """Return the integers and numbers of the node.
 
@@ -170,7 +170,7 @@ class ThroughPoints:
         first = self.points[0]
         return first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3]
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the records of the path.
 
         Args:

@@ -30,7 +30,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
 )
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.wrap_curves import MOST
-from osimlite.mechanics.multibody.links import Placement, Places
+from osimlite.mechanics.multibody.links import LinkMap, Placement
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import ContactGeometry
@@ -67,7 +67,7 @@ class CablePoint:
     size: ClassVar[int] = CABLE_POINT_WORK.SIZE
     is_obstacle: ClassVar[bool] = False
 
-    def pack(self, places: Places) -> tuple[int, list[float]]:
+    def pack(self, places: LinkMap) -> tuple[int, list[float]]:
         """Return the link of the point and its numbers.
 
         Args:
@@ -100,7 +100,7 @@ class CableObstacle:
     size: ClassVar[int] = OBSTACLE_WORK.SIZE
     is_obstacle: ClassVar[bool] = True
 
-    def pack(self, places: Places) -> tuple[int, list[float]]:
+    def pack(self, places: LinkMap) -> tuple[int, list[float]]:
         """Return the link of the obstacle and its numbers.
 
         Args:
@@ -149,7 +149,7 @@ class Cable:
         assert isinstance(first, CablePoint)
         return first.body, first.runs
 
-    def make_records(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: LinkMap) -> list[ForceRecord]:
         """Return the record that pulls, and that of the cable.
 
         Args:
@@ -192,7 +192,7 @@ class Cable:
         placements = [
             Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))
         ]
-        _, path = self.make_records(Places(mechanism, {}, placements))
+        _, path = self.make_records(LinkMap(mechanism, {}, placements))
         ints = np.array([0] * ITEM.OWN + list(path.ints))
         work = np.zeros(path.record_size)
         # Only cables need the engines while a model is built. As Python the search takes seconds.

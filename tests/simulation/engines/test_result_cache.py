@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.simulation.engines.kept_results import CACHE_VARIABLE, KeptResults
+from osimlite.simulation.engines.result_cache import CACHE_VARIABLE, ResultCache
 
 
 @pytest.fixture(autouse=True)
@@ -14,39 +14,39 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_results_are_read_again():
-    results = KeptResults("a", "key")
+    results = ResultCache("a", "key")
     assert results.get("one") is None
     results.keep("one", ["x", 1])
-    assert results.get("one") == ["x", 1] and KeptResults("a", "key").get("one") is None
+    assert results.get("one") == ["x", 1] and ResultCache("a", "key").get("one") is None
     results.save()
-    assert KeptResults("a", "key").get("one") == ["x", 1]
-    assert KeptResults("b", "key").get("one") is None
+    assert ResultCache("a", "key").get("one") == ["x", 1]
+    assert ResultCache("b", "key").get("one") is None
 
 
 def test_another_key_forgets_them():
-    results = KeptResults("a", "key")
+    results = ResultCache("a", "key")
     results.keep("one", 1)
     results.save()
-    assert KeptResults("a", "other").get("one") is None
+    assert ResultCache("a", "other").get("one") is None
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"key": 1}', b"\xff"])
 def test_a_damaged_file_is_forgotten(folder, content):
-    results = KeptResults("a", "key")
+    results = ResultCache("a", "key")
     results.keep("one", 1)
     results.save()
     (file,) = folder.iterdir()
     file.write_bytes(content)
-    assert KeptResults("a", "key").get("one") is None
+    assert ResultCache("a", "key").get("one") is None
 
 
 def test_a_file_that_others_can_write_is_not_read(folder):
-    results = KeptResults("a", "key")
+    results = ResultCache("a", "key")
     results.keep("one", 1)
     results.save()
     folder.chmod(0o777)
     try:
-        assert KeptResults("a", "key").get("one") is None
+        assert ResultCache("a", "key").get("one") is None
     finally:
         folder.chmod(0o700)
 
@@ -54,7 +54,7 @@ def test_a_file_that_others_can_write_is_not_read(folder):
 def test_without_a_folder_nothing_is_kept(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "file" / "inside"))
-    results = KeptResults("a", "key")
+    results = ResultCache("a", "key")
     results.keep("one", 1)
     results.save()
-    assert KeptResults("a", "key").get("one") is None
+    assert ResultCache("a", "key").get("one") is None

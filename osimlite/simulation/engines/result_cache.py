@@ -17,7 +17,7 @@ CACHE_VARIABLE = "NUMBA_CACHE_DIR"
 """Environment variable that names the only folder for compiled files; numba uses it for its own files."""
 
 
-class KeptResults:
+class ResultCache:
     """Cache of results by name, with a key that describes everything on which they depend.
 
     Args:
