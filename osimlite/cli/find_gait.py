@@ -111,7 +111,7 @@ def find_gait(
         )
     _describe_result(gait).show()
     # Scripts test the exit code: 0 means a stable walk to the end without scuffs.
-    if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
+    if not (gait.walk.walks and not gait.walk.scuffs and gait.model_cycle.cycle.largest < 1.0):
         raise SystemExit(1)
 
 
@@ -119,10 +119,10 @@ def _describe_result(gait: Gait) -> FactTable:
     from osimlite.base.text import format_count
     from osimlite.studies.gait.cycle_search import BASIN_STARTS, BASIN_STEPS
 
-    cycle, walk = gait.found.cycle, gait.walk
+    cycle, walk = gait.model_cycle.cycle, gait.walk
     stable = "stable" if cycle.largest < 1.0 else "not stable"
     facts = FactTable(f"{stable}: largest multiplier {cycle.largest:.4g}")
-    for name, number in gait.found.numbers.items():
+    for name, number in gait.model_cycle.numbers.items():
         facts.add(name, f"{number:.6g}")
     facts.add("step length", f"{cycle.length:.6g} m")
     facts.add("period", f"{cycle.period:.6g} s")
@@ -131,7 +131,7 @@ def _describe_result(gait: Gait) -> FactTable:
     facts.add("walk", f"{counts}; {end} after {walk.end:.4g} s")
     facts.add(
         "near it",
-        f"{round(BASIN_STARTS * gait.found.walking)} of {BASIN_STARTS} starts make {BASIN_STEPS} steps",
+        f"{round(BASIN_STARTS * gait.model_cycle.walking)} of {BASIN_STARTS} starts make {BASIN_STEPS} steps",
     )
     facts.add(
         "search",

@@ -31,12 +31,12 @@ class Axis:
 
     Attributes:
         label: name with its unit.
-        place: index in the state.
+        state_index: index in the state.
         values: values on the grid (k,) (rad, m, rad/s or m/s).
     """
 
     label: str
-    place: int
+    state_index: int
     values: Floats
 
 

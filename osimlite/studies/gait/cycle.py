@@ -84,9 +84,11 @@ def differentiate_step_map(
         Matrix, with NaN in the column of a direction in which the walker makes no step.
     """
     reduced = step_map.reduce(state)
-    moves = difference * np.eye(len(reduced))
+    displacements = difference * np.eye(len(reduced))
     # All perturbed walkers are simulated in one call.
-    images = step_map(step_map.expand(np.concatenate((reduced + moves, reduced - moves)))).states
+    images = step_map(
+        step_map.expand(np.concatenate((reduced + displacements, reduced - displacements)))
+    ).states
     images_ahead, images_behind = np.split(step_map.reduce(images), 2)
     return (images_ahead - images_behind).T / (2.0 * difference)
 
@@ -151,21 +153,21 @@ def find_cycle(
         residual = next_state
         size = trial_size
         step_count += 1
-    state_found = step_map.expand(reduced)
-    images = step_map(state_found[None])
+    cycle_state = step_map.expand(reduced)
+    images = step_map(cycle_state[None])
     engine = step_map.engine
     per_stride = step_map.exchange is None
     feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
     # All contacts of the feet together move by as much as the walker does in a complete cycle.
     position_before, position_after = (
-        measure_along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet]
+        measure_along_slope(engine, np.array([cycle_state, images.states[0]]))[0][:, feet]
         .mean(axis=1)
         .tolist()
     )
     # Floquet multipliers are the eigenvalues of the Jacobian of the map at the fixed point.
-    values = np.linalg.eigvals(differentiate_step_map(step_map, state_found)).astype(np.complex128)
+    values = np.linalg.eigvals(differentiate_step_map(step_map, cycle_state)).astype(np.complex128)
     return Cycle(
-        state_found,
+        cycle_state,
         float(images.lengths[0]),
         (position_after - position_before) / (1 + per_stride),
         float(images.times[0]),

@@ -194,7 +194,7 @@ class CycleSearch:
                 "walkers are drawn at random; vary some values and speeds of coordinates at the start"
             )
         self._least = [variable.low for variable in plan.variables]
-        engine: Any = self.variants.given.engine
+        engine: Any = self.variants.base_variant.engine
         self.footing: FootContacts = find_footing(engine, feet)
         if len(self.footing.feet) != 2:
             raise SettingError(
@@ -267,7 +267,7 @@ class CycleSearch:
         """
         variant = self.variants.make_variant(self.make_sample(fractions))
         # Step maps of models with other coordinates or contacts cannot be compared.
-        if variant.structure != self.variants.given.structure:
+        if variant.structure != self.variants.base_variant.structure:
             raise OsimliteError("the numbers change the structure of the model; vary others")
         return variant.engine
 
@@ -295,7 +295,7 @@ class CycleSearch:
 
     def _draw_samples(self, rng: np.random.Generator, count: int) -> list[Candidate]:
         """Simulate random walkers in one call, and return those that make two steps."""
-        engine: Any = self.variants.given.engine
+        engine: Any = self.variants.base_variant.engine
         models = rng.random((-(-count // STARTS_PER_MODEL), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
         fractions = np.repeat(models, STARTS_PER_MODEL, axis=0)[:count]
@@ -313,7 +313,7 @@ class CycleSearch:
                 is_valid[row] = False
                 continue
             # Walkers of one call share the structure of the engine.
-            is_valid[row] = variant.structure == self.variants.given.structure
+            is_valid[row] = variant.structure == self.variants.base_variant.structure
             if is_valid[row]:
                 states[row], vectors[row] = (
                     self.variants.make_start(variant, sample),
@@ -500,8 +500,8 @@ class _ClosingProblem:
         self._search = search
         self._maps: dict[bytes, StepMap] = {}
         self._sizes: list[float] = []
-        self._given = self._get_step_map(candidate.fractions, candidate.state)
-        reduced = self._given.reduce(candidate.state)
+        self._candidate_map = self._get_step_map(candidate.fractions, candidate.state)
+        reduced = self._candidate_map.reduce(candidate.state)
         self._size = len(reduced)
         # The solver needs a start in the interior of the bounds.
         inner_fractions = np.clip(candidate.fractions, 1e-3, 1.0 - 1e-3)
@@ -534,7 +534,7 @@ class _ClosingProblem:
             Fractions of the numbers, the step map of the model with these numbers, and the state.
         """
         reduced, fractions = np.split(unknowns, [self._size])
-        step_map = self._get_step_map(fractions, self._given.expand(reduced))
+        step_map = self._get_step_map(fractions, self._candidate_map.expand(reduced))
         return fractions, step_map, step_map.expand(reduced)
 
     def compute_residual(self, unknowns: Floats) -> Floats:

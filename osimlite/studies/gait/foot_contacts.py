@@ -77,17 +77,17 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             f"'{engine.mechanism.name}' has no contact forces, so that nothing walks"
         )
     soles = _find_soles(engine)
-    known_contacts = [sole.contact for sole in soles]
+    sole_contacts = [sole.contact for sole in soles]
     if feet:
         named_feet = tuple(
             tuple(contact_name.strip() for contact_name in foot.split("+")) for foot in feet
         )
         requested = [contact for foot in named_feet for contact in foot]
         for contact in requested:
-            if contact not in known_contacts:
+            if contact not in sole_contacts:
                 raise OsimliteError(
                     f"no sphere touches a half space in '{contact}'"
-                    f"{suggest_or_list(contact, known_contacts) if known_contacts else '; none does'}"
+                    f"{suggest_or_list(contact, sole_contacts) if sole_contacts else '; none does'}"
                 )
             if requested.count(contact) > 1:
                 raise OsimliteError(
@@ -99,7 +99,7 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             )
     else:
         named_feet = _find_feet(engine.mechanism, soles)
-    falls = tuple(name for name in known_contacts if not any(name in foot for foot in named_feet))
+    falls = tuple(name for name in sole_contacts if not any(name in foot for foot in named_feet))
     return FootContacts(named_feet, falls)
 
 

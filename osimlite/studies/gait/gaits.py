@@ -54,7 +54,7 @@ class Gait:
     """Walker with a stable gait.
 
     Attributes:
-        found: numbers of the model with the gait cycle.
+        model_cycle: numbers of the model with the gait cycle.
         start: initial value and speed of each coordinate, by name.
         walk: walk from this initial state.
         candidates: number of random walkers that made two steps.
@@ -63,7 +63,7 @@ class Gait:
         files: files that the search wrote.
     """
 
-    found: ModelCycle
+    model_cycle: ModelCycle
     start: dict[str, tuple[float, float]]
     walk: WalkerSteps
     candidates: int
@@ -141,7 +141,7 @@ def find_gait(
             _protect_results(output_folder, settings)
         # Settings are checked and the folder is protected before anything is computed.
         search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
-        refuse_constraints(search.variants.given.engine.mechanism)
+        refuse_constraints(search.variants.base_variant.engine.mechanism)
         candidates = search.find_candidates(
             samples, seed, lambda finished, total: report("random walkers", finished, total)
         )
@@ -244,12 +244,12 @@ def close_candidates(
     return cycles
 
 
-def round_cycle(search: CycleSearch, found: ModelCycle, digits: int) -> ModelCycle:
+def round_cycle(search: CycleSearch, model_cycle: ModelCycle, digits: int) -> ModelCycle:
     """Round the numbers of a model, and compute its cycle with full accuracy.
 
     Args:
         search: search with the plan.
-        found: numbers of the model with their gait cycle.
+        model_cycle: numbers of the model with their gait cycle.
         digits: number of significant digits.
 
     Raises:
@@ -257,7 +257,9 @@ def round_cycle(search: CycleSearch, found: ModelCycle, digits: int) -> ModelCyc
     """
     try:
         return search.find_cycle(
-            search.round_fractions(found.fractions, digits), found.cycle.state, fine=True
+            search.round_fractions(model_cycle.fractions, digits),
+            model_cycle.cycle.state,
+            fine=True,
         )
     except OsimliteError as error:
         raise SimulationError(
@@ -266,7 +268,7 @@ def round_cycle(search: CycleSearch, found: ModelCycle, digits: int) -> ModelCyc
 
 
 def choose_start(
-    search: CycleSearch, found: ModelCycle, digits: int | None
+    search: CycleSearch, model_cycle: ModelCycle, digits: int | None
 ) -> tuple[dict[str, tuple[float, float]], WalkerSteps]:
     """Choose an initial state within a step of a cycle, and simulate the walk from it.
 
@@ -275,17 +277,17 @@ def choose_start(
 
     Args:
         search: search with the plan.
-        found: numbers of the model with their gait cycle.
+        model_cycle: numbers of the model with their gait cycle.
         digits: significant digits of values and speeds; None for no rounding.
 
     Returns:
         Value (rad or m) and speed of each coordinate, by name, and the walk.
     """
-    step_map = search.make_step_map(found.fractions, found.cycle.state, TIGHT_ACCURACY)
+    step_map = search.make_step_map(model_cycle.fractions, model_cycle.cycle.state, TIGHT_ACCURACY)
     engine = step_map.engine
     ordered = sorted(START_PHASES)
     # States are sampled in the order of time, and then sorted by preference.
-    states = sample_states_of_step(step_map, found.cycle, ordered)[
+    states = sample_states_of_step(step_map, model_cycle.cycle, ordered)[
         [ordered.index(part) for part in START_PHASES]
     ]
     # Rounding errors would be written as digits.
@@ -311,7 +313,7 @@ def choose_start(
 
 def _name_values(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
     """Return value and speed of each coordinate of a state by name."""
-    names = [engine.mechanism.coordinates[place].name for place in engine.order]
+    names = [engine.mechanism.coordinates[index].name for index in engine.order]
     values = state[: len(names)]
     speeds = state[len(names) : 2 * len(names)]
     return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
@@ -325,7 +327,7 @@ def _write_walker(
     settings: dict[str, Any],
 ) -> None:
     """Write model, table of cycles and summary of a search."""
-    model = search.make_model(gait.found.fractions, gait.start)
+    model = search.make_model(gait.model_cycle.fractions, gait.start)
     write(model, folder / BEST_FILE)
     heads = [*search.names, "largest_multiplier", "walking", "step_length_m", "period_s", "scuffs"]
     rows = [",".join(heads)]
@@ -341,7 +343,7 @@ def _write_walker(
         ]
         rows.append(",".join(repr(number) for number in numbers))
     write_atomically(folder / CYCLES_FILE, "\n".join(rows) + "\n")
-    result, walk = gait.found, gait.walk
+    result, walk = gait.model_cycle, gait.walk
     summary = {
         "numbers": result.numbers,
         "start": {

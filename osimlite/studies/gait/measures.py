@@ -88,15 +88,15 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
         rows = None if batch.numbers is None else np.arange(len(batch.starts))
         along = measure_along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
         # A foot is as far as its foremost contact.
-        places = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
-        result = zip(_list_walks(footing, batch), places.tolist(), strict=True)
+        foot_positions = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
+        result = zip(_list_walks(footing, batch), foot_positions.tolist(), strict=True)
         return np.array([_compute_progress(walk, ends) for walk, ends in result])
 
     return _make_measure("progress", footing, numbers)
 
 
 @registry.register_start
-def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
+def planted(engine: Any, feet: Sequence[str] | None) -> registry.StartFunction:
     """Return the start in which the deeper foot is on the ground, and at rest there.
 
     Args:
@@ -110,7 +110,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
         raise SettingError("a walker is planted with --engine compiled only")
     footing = find_footing(engine, feet)
 
-    def place(
+    def plant(
         states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]
     ) -> Floats:
         resting = plant_feet(engine, footing, states, numbers=numbers)
@@ -118,7 +118,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
             lift_to_depth(engine, footing, resting, PLANTED_DEPTH_M, -1, numbers=numbers)
         )
 
-    return place
+    return plant
 
 
 def _compute_progress(walk: WalkerSteps, foot_positions: Sequence[float]) -> float:

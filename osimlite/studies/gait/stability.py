@@ -41,10 +41,10 @@ class StabilityOptimization:
         cycles: cycles that were found.
     """
 
-    def __init__(self, search: CycleSearch, found: ModelCycle, digits: int) -> None:
+    def __init__(self, search: CycleSearch, model_cycle: ModelCycle, digits: int) -> None:
         self.cycles: list[ModelCycle] = []
         self._search = search
-        self._first = found
+        self._first = model_cycle
         self._digits = digits
         self._costs: dict[bytes, float] = {}
         self._written: list[ModelCycle] = []
@@ -94,9 +94,9 @@ class StabilityOptimization:
             # With another seed the next round tries other points.
             seed += 1
 
-    def _is_enough(self, found: ModelCycle) -> bool:
+    def _is_enough(self, model_cycle: ModelCycle) -> bool:
         """Return whether a cycle is as stable as the search requires."""
-        return found.cost < self._search.stable
+        return model_cycle.cost < self._search.stable
 
     def _evaluate_cost(self, fractions: Floats, rounds: bool) -> float:
         """Return the cost of the cycle at some fractions, searched from the nearest known cycle."""
@@ -107,7 +107,7 @@ class StabilityOptimization:
         if key not in self._costs:
             nearest = min(
                 (self._first, *self.cycles),
-                key=lambda known_cycle: _compute_distance(known_cycle, fractions),
+                key=lambda earlier_cycle: _compute_distance(earlier_cycle, fractions),
             )
             try:
                 result = self._search.find_cycle(fractions, nearest.cycle.state)
@@ -121,6 +121,6 @@ class StabilityOptimization:
         return self._costs[key]
 
 
-def _compute_distance(found: ModelCycle, fractions: Floats) -> float:
+def _compute_distance(model_cycle: ModelCycle, fractions: Floats) -> float:
     """Return the distance between the numbers of a cycle and some fractions."""
-    return float(np.linalg.norm(found.fractions - fractions))
+    return float(np.linalg.norm(model_cycle.fractions - fractions))

@@ -47,10 +47,10 @@ def find_carriers(engine: BatchEngine, foot_contacts: FootContacts) -> Carriers:
     carrier_offsets: list[int] = []
     lift_offset: int | None = None
     for index in range(dof_count):
-        moved_poses = poses.copy()
-        moved_poses[:, index] += PROBE_STEP
+        displaced_poses = poses.copy()
+        displaced_poses[:, index] += PROBE_STEP
         directions = (
-            (_compute_contact_centres(engine, moved_poses)[:, contacts] - centres) / PROBE_STEP
+            (_compute_contact_centres(engine, displaced_poses)[:, contacts] - centres) / PROBE_STEP
         ).reshape(-1, 3)
         # A carrier moves all contacts equally, in all poses, and by a noticeable amount.
         if np.ptp(directions, axis=0).max() > 1e-9 or np.linalg.norm(directions[0]) < 1e-3:
@@ -60,7 +60,7 @@ def find_carriers(engine: BatchEngine, foot_contacts: FootContacts) -> Carriers:
         if (
             lift_offset is None
             and (
-                measure_along_slope(engine, moved_poses)[1][:, contacts] - depths
+                measure_along_slope(engine, displaced_poses)[1][:, contacts] - depths
                 < -0.1 * PROBE_STEP
             ).all()
         ):
@@ -164,10 +164,10 @@ def plant_feet(
     carrier_directions = []
     centres = _compute_contact_centres(engine, planted, numbers, rows)
     for index in carriers.offsets:
-        moved_poses = planted.copy()
-        moved_poses[:, index] += PROBE_STEP
+        displaced_poses = planted.copy()
+        displaced_poses[:, index] += PROBE_STEP
         carrier_directions.append(
-            (_compute_contact_centres(engine, moved_poses, numbers, rows) - centres)[
+            (_compute_contact_centres(engine, displaced_poses, numbers, rows) - centres)[
                 state_indices, deepest
             ]
             / PROBE_STEP

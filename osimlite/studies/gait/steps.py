@@ -251,7 +251,7 @@ def follow_events(
         {name for name in foot if touching[contact_indices[name]]} for foot in footing.feet
     ]
     lift_times = [0.0] * len(feet)
-    last_foot, first_place = -1, None
+    last_foot, first_position = -1, None
     for (time, name, begins), state, contact_positions in zip(events, states, reached, strict=True):
         if name.startswith(FALL_PREFIX) or (begins and name in footing.falls):
             walk.end = time
@@ -287,11 +287,11 @@ def follow_events(
             rear_position = position
         length = position - rear_position
         air_time = time - lift_times[number]
-        if first_place is None:
-            first_place = position
+        if first_position is None:
+            first_position = position
         if number != last_foot and length >= MIN_STEP_LENGTH_M and air_time >= MIN_AIR_TIME_S:
             walk.steps.append(GaitStep(time, number, length, air_time, state))
-            walk.distance = position - first_place
+            walk.distance = position - first_position
             last_foot = number
         else:
             walk.scuffs.append(Scuff(time, number, length, air_time))

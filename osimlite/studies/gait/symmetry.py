@@ -163,11 +163,11 @@ def find_neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
     Returns:
         Orthonormal directions (y, m).
     """
-    found_slopes = [
+    candidate_slopes = [
         compute_derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)
     ]
-    usual = float(np.median([uneven for _, uneven in found_slopes]))
-    slopes = [slope for slope, uneven in found_slopes if uneven <= MAX_UNEVENNESS * usual]
+    usual = float(np.median([uneven for _, uneven in candidate_slopes]))
+    slopes = [slope for slope, uneven in candidate_slopes if uneven <= MAX_UNEVENNESS * usual]
     size = slopes[0].shape[0]
     result = np.zeros((size, 0))
     # Start from directions that change no rate, then add those that change rates along known neutral

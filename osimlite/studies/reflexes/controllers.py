@@ -327,7 +327,7 @@ class Reflexes:
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of reflexes is not done here")
         target = node.text("target")
-        source = node.text("source", target if reflex_type.is_own else None)
+        source = node.text("source", target if reflex_type.defaults_to_target else None)
 
         def format_name(name: str) -> str:
             """Return the name of a target or source as SCONE writes it in names of parameters."""
@@ -399,11 +399,11 @@ class Reflexes:
         delay = self._read_delay(node, parameters, reflex_prefix)
         gate = self._add_gate(node, parameters, reflex_prefix, leg) if name == CONDITIONAL else -1
         written_keys = {key for key, _ in node.parts}
-        for letter, make_source, default_offset, is_free in reflex_type.channels:
+        for letter, make_source, default_offset, allows_negative in reflex_type.channels:
             keys = {
                 f"K{letter}",
                 f"{letter}0",
-                *(() if is_free is None else (f"allow_neg_{letter}",)),
+                *(() if allows_negative is None else (f"allow_neg_{letter}",)),
             }
             node.read_keys |= keys
             if written_keys.isdisjoint(keys):
@@ -415,7 +415,9 @@ class Reflexes:
                 for key, value in (settings if reflex_type.corrects else settings[::-1])
             }
             gain = numbers[f"K{letter}"]
-            takes_any_sign = is_free is None or node.flag(f"allow_neg_{letter}", is_free)
+            takes_any_sign = allows_negative is None or node.flag(
+                f"allow_neg_{letter}", allows_negative
+            )
             # A gain of 0 that is no parameter needs no sensor.
             if np.any(gain != 0.0) or f"{reflex_prefix}K{letter}" in parameters.requested:
                 source = make_source(
@@ -498,7 +500,7 @@ class Reflexes:
         for source in self.sources:
             ints += (
                 source.kind,
-                source.place,
+                source.sensor_index,
                 numbers.shape[1] + len(sensor_numbers) if source.numbers else source.more,
             )
             # Numbers of sensors follow those of all terms and gates, and are the same for all

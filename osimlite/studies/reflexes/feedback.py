@@ -82,7 +82,7 @@ class Feedback:
             raise controller_parent.error(
                 f"a controller is needed: {join_words(list(CONTROLLERS))}"
             )
-        self._kind, self._node = selection
+        self._class_name, self._node = selection
         self.step = read_control_step(model)
         self._legs = read_leg_names(model)
         initial_values = {
@@ -103,7 +103,7 @@ class Feedback:
     @property
     def digest(self) -> str:
         """SHA-256 digest of everything that determines the controls, as a key of caches."""
-        content = self._kind, self._node, self.step, self._legs, self._values
+        content = self._class_name, self._node, self.step, self._legs, self._values
         return sha256(repr(content).encode()).hexdigest()
 
     def gains(self, model: Model, engine: Any) -> list[Gain]:
@@ -145,7 +145,7 @@ class Feedback:
         """Read the controller for a model; return the sensors, the reflexes and the parameters."""
         sensed = SensedModel(model, engine, 1, self.step, self._legs)
         parameters = Parameters(self._values)
-        reflexes = Reflexes(self._node, self._kind, sensed, parameters)
+        reflexes = Reflexes(self._node, self._class_name, sensed, parameters)
         for name in self._values:
             # The file of `init` may have more parameters than the controller uses.
             if name not in parameters.requested and name not in self._initial:

@@ -319,7 +319,7 @@ class JumpMeasure(Measure):
             times: times at which the jumps ended (w,) (s).
             duration: longest duration (s).
         """
-        start, height, peak, prepared, does = (
+        start, height, peak, prepared, phase = (
             self.read_recorded(self._first, getattr(JUMP_WORK, name))
             for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
         )
@@ -327,7 +327,7 @@ class JumpMeasure(Measure):
         early = 100.0 * np.maximum(prepared - start, 0.0)
         self.report = {"jump height": 100.0 * peak, "early rise": early}
         jump_height = np.where(
-            does == JUMP_PHASE.PREPARES,
+            phase == JUMP_PHASE.PREPARES,
             100.0 * (start + (height - start) / times),
             100.0 * peak - early,
         )
@@ -362,8 +362,8 @@ class EffortMeasure(Measure):
             node.get(key)
         if node.get("name") is None:
             self.name = effort_type
-        self._kind, power = EFFORTS[effort_type]
-        self._first = self.criteria.add(self._kind, power, self, slow, *masses)
+        self._criterion, power = EFFORTS[effort_type]
+        self._first = self.criteria.add(self._criterion, power, self, slow, *masses)
 
     def compute_result(self, times: Array, duration: float) -> Array:
         """Return the mean effort, or the effort per mass and distance (w,).
@@ -379,7 +379,7 @@ class EffortMeasure(Measure):
         # A smallest distance keeps walkers that fall at once from having an infinite cost of
         # transport.
         distance = np.maximum(self.least_distance, np.abs(position - start))
-        if self._kind == CRITERION_TYPE.WANG:
+        if self._criterion == CRITERION_TYPE.WANG:
             mass = self.walkers.mass
             self.report = {
                 "power": self.average_over_time(self._first) / mass,
@@ -454,7 +454,7 @@ class DofMeasure(Penalty):
     def read(self, node: SettingNode) -> None:
         """Read the coordinate and the ranges; rotations are in degrees unless `in_degrees` is false."""
         name = node.text("dof")
-        senses = self.walkers.sensor_plan
+        sensor_plan = self.walkers.sensor_plan
         names = self.walkers.coordinates
         # In a dual-sided composite the side completes the name of the coordinate.
         if name not in names and name + self.side in names:
@@ -475,7 +475,7 @@ class DofMeasure(Penalty):
                 self.penalize(
                     range_node,
                     CRITERION_TYPE.NUMBER,
-                    int(senses[first_sensor]) + names.index(name),
+                    int(sensor_plan[first_sensor]) + names.index(name),
                     scale,
                 )
                 range_node.refuse_unread_parts(f"a {quantity}")

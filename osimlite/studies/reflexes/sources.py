@@ -22,7 +22,7 @@ class Source(NamedTuple):
     Attributes:
         name: name in records.
         kind: kind of sensor, such as `SOURCE_TYPE.IN_ROW` of the kernels.
-        place: index in the sensor row, or number of a link.
+        sensor_index: index in the sensor row, or number of a link.
         more: second index in the sensor row, where the kind has one.
         numbers: numbers of the sensor, such as a point and a direction. If there are any, the
             kernels find their offset where `more` would be.
@@ -30,7 +30,7 @@ class Source(NamedTuple):
 
     name: str
     kind: int
-    place: int
+    sensor_index: int
     more: int = 0
     numbers: tuple[float, ...] = ()
 
@@ -49,15 +49,15 @@ class Channel(NamedTuple):
     Attributes:
         letter: letter of the channel, for example `L` for the length of a muscle.
         make_source: function that makes its sensor.
-        rest: offset without a setting.
-        is_free: whether the term may be negative without a setting `allow_neg_`; None if SCONE has
+        default_offset: offset without a setting.
+        allows_negative: whether the term may be negative without a setting `allow_neg_`; None if SCONE has
             no such setting for it.
     """
 
     letter: str
     make_source: SourceFactory
-    rest: float = 0.0
-    is_free: bool | None = True
+    default_offset: float = 0.0
+    allows_negative: bool | None = True
 
 
 class ReflexType(NamedTuple):
@@ -68,7 +68,7 @@ class ReflexType(NamedTuple):
             indices.
         channels: channels whose terms are added.
         corrects: True for gain * (offset - sensor), False for gain * (sensor - offset).
-        is_own: whether the target is the source of a reflex that names no source.
+        defaults_to_target: whether the target is the source of a reflex that names no source.
         settings: keys that the sensors of the reflex read.
         refused: keys of SCONE that are not supported.
     """
@@ -76,7 +76,7 @@ class ReflexType(NamedTuple):
     names: Callable[[SensedModel], list[str]]
     channels: tuple[Channel, ...]
     corrects: bool = True
-    is_own: bool = False
+    defaults_to_target: bool = False
     settings: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
 
@@ -245,19 +245,21 @@ def _make_angular_velocity_source(
 
 _MUSCLE_CHANNELS = (
     Channel("L", _select_muscle_factory("length", SENSES.LENGTHS), 1.0),
-    Channel("V", _select_muscle_factory("velocity", SENSES.VELOCITIES), is_free=False),
+    Channel("V", _select_muscle_factory("velocity", SENSES.VELOCITIES), allows_negative=False),
     Channel("F", _select_muscle_factory("force", SENSES.FORCES)),
-    Channel("S", _make_spindle_source, is_free=False),
-    Channel("A", _select_muscle_factory("activation", SENSES.ACTIVATIONS), is_free=False),
+    Channel("S", _make_spindle_source, allows_negative=False),
+    Channel("A", _select_muscle_factory("activation", SENSES.ACTIVATIONS), allows_negative=False),
 )
 """Channels of reflexes on muscles: length, velocity, force, spindle rate and activation.
 
 Offsets, and whether a term may be negative, are as in SCONE by default.
 """
 REFLEX_TYPES = {
-    "MuscleReflex": ReflexType(_list_muscles, _MUSCLE_CHANNELS, corrects=False, is_own=True),
+    "MuscleReflex": ReflexType(
+        _list_muscles, _MUSCLE_CHANNELS, corrects=False, defaults_to_target=True
+    ),
     "ConditionalMuscleReflex": ReflexType(
-        _list_muscles, _MUSCLE_CHANNELS, corrects=False, is_own=True
+        _list_muscles, _MUSCLE_CHANNELS, corrects=False, defaults_to_target=True
     ),
     "DofReflex": ReflexType(
         _list_coordinates,
@@ -274,8 +276,12 @@ REFLEX_TYPES = {
     "BodyPointReflex": ReflexType(
         _list_bodies,
         (
-            Channel("P", _select_point_factory("position", SOURCE_TYPE.POSITION), is_free=None),
-            Channel("V", _select_point_factory("speed", SOURCE_TYPE.VELOCITY), is_free=None),
+            Channel(
+                "P", _select_point_factory("position", SOURCE_TYPE.POSITION), allows_negative=None
+            ),
+            Channel(
+                "V", _select_point_factory("speed", SOURCE_TYPE.VELOCITY), allows_negative=None
+            ),
         ),
         settings=("offset", "direction"),
         refused=("KA",),

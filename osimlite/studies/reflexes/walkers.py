@@ -333,7 +333,7 @@ class Walkers(SensedModel):
         self.rows = np.zeros((count, self.sensor_plan[SENSES.SIZE]))
         self.excitations = np.zeros((count, len(self.names)))
         self.progress: Ints = np.zeros((count, PROGRESS.SIZE), dtype=np.int64)
-        self._driven: Ints = self.copies.places[self.order]
+        self._driven: Ints = self.copies.control_offsets[self.order]
 
     # ------------------------------------------------------------------------------------------------- walking
     def set_reflexes_and_criteria(

@@ -85,7 +85,7 @@ class Gradients:
                 "--method gradient needs runs that last until --to; remove --below and --above"
             )
         self._plan, self._variants = plan, Variants(plan)
-        base_variant = self._variants.given
+        base_variant = self._variants.base_variant
         self._measure = make_measure(plan.measures[0], base_variant.engine, plan.feet)
         if self._measure.watches:
             raise UnsupportedError(
@@ -197,7 +197,9 @@ class Gradients:
         variant = self._variants.make_variant(values)
         start = self._variants.make_start(variant, values)
         return _Neighbour(
-            values, variant, self._variants.place_states(variant.engine, [variant], start[None])[0]
+            values,
+            variant,
+            self._variants.make_initial_states(variant.engine, [variant], start[None])[0],
         )
 
     def _simulate_neighbour(self, neighbour: _Neighbour) -> Runs:

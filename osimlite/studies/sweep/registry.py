@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.plan import Plan
     from osimlite.studies.sweep.variables import Floats
 
-    Place = Callable[[Floats, Floats | None, Callable[[Floats], Floats]], Floats]
+    StartFunction = Callable[[Floats, Floats | None, Callable[[Floats], Floats]], Floats]
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -47,7 +47,7 @@ class RegisteredMeasure(NamedTuple):
 
 _MEASURES: dict[str, RegisteredMeasure] = {}
 """Measures by name."""
-_STARTS: dict[str, Callable[[Any, Sequence[str] | None], Place]] = {}
+_STARTS: dict[str, Callable[[Any, Sequence[str] | None], StartFunction]] = {}
 """Initial states by name."""
 
 
@@ -81,7 +81,7 @@ def make_gradients(plan: Plan) -> Any:
     return import_module(GRADIENTS_MODULE).Gradients(plan)
 
 
-def find_start(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
+def find_start(name: str) -> Callable[[Any, Sequence[str] | None], StartFunction]:
     """Return the function that makes the start of a name."""
     result = _load_provider(_STARTS, name)
     assert result is not None

@@ -209,7 +209,7 @@ class _Dispatcher:
         self.outcome = outcome
         self.progress = progress
         self.next = self.saved = partial.rows
-        self.under_way = 0
+        self.pending_count = 0
         self.size = INITIAL_TASK_SIZE
         self.done: dict[int, tuple[Floats, Block]] = {}
         self.values: dict[int, Floats] = {}
@@ -222,10 +222,10 @@ class _Dispatcher:
             while self.saved < self.samples.count:
                 self._submit_tasks()
                 first_sample, block = self.pool.result()
-                self.under_way -= 1
+                self.pending_count -= 1
                 self.done[first_sample] = self.values.pop(first_sample), block
                 self._record_block(block)
-                is_last = not self.under_way and self.next >= self.samples.count
+                is_last = not self.pending_count and self.next >= self.samples.count
                 if is_last or time.monotonic() - self.last_saved > SAVE_SECONDS:
                     self._save_rows()
         # Also Ctrl-C: results so far are worth keeping.
@@ -239,13 +239,13 @@ class _Dispatcher:
         farthest = self.saved + 64 * max(MAX_TASK_SIZE, self.size)
         while (
             self.next < min(self.samples.count, farthest)
-            and self.under_way < TASKS_PER_WORKER * self.pool.workers
+            and self.pending_count < TASKS_PER_WORKER * self.pool.workers
         ):
             values = self.samples.make_block(self.next, self.size)
             self.values[self.next] = values
             self.pool.submit(self.next, values)
             self.next += len(values)
-            self.under_way += 1
+            self.pending_count += 1
 
     def _record_block(self, block: Block) -> None:
         """Update the outcome, and adapt the size of tasks to the duration of runs.

@@ -78,12 +78,12 @@ class _Sample(NamedTuple):
     """Sample with its model and its initial state.
 
     Attributes:
-        place: index of the sample in the block.
+        row: index of the sample in the block.
         variant: model of the sample.
         start: initial state (y,).
     """
 
-    place: int
+    row: int
     variant: Variant
     start: Floats
 
@@ -149,8 +149,8 @@ class Runner:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.variants = Variants(plan)
-        base_variant = self.variants.given
-        self._looks: dict[bytes, _Observers] = {
+        base_variant = self.variants.base_variant
+        self._cached_observers: dict[bytes, _Observers] = {
             base_variant.structure: _Observers(plan, base_variant.engine)
         }
         moments = [] if plan.interval is None else compute_report_times(plan.to, plan.interval)
@@ -182,7 +182,7 @@ class Runner:
             except OsimliteError as error:
                 # A measure may need something that models of another structure lack.
                 for sample in group:
-                    block.status[sample.place], block.reasons[sample.place] = FAILED, str(error)
+                    block.status[sample.row], block.reasons[sample.row] = FAILED, str(error)
         # A run whose measure fails counts as failed, so that its other measures are dropped.
         failed = [index for index in range(count) if block.status[index] == FAILED]
         for column in block.measures.values():
@@ -192,26 +192,26 @@ class Runner:
     def _run_group(self, group: Sequence[_Sample], values: Floats, block: Block) -> None:
         """Run samples whose models have one structure, in one call of the engine."""
         # Any engine of the same structure works, and making one takes time.
-        base_variant, first_variant = self.variants.given, group[0].variant
+        base_variant, first_variant = self.variants.base_variant, group[0].variant
         engine = (
             base_variant if first_variant.structure == base_variant.structure else first_variant
         ).engine
         observers = self._get_observers(first_variant.structure, engine)
         variants = [sample.variant for sample in group]
-        starts = self.variants.place_states(
+        starts = self.variants.make_initial_states(
             engine, variants, np.stack([sample.start for sample in group])
         )
         runs, endings = self._simulate_batch(engine, observers, variants, starts)
         for number, sample in enumerate(group):
-            block.status[sample.place], block.reasons[sample.place] = endings[number]
-            block.times[sample.place] = runs.times[number]
+            block.status[sample.row], block.reasons[sample.row] = endings[number]
+            block.times[sample.row] = runs.times[number]
         successful = np.array(
             [number for number, (status, _) in enumerate(endings) if status != FAILED], dtype=int
         )
         if len(successful) == 0:
             return
         selected = [group[number].variant for number in successful]
-        rows = np.array([group[number].place for number in successful])
+        rows = np.array([group[number].row for number in successful])
         batch = Batch(
             engine,
             lambda number: selected[number].engine,
@@ -227,12 +227,12 @@ class Runner:
 
     def _get_observers(self, structure: bytes, engine: Any) -> _Observers:
         """Return the measures and watches for a structure of the model, from a cache."""
-        result = self._looks.get(structure)
+        result = self._cached_observers.get(structure)
         if result is None:
             # Parameters of a function may give every sample a structure of its own.
-            if len(self._looks) >= CACHED_VARIANTS:
-                self._looks = {}
-            result = self._looks[structure] = _Observers(self.plan, engine)
+            if len(self._cached_observers) >= CACHED_VARIANTS:
+                self._cached_observers = {}
+            result = self._cached_observers[structure] = _Observers(self.plan, engine)
         return result
 
     def _apply_measure(self, measure: RunMeasure, batch: Batch, rows: Any, block: Block) -> None:
@@ -275,7 +275,11 @@ class Runner:
             event_states=any(measure.event_states for measure in observers.measures),
             most_tries=MAX_INTEGRATOR_STEPS,
             threads=1,
-            held=[variant.held for variant in variants if variant.held is not None],
+            controllers=[
+                variant.kernel_controller
+                for variant in variants
+                if variant.kernel_controller is not None
+            ],
         )
         endings: Endings = []
         for number, (ending, state) in enumerate(

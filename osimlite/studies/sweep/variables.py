@@ -85,11 +85,11 @@ class Property:
     """Numbers of the model that are equal, or are multiplied by the same factor.
 
     Attributes:
-        places: paths of the properties.
+        paths: paths of the properties.
         is_scaled: whether the variable is a factor.
     """
 
-    places: tuple[PropertyPath, ...]
+    paths: tuple[PropertyPath, ...]
     is_scaled: bool = False
 
     @property
@@ -99,7 +99,7 @@ class Property:
         Returns:
             Path of each property.
         """
-        return self.places
+        return self.paths
 
 
 @dataclass(frozen=True)
@@ -446,10 +446,10 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
     if count == 1 and lower != upper:
         raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
     # "rad | m" is either, by a coordinate that is not known here.
-    known_unit = "" if "|" in unit or unit == "parameter" else unit
-    if known_unit and isinstance(target, Start) and target.is_speed:
-        known_unit += "/s"
-    return Variable(name, target, lower, upper, count, is_log, unit=known_unit)
+    value_unit = "" if "|" in unit or unit == "parameter" else unit
+    if value_unit and isinstance(target, Start) and target.is_speed:
+        value_unit += "/s"
+    return Variable(name, target, lower, upper, count, is_log, unit=value_unit)
 
 
 def _refuse_mixed_units(name: str, bound_texts: Sequence[object], unit: str) -> None:

@@ -61,7 +61,7 @@ class Variant:
         maker: function that makes the engine of the model.
         simulation: simulation of the engine; None if only numbers were updated.
         controller: feedback controller of the sample.
-        held: controller of the sample in the form of the kernels.
+        kernel_controller: controller of the sample in the form of the kernels.
     """
 
     state: StateLayout
@@ -70,7 +70,7 @@ class Variant:
     maker: Callable[[], Any]
     simulation: Simulation | None = None
     controller: Feedback | None = None
-    held: KernelController | None = None
+    kernel_controller: KernelController | None = None
 
     @cached_property
     def engine(self) -> Any:
@@ -86,7 +86,7 @@ class Variants:
 
     Attributes:
         model: model with the numbers of the latest variant.
-        given: variant of the model with none of the variables set.
+        base_variant: variant of the model with none of the variables set.
 
     Raises:
         OsimliteError: the model cannot be simulated.
@@ -111,11 +111,11 @@ class Variants:
             k for k, target in enumerate(targets) if isinstance(target, FunctionParameter)
         ]
         self._set_model(plan.model())
-        self.given = self._make_complete_variant()
+        self.base_variant = self._make_complete_variant()
         if plan.is_planted:
             # A model without two feet fails here, before any run.
-            find_start("planted")(self.given.engine, plan.feet)
-        self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
+            find_start("planted")(self.base_variant.engine, plan.feet)
+        self._cached_variants: dict[tuple[float, ...], Variant | OsimliteError] = {}
         self._renewal: ModelUpdater | None = None
 
     @property
@@ -130,18 +130,18 @@ class Variants:
             OsimliteError: the model is invalid with these values.
         """
         if not self._changes:
-            return self.given
+            return self.base_variant
         key = tuple(values[index] for index in self._changes)
-        result = self._kept.get(key)
+        result = self._cached_variants.get(key)
         if result is None:
             try:
                 result = self._make_variant(values)
             # Errors are cached, too: an invalid model would be built again for each sample.
             except OsimliteError as error:
                 result = error
-            if len(self._kept) >= CACHED_VARIANTS:
-                self._kept = {}
-            self._kept[key] = result
+            if len(self._cached_variants) >= CACHED_VARIANTS:
+                self._cached_variants = {}
+            self._cached_variants[key] = result
         if isinstance(result, OsimliteError):
             raise result
         return result
@@ -157,9 +157,11 @@ class Variants:
             OsimliteError: a coordinate is unknown or locked, or a muscle has no equilibrium.
         """
         # A new engine is made only if the structure, and so the coordinates, may differ.
-        engine = (self.given if variant.structure == self.given.structure else variant).engine
+        engine = (
+            self.base_variant if variant.structure == self.base_variant.structure else variant
+        ).engine
         row = np.array(variant.state.pack_defaults())
-        simulation = variant.simulation or self.given.simulation
+        simulation = variant.simulation or self.base_variant.simulation
         if simulation is not None and simulation.constraints:
             # Assembly computes the dependent coordinates from those that are set.
             selected: tuple[dict[str, float], dict[str, float]] = {}, {}
@@ -207,7 +209,9 @@ class Variants:
                 )
         return rows
 
-    def place_states(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
+    def make_initial_states(
+        self, engine: Any, variants: Sequence[Variant], starts: Floats
+    ) -> Floats:
         """Return initial states (k, y), with the feet on the ground if the plan requests it.
 
         Args:
@@ -229,7 +233,7 @@ class Variants:
     def list_current_values(self) -> list[float | None]:
         """Return the values of the variables in the given model; None where it has no value."""
         result: list[float | None] = []
-        engine = self.given.engine
+        engine = self.base_variant.engine
         setters = dict(self._setters)
         for index, variable in enumerate(self._plan.variables):
             if isinstance(variable.target, Start):
@@ -263,7 +267,7 @@ class Variants:
         if self._plan.is_planted:
             variant = self.make_variant(values)
             engine = variant.engine
-            (row,) = self.place_states(
+            (row,) = self.make_initial_states(
                 engine, [variant], self.make_start(variant, values)[None]
             ).tolist()
             for number, index in enumerate(engine.order):
@@ -333,7 +337,7 @@ class Variants:
         for index in self._changes:
             target = self._plan.variables[index].target
             if isinstance(target, Property):
-                setters = [element.make_setter(model) for element in target.places]
+                setters = [element.make_setter(model) for element in target.paths]
                 self._setters.append(
                     (
                         index,
@@ -343,7 +347,7 @@ class Variants:
                     )
                 )
                 changed_components += [
-                    model.tree().by_path[element.component] for element in target.places
+                    model.tree().by_path[element.component] for element in target.paths
                 ]
             elif isinstance(target, Slope):
                 self._slopes.append(index)
@@ -395,13 +399,13 @@ class Variants:
         """Compile the controller for a variant."""
         if self._controller is not None:
             variant.controller = self._controller
-            variant.held = self._controller.compile_for(self.model, variant.engine)
+            variant.kernel_controller = self._controller.compile_for(self.model, variant.engine)
         return variant
 
     def _make_variant(self, values: Sequence[float]) -> Variant:
         """Make the model of a sample, by an update if possible."""
         self.apply_sample(values)
-        base_variant = self.given
+        base_variant = self.base_variant
         # Gains change the controller only; the engine stays.
         if self._changes == self._gains:
             return self._add_controls(replace(base_variant))

@@ -57,7 +57,7 @@ def found(tmp_path_factory):
 @pytest.mark.full
 def test_a_walker_is_found_that_never_stops(found):
     gait, folder, stages = found
-    assert gait.found.cycle.residual < 1e-9 and gait.found.cycle.largest < 1.0
+    assert gait.model_cycle.cycle.residual < 1e-9 and gait.model_cycle.cycle.largest < 1.0
     assert gait.walk.walks and len(gait.walk.steps) > 50 and not gait.walk.scuffs
     assert sorted({title for title, _, _ in stages}) == [
         "closing cycles",
@@ -66,9 +66,9 @@ def test_a_walker_is_found_that_never_stops(found):
     ]
     with Simulation(read(folder / "best.osim"), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    assert cycle.largest == pytest.approx(gait.found.cycle.largest, abs=1e-2)
+    assert cycle.largest == pytest.approx(gait.model_cycle.cycle.largest, abs=1e-2)
     assert (cycle.length, cycle.period) == pytest.approx(
-        (gait.found.cycle.length, gait.found.cycle.period), rel=1e-7
+        (gait.model_cycle.cycle.length, gait.model_cycle.cycle.period), rel=1e-7
     )
 
 
@@ -77,13 +77,13 @@ def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
     gait, folder, _ = found
     before, after = dynamic_walker(), read(folder / "best.osim")
     assert {
-        name: float(f"{number:.3g}") for name, number in gait.found.numbers.items()
-    } == gait.found.numbers
+        name: float(f"{number:.3g}") for name, number in gait.model_cycle.numbers.items()
+    } == gait.model_cycle.numbers
     for body in ("LeftShank", "RightShank"):
         assert after[f"/bodyset/{body}"].inertia == (
             1.0,
             1.0,
-            gait.found.numbers[INERTIA],
+            gait.model_cycle.numbers[INERTIA],
             0.0,
             0.0,
             0.0,
@@ -91,7 +91,7 @@ def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
         before[f"/bodyset/{body}"].inertia = after[f"/bodyset/{body}"].inertia
     for side in "LR":
         sphere = f"/contactgeometryset/{side}FootContact"
-        assert after[sphere].location[0] == gait.found.numbers[AHEAD]
+        assert after[sphere].location[0] == gait.model_cycle.numbers[AHEAD]
         before[sphere].location = after[sphere].location
     for coordinate in after.components(Coordinate):
         if coordinate.name in gait.start:
@@ -104,8 +104,8 @@ def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
 def test_the_files_tell_what_was_found_and_how(found):
     gait, folder, _ = found
     summary = json.loads((folder / "summary.json").read_text())
-    assert summary["numbers"] == gait.found.numbers and summary["settings"]["seed"] == 0
-    assert summary["largest_multiplier"] == gait.found.cycle.largest
+    assert summary["numbers"] == gait.model_cycle.numbers and summary["settings"]["seed"] == 0
+    assert summary["largest_multiplier"] == gait.model_cycle.cycle.largest
     heads, *rows = (folder / "cycles.csv").read_text().splitlines()
     assert (
         heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and len(rows) == gait.cycles
@@ -126,7 +126,7 @@ def test_another_walker_is_spared_unless_forced_and_the_same_seed_finds_the_same
         assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
         (tmp_path / name).unlink()
     again = find_gait(plan(dynamic_walker(), NEAR), folder, **FEW, force=True, threads=1)
-    assert again.found.cycle.state.tolist() == gait.found.cycle.state.tolist()
+    assert again.model_cycle.cycle.state.tolist() == gait.model_cycle.cycle.state.tolist()
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 

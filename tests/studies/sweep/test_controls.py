@@ -199,7 +199,7 @@ def test_names():
         Control((motor,), "node", 1.0),
     ]
     assert targets("/forceset/m{?}/control") == [Control((mu,))]
-    assert [len(target.places) for target in targets("{*}/max_control@scale")] == [1, 1]
+    assert [len(target.paths) for target in targets("{*}/max_control@scale")] == [1, 1]
     assert targets("mu/control@scale") == [Control((mu,), "scale")]
 
 

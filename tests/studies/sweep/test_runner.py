@@ -148,7 +148,7 @@ def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
     for end in (1, 0):
         row = [NUMBERS[name][end] for name in chosen]
         variant = variants.make_variant(row)
-        assert variant.simulation is None and variant.structure == variants.given.structure
+        assert variant.simulation is None and variant.structure == variants.base_variant.structure
         model, _, _ = changed(chosen, row)
         with Simulation(model, "compiled") as simulation:
             engine = simulation.engine

@@ -43,14 +43,14 @@ def test_names():
     assert one("?Hip_rz/speed").target == Start((HIP, "/jointset/LeftThighToPelvis/LHip_rz"), True)
     assert one("slope").target == Slope()
     assert one("slope", parameters={"slope": 10.0}).target == FunctionParameter("slope", 10.0)
-    (place,) = one("/bodyset/Pelvis/mass_center/1").target.places
+    (place,) = one("/bodyset/Pelvis/mass_center/1").target.paths
     assert (place.component, place.steps, place.unit) == (
         "/bodyset/Pelvis",
         ("mass_center", 1),
         "m",
     )
     locked = one("platform_rz", "-12deg:-2deg")
-    assert isinstance(locked.target, Property) and locked.target.places[0].steps == (
+    assert isinstance(locked.target, Property) and locked.target.paths[0].steps == (
         "default_value",
     )
     assert locked.low == math.radians(-12)
@@ -76,7 +76,7 @@ def test_controls():
 
 def test_several_numbers_by_one_path():
     result = one("/forceset/*Foot*/contact_parameters/stiffness", "1e5:1e7:3:log")
-    assert [place.component for place in result.target.places] == [
+    assert [place.component for place in result.target.paths] == [
         "/forceset/RFootForce",
         "/forceset/LFootForce",
     ]

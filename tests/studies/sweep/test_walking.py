@@ -80,10 +80,10 @@ def test_progress_tells_how_near_the_next_step_was(walker):
 def test_a_planted_walker_stands_at_rest(walker):
     made = plan(walker, VARY, measures=("steps",), is_planted=True)
     runner, rows = Runner(made), points(VARY)
-    given = runner.variants.given
+    given = runner.variants.base_variant
     engine = given.engine
     bare = np.array([runner.variants.make_start(given, row) for row in rows.tolist()])
-    starts = runner.variants.place_states(engine, [given] * len(rows), bare)
+    starts = runner.variants.make_initial_states(engine, [given] * len(rows), bare)
     feet = [engine.contacts.index(name) for foot in find_footing(engine).feet for name in foot]
     n, which = len(engine.order), np.arange(len(rows))
 
