@@ -82,7 +82,7 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
         tag: "this muscle has never had it" for tag in ("Vmax", "Vmax0", "damping", "muscle_model")
     },
     "Millard2012EquilibriumMuscle": {
-        tag: "this muscle has no such part"
+        tag: "this class of muscles has no such property"
         for tag in (
             "MuscleFirstOrderActivationDynamicModel",
             "MuscleSecondOrderActivationDynamicModel",

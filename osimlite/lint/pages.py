@@ -16,7 +16,7 @@ _CONSEQUENCE_TEXTS = {
     REFUSES: "refuses the file",
     FAILS: "fails when it needs the faulty part",
     NAN: "computes NaN",
-    RUNS: "runs it, but may compute another model than the file describes",
+    RUNS: "runs it, but may compute something else than the file describes",
 }
 _INTRODUCTION = """\
 # Rules
@@ -30,8 +30,8 @@ severity than its rule where the file shows the reason. `--fix` makes **safe** f
 or the one that was certainly meant. An **unsafe** fix is a guess; `--unsafe-fixes` makes it.
 
 The column **OpenSim** is about errors: OpenSim **refuses** the file or the model (or crashes or hangs), loads it and
-**fails** as soon as it needs the faulty part, computes **nan**, or **runs** it, but may compute another model than the
-file describes. It is empty if the rule does not say. Each finding has one of these words as `consequence` in
+**fails** as soon as it needs the faulty part, computes **nan**, or **runs** it, but may compute something else than
+the file describes. It is empty if the rule does not say. Each finding has one of these words as `consequence` in
 `--format json`; that of a warning or an info is `runs`."""
 _SHORT = {"": "", "safe": "safe", "unsafe": "unsafe", "both": "safe or unsafe"}
 

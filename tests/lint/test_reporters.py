@@ -47,7 +47,7 @@ def test_full(report):
           |          ^^^^^^^^^
 
         m.osim:7:27: error OSIM301 unresolved-reference
-          Marker 'asis': socket_parent_frame names '/grund', but there is no such
+          Marker 'asis': <socket_parent_frame> names '/grund', but there is no such
           PhysicalFrame
           |
         7 | <socket_parent_frame>/grund</socket_parent_frame>
@@ -71,7 +71,7 @@ def test_full(report):
 
 def test_concise(report):
     assert render(report, "concise").splitlines()[1:] == [
-        "m.osim:7:27: error OSIM301 Marker 'asis': socket_parent_frame names '/grund', but there is no such "
+        "m.osim:7:27: error OSIM301 Marker 'asis': <socket_parent_frame> names '/grund', but there is no such "
         "PhysicalFrame (did you mean '/ground'?)",
         "m.osim:8:13: error OSIM201 fixed of Marker 'asis' is 'yes', expected true or false: OpenSim keeps the default, "
         "false (did you mean 'true'?)",
@@ -85,7 +85,7 @@ def test_json_has_what_is_promised(report):
         "code": "OSIM301",
         "name": "unresolved-reference",
         "severity": "error",
-        "message": "Marker 'asis': socket_parent_frame names '/grund', but there is no such PhysicalFrame",
+        "message": "Marker 'asis': <socket_parent_frame> names '/grund', but there is no such PhysicalFrame",
         "file": "m.osim",
         "line": 7,
         "column": 27,

@@ -126,7 +126,7 @@ def test_a_comment_written_as_an_element_is_one_finding_with_a_fix(tmp_path: Pat
     report = validate(path, ignore="OSIM63")
     assert report.codes == {"OSIM101": 2}
     assert not report.errors
-    assert any("4 more elements <Comment>" in finding.message for finding in report)
+    assert any("<Comment> occurs 4 more times" in finding.message for finding in report)
     text = _apply(path, report)
     assert text.count("<!-- measured on the left leg -->") == 5
     assert not check(text).codes

@@ -126,7 +126,7 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"name": "angel"}, "has no coordinate 'angel'"),
+        ({"name": "angel"}, "names the coordinate 'angel', which the model does not have"),
         ({"active": "false true true"}, "no task of .* is active"),
         ({"active": ""}, "has an empty 'active'"),
         ({"final": 0.0005}, "set a later final_time"),

@@ -200,8 +200,8 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
     Looks for the files of external loads, of controllers and of table sources beside the model and
     in the working folder of the program.
 
-    OpenSim rejects the model when it is connected; only a ControlSetController continues, without
-    controls.
+    OpenSim rejects the model when it connects the components; only a ControlSetController
+    continues, without controls.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>

@@ -237,11 +237,11 @@ def report_defaults_block(subject: Subject, report: FindingCollector) -> None:
 def report_force_outside_set(subject: Subject, report: FindingCollector) -> None:
     """Forces are outside the ForceSet.
 
-    Reports forces, actuators and muscles among the `<components>` of the model or of another part
-    of it, or in its ComponentSet: once for each such place.
+    Reports forces, actuators and muscles in the `<components>` of the model or of one of its
+    components, or in the ComponentSet. Each such list is reported once.
 
-    They act. But OpenSim lists forces, actuators and muscles from the ForceSet only, so
-    controllers, probes, static optimization and CMC do not find a muscle elsewhere.
+    Such forces act on the model. But OpenSim lists forces, actuators and muscles from the ForceSet
+    only, so controllers, probes, static optimization and CMC do not find a muscle elsewhere.
 
     ```xml
     - <components>
@@ -310,8 +310,8 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
         if refusal.number in reported_numbers:
             continue
         report(
-            f"{refusal.message}: OpenSim, which must upgrade a document of version "
-            f"{subject.version}, rejects it",
+            f"{refusal.message}: OpenSim cannot upgrade this document of version "
+            f"{subject.version} and rejects it",
             number=refusal.number,
         )
 

@@ -177,7 +177,7 @@ RATE = Threshold(
     "resting-point",
     0.005,
     "m/rad, or m/m",
-    "largest accepted motion of a path point per coordinate at an end of the range, where OpenSim stops the point",
+    "largest accepted speed, relative to the coordinate, of a path point at an end of the range",
 )
 
 
@@ -242,10 +242,10 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
             )
         else:
             report(
-                f"OpenSim stops {names} at the ends of the range of '{end.coordinate}', but beyond "
-                "them it computes path speeds and moment arms as if the point moved on, by "
-                f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}; add a "
-                "CoordinateLimitForce",
+                f"{names} does not move outside the range of '{end.coordinate}' in OpenSim, but "
+                "OpenSim computes path speeds and moment arms there as if it moved, by "
+                f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}; keep the "
+                "coordinate in its range with a CoordinateLimitForce",
                 owner,
                 severity=INFO,
             )

@@ -76,9 +76,9 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     Reports white space, `/`, `\`, `*` and `+` in the names of components.
 
     Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
-    removes all white space from names, but keeps that in the middle of references. A reference to a
-    name with white space in its middle then leads nowhere: OpenSim rejects the file, unless only
-    groups and controllers have such references.
+    removes all white space from names, but only that at both ends from references. A reference to
+    'right asis' then finds nothing, because the component is now called 'rightasis'. OpenSim rejects
+    the file, unless only groups and controllers have such references.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -193,8 +193,8 @@ def list_old_references(subject: Subject, source: Source, name: str) -> list[str
 def report_missing_name(subject: Subject, report: FindingCollector) -> None:
     """A component has no name.
 
-    Reports members of sets, and coordinates, without a name or with an empty one. It is an error if
-    a reference is unresolved that may mean this component.
+    Reports members of sets, and coordinates, without a name or with an empty one. If the file also
+    has an unresolved reference that may mean this component, the finding is an error.
 
     OpenSim names such a component after its class, in lower case. References by the intended name
     fail, and the columns of results are named `body` or `pinjoint`.

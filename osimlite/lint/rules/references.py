@@ -33,8 +33,8 @@ def report_unresolved_reference(subject: Subject, report: FindingCollector) -> N
     references, with the force, joint or other component that contains them and the nearest existing
     name.
 
-    OpenSim rejects the model when it is connected, and its message names neither the line nor, for
-    a contact, the force. A group loses a missing member without a message.
+    OpenSim rejects the model when it connects the components. Its message does not name the line
+    and, for a contact, not the force. A group loses a missing member without a message.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -47,7 +47,8 @@ def report_unresolved_reference(subject: Subject, report: FindingCollector) -> N
         use = broken.use
         text = broken.text
         message = (
-            f"{_format_subject(subject, use)} '{text}', but there is no such {use.reference.target}"
+            f"{_format_subject(subject, use)} '{text}', but there is no such "
+            f"{use.reference.target if use.reference.target != 'Object' else 'object'}"
         )
         if broken.hint == "comma":
             message += "; separate the names by blanks, without commas"
@@ -100,7 +101,7 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
 
     Reports sockets and names that are empty or not given.
 
-    OpenSim rejects the model when it is connected.
+    OpenSim rejects the model when it connects the components.
 
     ```xml
       <Marker name="asis">
@@ -170,9 +171,8 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
             start = subject.source.line_start(position.line) + position.column - 1
             text = subject.source.text[start : start + position.length]
             report(
-                f"{change.where} names '{text}', as files did during the development of version "
-                "4: OpenSim 4.6 finds nothing there and rejects the model; `osimlite upgrade` "
-                "rewrites the path",
+                f"{change.where} names '{text}', a path as in test versions of OpenSim 4: OpenSim 4.6 "
+                "finds nothing there and rejects the model; `osimlite upgrade` rewrites the path",
                 at=position,
                 consequence=REFUSES,
             )
@@ -437,8 +437,8 @@ def _is_undecided(subject: Subject, use: Use, text: str) -> bool:
 
 
 def _format_subject(subject: Subject, use: Use) -> str:
-    """Return the beginning of a message, such as ``HuntCrossleyForce 'foot': geometry names``."""
-    return f"{_describe_holder(subject, use)}: {use.spec.tag} names"
+    """Return the beginning of a message, such as ``HuntCrossleyForce 'foot': <geometry> names``."""
+    return f"{_describe_holder(subject, use)}: <{use.spec.tag}> names"
 
 
 def _describe_holder(subject: Subject, use: Use) -> str:

@@ -18,11 +18,11 @@ from osimlite.schema.tree import is_a
 def report_missing_column(setup: Setup, report: FindingCollector) -> None:
     """A table of coordinates lacks columns for coordinates of the model.
 
-    Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's
-    inverse dynamics accepts plain names only, analyses also paths of values, `osimlite run` any
-    path. A task
-    whose value comes from a file needs a column there, and a table of states needs one for every
-    state of the model.
+    Compares the columns of a table of coordinates with the coordinates of the model. OpenSim's
+    inverse dynamics accepts plain names only, such as `knee_angle`. Its analyses also accept paths
+    such as `/jointset/knee/knee_angle/value`, and `osimlite run` accepts paths of every version. A
+    task whose value comes from a file needs a column there, and a table of states needs one for
+    every state of the model.
 
     OpenSim gives a coordinate without a column its default value, in analyses 0, without a message
     or with a line in the log: the motion is wrong.

@@ -34,10 +34,10 @@ _SHARED = {
 def report_missing_input(setup: Setup, report: FindingCollector) -> None:
     """A file that a setup reads is missing or not named.
 
-    Searches every file that a setup reads where OpenSim does: beside the setup, if OpenSim is
-    started there. Files that another setup of the project writes need not exist yet. Reports names
-    in the wrong letter case and names with backslashes, which only Windows accepts, and suggests a
-    file with a similar name.
+    Checks whether OpenSim finds every file that a setup reads. File names are relative to the
+    folder of the setup, as in OpenSim if it is started there. Files that another setup of the
+    project writes need not exist yet. Reports names in the wrong letter case and names with
+    backslashes, which only Windows accepts, and suggests a file with a similar name.
 
     OpenSim rejects the setup; where the model is missing, inverse kinematics crashes. A missing
     file of controls is only logged, and the tool runs without controls. A setup that names no file

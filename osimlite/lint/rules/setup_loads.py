@@ -135,10 +135,11 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
 
     Poses the model along the motion of the tool, and reports measured forces that act more than
     40 cm from their body: from its origin, mass centre, joints, markers and contact surfaces. Every
-    point of a foot or a hand is nearer, even if foot and shank are one body. A force that is
-    expressed in a body is reported if the same numbers point up more when they are read as components
-    in ground. A torque is reported if it is larger than the moment of the force at a distance of
-    40 cm. The sum of all forces must point up if it is at least half the weight of the model.
+    point of a foot or a hand is nearer, even if foot and shank are one body. For a force that is
+    expressed in a body, the rule also reads its numbers as components in ground. If the force then
+    points more upwards, it is reported. A torque is reported if it is larger than the moment of the
+    force at a distance of 40 cm. The sum of all forces must point up if it is at least half the
+    weight of the model.
 
     OpenSim applies the force where the setup says: joint moments are wrong by the force times that
     distance, without a message. Typical causes are swapped feet, points in millimetres, torques in
@@ -190,8 +191,8 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
             # the ground.
             if len(far_distances) > max(2, len(acting) // 4):
                 report(
-                    f"at {len(far_distances)} of {len(acting)} times {describe_object(force)} acts more "
-                    f"than {_MAX_DISTANCE_M:g} m from {force.applied_to_body}, by up to "
+                    f"at {len(far_distances)} of {len(acting)} checked times {describe_object(force)} acts "
+                    f"more than {_MAX_DISTANCE_M:g} m from {force.applied_to_body}; the largest distance is "
                     f"{max(far_distances):.3g} m: does it belong to another body, or are its points in "
                     "another frame or unit?",
                     force,

@@ -33,9 +33,10 @@ _SET_PATHS = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/cont
 def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     """A setup refers to something that the model of its tool does not have.
 
-    Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that
-    a setup reads, names in the model of the tool, with the sets of forces and markers that the tool
-    adds to it. In Moco studies also states, controls and outputs, by their paths or by patterns.
+    Checks whether the model of the tool has every marker, coordinate, body, joint, muscle and
+    actuator that the setup names, or that a set names which the setup reads. Forces and markers
+    that the tool adds to the model count, too. In Moco studies the rule also checks states,
+    controls and outputs, which paths or patterns name.
 
     Most tools reject the setup, some crash. Missing markers of tasks, bodies of scale factors and
     muscles of an analysis are ignored without a message, and so are patterns without a match
@@ -144,7 +145,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
             # Names that other objects of this class use already are no likely spelling.
             names = names.difference(sibling.name for sibling in setup.by_class[type(item)])
         report(
-            f"the model has no {target_kind} '{text}', which {describe_object(item)} names: {consequence}{hint}",
+            f"{describe_object(item)} names the {target_kind} '{text}', which the model does not have: {consequence}{hint}",
             item,
             **position,
             severity=severity,

@@ -52,16 +52,16 @@ has not set; of more OpenSim uses the first two.
 02 few-rows, error, in any: A motion has fewer than six rows. OpenSim needs at least six for its spline.
 - <coordinates_file>short.mot</coordinates_file>
 + <coordinates_file>leg.mot</coordinates_file>
-03 impossible-times, error, in dynamics: A time range of a tool or an analysis is reversed or not a number. It fails,
-writes tables without rows, or uses other times.
+03 impossible-times, error, in dynamics: A time range of a tool or an analysis is reversed or not a number. The tool
+fails, writes tables without rows, or uses other times.
 - <time_range>0.5 0</time_range>
 + <time_range>0 0.5</time_range>
 04 too-short-for-control, error, in control: The time range of computed muscle control is too short. It needs 0.03 s for the first
 states, and one window.
 - <initial_time>0</initial_time> <final_time>0.02</final_time>
 + <initial_time>0</initial_time> <final_time>0.5</final_time>
-05 no-data-at-times, error, in dynamics: A tool runs completely before or after its data. It fails, crashes, or computes
-one row at the end of the data. Scaling measures in the first or the last frame: that is a warning.
+05 no-data-at-times, error, in dynamics: A tool runs completely before or after its data. The tool fails, crashes, or
+computes one row at the end of the data. Scaling uses the first or the last frame; that is a warning.
 - <time_range>5 6</time_range>
 + <time_range>0 0.5</time_range>
 06 stops-at-default, warning, in ik: A tool has no end time and its data continue. Inverse kinematics stops at 2 s: OpenSim

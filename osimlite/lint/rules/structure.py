@@ -63,7 +63,7 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
         groups.setdefault((note.word, item.suggestion, item.severity), []).append(item)
     for first, *similar in groups.values():
         count_note = (
-            f"; the file has {format_count(len(similar), 'more element')} <{first.note.word}>"
+            f" (<{first.note.word}> occurs {format_count(len(similar), 'more time')} in this file)"
             if similar
             else ""
         )
@@ -94,8 +94,8 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
     if reason is not None:
         fix = remove_element(subject.source, note.number)
         message = (
-            f"OpenSim 4.6 ignores <{note.word}> of {describe_object(owner)} in files of every "
-            f"version: {reason}; delete it"
+            f"OpenSim 4.6 ignores <{note.word}> of {describe_object(owner)} in files of all "
+            f"versions: {reason}; delete it"
         )
         # Old programs write the tags of setups also where they have no value.
         is_empty = subject.model is None and _is_switched_off(subject, note.number)
@@ -243,7 +243,10 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
     for note, owner in subject.notes_of("duplicate-tag"):
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
-        used_value = "" if isinstance(note.spec.kind, ObjectField) else f", {format_value(value)},"
+        used_value = ""
+        if not isinstance(note.spec.kind, ObjectField):
+            text = format_value(value)
+            used_value = f" ('{text if len(text) <= 60 else f'{text[:57]}...'}')"
         # Two objects of different classes in a property that holds one.
         if note.word != note.spec.tag:
             report(

@@ -65,8 +65,8 @@ def report_broken_input(subject: Subject, report: FindingCollector) -> None:
     Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and
     one of its outputs of the type that the input takes.
 
-    OpenSim rejects the model when it is connected. Paths are absolute or relative to the component
-    with the input. OpenSim also rejects an input of a geometry that a frame draws.
+    OpenSim rejects the model when it connects the components. Paths are absolute or relative to the
+    component with the input. OpenSim also rejects an input of a geometry that a frame draws.
 
     ```xml
       <components>
@@ -87,7 +87,7 @@ def report_broken_input(subject: Subject, report: FindingCollector) -> None:
         nth = value[: use.position].count(use.value) if isinstance(value, tuple) else 0
         position = subject.position(use.holder, tag=use.spec.tag, word=use.value, nth=nth)
         report(
-            f"{describe_object(use.holder)}: {use.spec.tag} names '{use.value}'{fault.message}",
+            f"{describe_object(use.holder)}: <{use.spec.tag}> names '{use.value}'{fault.message}",
             use.holder,
             at=position,
             suggestion=fault.suggestion,
@@ -101,7 +101,7 @@ def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
 
     Reports every mention of an actuator after the first in the list of one controller.
 
-    OpenSim rejects the model when it is connected.
+    OpenSim rejects the model when it connects the components.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>

@@ -79,7 +79,7 @@ def _check_bodies(draft: Draft) -> None:
         draft.record_refusal(
             draft.model,
             draft.model,
-            "the model has no <BodySet> with <objects>, not even one with ground",
+            "the model has no <BodySet> with <objects> (one that contains only ground is enough)",
         )
         return
     bodies = objects.findall("Body")
