@@ -164,7 +164,10 @@ FailOn = Annotated[
 ]
 Everything = Annotated[
     bool,
-    Option("--all", help="Print every finding; by default similar ones are folded into the first."),
+    Option(
+        "--all",
+        help="Print every finding; by default, only the first of several similar ones, with their number.",
+    ),
 ]
 OnlyOurs = Annotated[
     bool,
@@ -262,7 +265,10 @@ def read_feedback(controller: Path | None, par: Path | None) -> Feedback | None:
 
 Overwrite = Annotated[
     bool,
-    Option("--overwrite", help="Replace files of other conversions and programs, too."),
+    Option(
+        "--overwrite",
+        help="Also replace files that an earlier run of this conversion did not write.",
+    ),
 ]
 
 

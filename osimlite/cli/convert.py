@@ -60,7 +60,7 @@ def convert(
             "--to",
             metavar="FORMAT",
             help="Format to write.",
-            show_default="by the suffix of OUT, or else OpenSim's for files of other programs",
+            show_default="by the suffix of OUT; without one, files of other programs become OpenSim's",
         ),
     ] = None,
     motion: Annotated[

@@ -31,7 +31,7 @@ def modify(
             metavar="NAME=WORD",
             help="muscles=degroote|path-actuators|none, tendon=rigid|explicit|implicit, activation=none, passive=none, "
             "paths=polynomial|FILE, contact=smooth, joints=weld:NAME,NAME, reserves=FORCE[:BOUND], strength=FACTOR, "
-            "width=FACTOR, external-loads=FILE. May be repeated; applied in this order.",
+            "width=FACTOR, external-loads=FILE. May be repeated; replacements are applied in the order in which you write them.",
         ),
     ] = None,
     source: Annotated[

@@ -136,7 +136,7 @@ URDF_CHOICES = (
     OptionSpec(
         "velocity",
         float | None,
-        "Greatest rate (m/s, rad/s) of all joints.",
+        "Velocity limit (m/s, rad/s) of all joints.",
         default_text="no limit",
         group="URDF",
     ),
@@ -164,7 +164,8 @@ MJCF_CHOICES = (
     OptionSpec(
         "spline",
         str | None,
-        "How to fit a spline that moves a joint: 'quartic', a polynomial of degree four, or 'series', a quartic of a quartic.",
+        "How to fit a spline that moves a joint: 'quartic', one polynomial of degree four, or 'series', two of them: the second "
+        "takes the value of the first.",
         default_text="series",
         group="MJCF",
     ),

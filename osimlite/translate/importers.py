@@ -161,10 +161,10 @@ B3D_CHOICES = (
     OptionSpec(
         "processing_pass",
         str | None,
-        "Processing pass to write the trials of: kinematics, dynamics, lowpass-filter or "
+        "Write the trials of this processing pass: kinematics, dynamics, lowpass-filter or "
         "acceleration-minimizing-filter.",
         unit="TYPE",
-        default_text="dynamics, or else the last one",
+        default_text="dynamics; the last pass if there is no such pass",
         group="AddBiomechanics",
     ),
 )
