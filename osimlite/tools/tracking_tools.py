@@ -353,8 +353,8 @@ def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: Tracked
             largest = factor * float(errors[:, selected].max())
             outcome.summary[f"worst_{quantity}"] = largest
             outcome.add_message(
-                f"worst {quantity}",
-                f"{largest:.3g} {unit} off, {table.columns[selected[worst_column]]}",
+                f"{quantity} error",
+                f"at most {largest:.3g} {unit} ({table.columns[selected[worst_column]]})",
             )
 
 

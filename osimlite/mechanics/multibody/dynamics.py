@@ -218,8 +218,9 @@ def describe_massless_motion(coordinate: str) -> SimulationError:
         coordinate: name of the coordinate that moves most in it.
     """
     return SimulationError(
-        f"coordinate '{coordinate}' moves no mass, or a negative inertia, or its axis lies in this pose along another "
-        "of the same joint; give the bodies beyond its joint mass and inertia, lock it, or start in another pose"
+        f"coordinate '{coordinate}' moves no mass, or moves a negative inertia, or its axis is parallel to another axis "
+        "of its joint in this pose; give mass and inertia to the bodies beyond the joint, lock the coordinate, or start "
+        "in another pose"
     )
 
 

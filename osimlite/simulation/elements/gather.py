@@ -95,7 +95,7 @@ def force_elements(
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce to false{SKIP_ADVICE}"
+            f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce of such forces to false{SKIP_ADVICE}"
         )
     # External loads come after the forces of the model, as OpenSim adds them to the component set.
     if external_loads is not None:
@@ -111,9 +111,7 @@ def force_elements(
     return Forces(tuple(elements), tuple(skipped), controls, reads_files)
 
 
-SKIP_ADVICE = (
-    ", or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
-)
+SKIP_ADVICE = ", or add --skip-unsupported (skip_unsupported=True) to leave them out"
 """Advice of commands with the option --skip-unsupported; commands without it remove this from the message."""
 FEW = 4
 """Up to this number, skipped forces are listed one by one."""

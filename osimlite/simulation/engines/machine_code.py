@@ -184,12 +184,12 @@ def explain_source() -> list[str]:
         if library.changed_files:
             count = len(library.changed_files)
             sentences.append(
-                f"{count} of its source files have changed since: edited kernels are compiled one by one; "
-                "pip install -e . compiles the library anew"
+                f"{count} source files of this library were changed after it was compiled: kernels from them are "
+                "compiled again at their first use; 'pip install -e .' compiles a new library"
             )
     elif is_allowed(LIBRARY):
         sentences.append(kernel_library.explain_absence())
-    alone = "a kernel that is not in it is" if library is not None else "each kernel is"
+    alone = "a kernel that is not in the library is" if library is not None else "each kernel is"
     if compiler is not None:
         sentences.append(f"{alone} compiled at its first use by {compiler.name}")
     elif is_allowed(NUMBA) and _has_numba():

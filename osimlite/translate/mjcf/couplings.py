@@ -135,7 +135,7 @@ def _add_follower(
         draft.fidelity.add(
             "function",
             component_path,
-            "a joint that follows a coordinate by another function than a polynomial of degree four",
+            "a joint that is a function of a coordinate, but not a polynomial of degree four",
             replacement,
             f"joint {joint.name} over {coordinate.name} from {lower:g} to {upper:g}",
             {"value": fit.error},

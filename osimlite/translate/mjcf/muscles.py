@@ -237,8 +237,12 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
         "muscle",
         path,
         f"a {type(force).__name__}: an elastic tendon, fibers at a changing angle, non-parabolic curves",
-        "a muscle of MuJoCo's, "
-        + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths")
+        "a MuJoCo muscle, "
+        + (
+            "fitted to the isometric force"
+            if fits
+            else "with the same optimal fiber length and tendon slack length"
+        )
         + rates.note
         + (
             "" if has_activation else "; without activation dynamics: it has its full force at once"

@@ -102,7 +102,7 @@ def add_paths(draft: MjcfDraft) -> None:
         errors = _measure_errors(draft, tendon, test_poses, test_samples[path])
         # Exact tendons need no record.
         if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):
-            approximation = "the best tendon through its points and around its surfaces"
+            approximation = "the tendon with the smallest error through the same points and around the same surfaces"
             replacement = f"{approximation}, fitted" if fits else approximation
             draft.fidelity.add(
                 "path",
@@ -154,12 +154,12 @@ def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
         ),
         *sorted({f"a {_SURFACE_NAMES[surface.law]}" for surface in touched}),
     ]
-    several_note = ", several at a time" if len(touched) > 1 else ""
+    several_note = ", and several surfaces" if len(touched) > 1 else ""
     return "a path with " + " and ".join(result or ["surfaces"]) + several_note
 
 
 _SURFACE_NAMES = {
-    "wrap_cylinder": "cylinder on which it is not the shortest",
+    "wrap_cylinder": "cylinder around which OpenSim's path is not the shortest",
     "wrap_sphere": "sphere to wrap around",
     "wrap_ellipsoid": "ellipsoid to wrap around",
     "wrap_torus": "torus to wrap around",

@@ -63,7 +63,7 @@
       const kept = this.data.constraints;
       if (kept.length && !this.data.server) {
         $("#notice").hidden = false;
-        $("#notice").textContent = `Sliders do not keep up ${kept.map((path) => path.split("/").pop()).join(", ")}; 'osimlite view' without --html does.`;
+        $("#notice").textContent = `Sliders on this page do not enforce ${kept.map((path) => path.split("/").pop()).join(", ")}; those of 'osimlite view' without --html do.`;
       }
     }
 

@@ -184,7 +184,7 @@ def test_a_coordinate_that_moves_nothing_is_named():
     with pytest.raises(SimulationError, match="'swing' moves no mass"):
         _pendulum().acceleration([0.1], [0.0])
     negative = _pendulum(inertia=np.diag((0.0, 0.0, -1.0)))
-    with pytest.raises(SimulationError, match="'swing' moves no mass, or a negative inertia"):
+    with pytest.raises(SimulationError, match="'swing' moves no mass, or moves a negative inertia"):
         negative.acceleration([0.1], [0.0])
 
 
