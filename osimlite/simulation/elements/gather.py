@@ -95,7 +95,8 @@ def force_elements(
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce of such forces to false{SKIP_ADVICE}"
+            f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce of such forces to "
+            f"false{SKIP_ADVICE}"
         )
     # External loads come after the forces of the model, as OpenSim adds them to the component set.
     if external_loads is not None:
