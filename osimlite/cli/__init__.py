@@ -258,6 +258,28 @@ COMMAND_SYNONYMS = {
 """Words that users of other programs try, and the command that does it here."""
 
 
+EXPECTED_NUMBERS = {"valid number": "a number", "valid integer": "a whole number"}
+"""Kinds of numbers by the words that distinguish them in messages of typer, which come from pydantic."""
+
+
+def _describe_wrong_number(error: BaseException, words: Sequence[str]) -> str:
+    """Return a message about an option whose value is not a number, or "" for other errors.
+
+    Args:
+        error: error of typer.
+        words: words of the command line.
+    """
+    expected = [name for text, name in EXPECTED_NUMBERS.items() if text in str(error)]
+    options = getattr(getattr(error, "param", None), "opts", ())
+    # The last of several values counts.
+    for index, word in reversed([*enumerate(words)]):
+        option, has_value, value = word.partition("=")
+        if expected and option in options:
+            found = value if has_value else next(iter(words[index + 1 :]), "")
+            return f"{option}: expected {expected[0]}, found '{found}'"
+    return ""
+
+
 def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
     """Exit with a one-line message for known errors of other libraries; raise the others again."""
     from osimlite.cli._console import complain
@@ -293,7 +315,7 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
         options = {word for parameter in context.command.params for word in parameter.opts}
         if synonym in options:
             error.possibilities = [synonym]  # type: ignore[attr-defined]
-    message = error.format_message().rstrip(".")
+    message = _describe_wrong_number(error, words) or error.format_message().rstrip(".")
     if words[0] not in COMMANDS and words[0] in COMMAND_SYNONYMS:
         message += f", use '{COMMAND_SYNONYMS[words[0]]}'"
     complain(f"{message}; '{path} --help' shows the usage")

@@ -48,6 +48,15 @@ def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
         ),
         (("modify", "box.osim"), "there is nothing to replace; add --replace NAME=WORD"),
         (("simulate", "box.osim", "--to"), "'osimlite simulate --help' shows the usage"),
+        (("simulate", "box.osim", "--to", "1 s"), "--to: expected a number, found '1 s'"),
+        (
+            ("simulate", "box.osim", "--to", "1", "--to=1,5"),
+            "--to: expected a number, found '1,5'",
+        ),
+        (
+            ("run", "box.osim", "--workers", "1.5"),
+            "--workers: expected a whole number, found '1.5'",
+        ),
         (("validate", "--format"), "'osimlite validate --help' shows the usage"),
         (("translate", "box.osim", "-o"), "'osimlite translate --help' shows the usage"),
         (("run-tool", "setup.xml", "--workers"), "'osimlite run --help' shows the usage"),
