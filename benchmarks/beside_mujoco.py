@@ -64,9 +64,7 @@ def prepare_osimlite(model: osimlite.Model) -> Callable[[int], None]:
     """Return a function that evaluates a model with osimlite at the state of a number."""
     simulation = Simulation(model, "compiled", skip_unsupported=True)
     engine: Any = simulation.engine
-    # Before the first evaluation the rates are zero. The states are thus near zero, and states of
-    # muscles are zero; those of MuJoCo are near the default pose.
-    start = np.array(engine.get_derivative())
+    start = np.array(simulation.initial_state({}, {}))
     generator = np.random.default_rng(0)
     states = np.tile(start, (STATE_COUNT, 1))
     # Only coordinates and speeds vary; states of muscles stay.
