@@ -228,6 +228,7 @@ def measure_wheel_speed(
             {"tx": sin(slope), "ty": cos(slope)},
             {"rz": -rigid, "tx": rigid * cos(slope), "ty": -rigid * sin(slope)},
         )
+        # After 20 s the wheel has its steady speed.
         runs = run_many(engine, [y], 20.0, accuracy=ACCURACY, most_events=4000, event_states=True)
         rate_offset = list(engine.order).index(0) + len(engine.order)
         speeds = []
@@ -283,6 +284,7 @@ class Legs:
 
         The foot has no stiffness instead of no contact, so that the layout of the engine is the same.
         """
+        # Each foot needs parameters of its own, since either may swing.
         model = build_legs(ground, parameters)
         for force in model.components(HuntCrossleyForce):
             if force.name == foot:

@@ -47,6 +47,7 @@ CHAIN_LENGTHS = (2, 5, 10, 20, 40, 80)
 GROWTH_LENGTHS = (10, 80)
 """Two of these numbers, between which the growth of the times is computed."""
 
+# These range from legs without constraints to closed loops and many constraints.
 CORPUS_MODELS = {
     "m0005": "gait10dof18musc",
     "m0013": "gait2392",
@@ -87,6 +88,7 @@ def build_chain(count: int) -> Model:
     model = Model(name="chain")
     parent = None
     for index in range(count):
+        # The product of inertia makes the matrix a general one.
         inertia = (0.02, 0.03, 0.025, 0.001, 0.0, 0.0)
         body = model.add(
             Body(name=f"b{index}", mass=1.0, mass_center=(0.02, -0.1, 0.01), inertia=inertia)
@@ -94,6 +96,7 @@ def build_chain(count: int) -> Model:
         joint = PinJoint(
             name=f"j{index}", coordinates=[Coordinate(name=f"q{index}", default_value=0.1)]
         )
+        # The frames differ, so that the axes of consecutive joints have different directions.
         orientation = ((0.0, 0.0, 0.0), (1.2, 0.0, 0.0), (0.0, 1.1, 0.3))[index % 3]
         model.add(
             joint.between(
@@ -181,6 +184,7 @@ def time_model(model: Model, mechanism: Mechanism) -> Times:
                 engine: Any = engine_factory(engine_name)(
                     mechanism, Forces(()), EngineSettings(route="auto")
                 )
+            # An engine may not support a constraint of the model; the table then has a dash.
             except OsimliteError:
                 continue
             stack.callback(engine.close)
@@ -207,6 +211,7 @@ def prepare_opensim(model: Model, q: Any, u: Any) -> Call:
     for index in range(len(q)):
         coordinate = coordinates.get(index)
         if not coordinate.getLocked(state):
+            # Without enforcing constraints: only all coordinates together fulfil them.
             coordinate.setValue(state, float(q[index]), False)
         coordinate.setSpeedValue(state, float(u[index]))
 

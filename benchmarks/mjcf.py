@@ -97,6 +97,7 @@ def write_loadable_copy(file: Path) -> Path:
     """Write a copy of a MuJoCo file next to it, without attributes that MuJoCo no longer reads."""
     copy = file.with_name(f"{file.stem}_now.xml")
     text = file.read_text(encoding="utf-8")
+    # The attribute only selects contacts, which are not compared here.
     for word in ("all", "predefined", "dynamic"):
         text = text.replace(f'collision="{word}"', "")
     copy.write_text(text, encoding="utf-8")
@@ -107,6 +108,7 @@ def print_own_translations(model: osimlite.Model, version: Version) -> None:
     """Translate a model with each fit, and print one line for each."""
     with TemporaryDirectory() as folder:
         for fit in FITS:
+            # Processor time, because other work on the machine counts little then.
             start = time.process_time()
             translation = osimlite.to_mjcf(model, mujoco=version, visuals=False, fit=fit)
             seconds = time.process_time() - start
@@ -132,6 +134,7 @@ def main(base: Path) -> None:
     version: Version = 4 if mujoco.__version__ >= "4" else 3
     print(f"MuJoCo {mujoco.__version__}\n{HEADINGS}")
     for file, published in TRANSLATIONS.items():
+        # The clone of this repository may be missing.
         if not (base / file).exists():
             continue
         model = osimlite.read(base / file)

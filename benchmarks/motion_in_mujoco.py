@@ -75,12 +75,14 @@ def time_runs(runs: dict[str, Callable[[], None]]) -> dict[str, float]:
 
 def prepare_plain_file(model: osimlite.Model, step: float) -> Callable[[], None]:
     """Return a function that simulates the translated model in MuJoCo with a fixed step (s)."""
+    # Visual meshes take time to load, and do not change the motion.
     mjcf = osimlite.to_mjcf(model, visuals=False)
     mujoco_model = mujoco.MjModel.from_xml_string(mjcf.text)
     mujoco_model.opt.timestep = step
     data = mujoco.MjData(mujoco_model)
 
     def run() -> None:
+        # The key frame has the default pose.
         mujoco.mj_resetDataKeyframe(mujoco_model, data, 0)
         for _ in range(round(TO / step)):
             mujoco.mj_step(mujoco_model, data)

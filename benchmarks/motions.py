@@ -86,6 +86,7 @@ def main() -> None:
             for heading, engine in ENGINES.items():
                 try:
                     simulation = Simulation(osimlite.read(file), engine, opensim_derivatives=True)
+                # An engine may not support a joint or constraint of the model.
                 except OsimliteError as error:
                     console.print(f"{name}: {error}", highlight=False)
                     continue
@@ -131,6 +132,7 @@ def write_models(folder: Path) -> Iterator[tuple[str, Path]]:
     """
     for number, (name, model) in enumerate(read_models()):
         for force in model.components(Force):
+            # Muscles would need equilibrium at the start; they are compared by muscles.py.
             is_supported = FORCE_TYPES.find(type(force)) is not None
             if not is_supported or isinstance(force, PathSpring | Muscle):
                 force.appliesForce = False

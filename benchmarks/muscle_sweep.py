@@ -120,6 +120,7 @@ def prepare_opensim_runs(path: Path, names: list[str], rows: Floats) -> Callable
             manager.setIntegratorAccuracy(1e-3)
             manager.initialize(opensim.State(state))
             end = manager.integrate(TO)
+            # The mass centre needs the positions of the bodies at the end.
             model.realizePosition(end)
             heights.append(model.calcMassCenterPosition(end)[1])
         return heights

@@ -32,6 +32,7 @@ OPENSIM_SCRIPT = (
     "import opensim; opensim.Logger.setLevelString('Off'); opensim.AnalyzeTool('setup.xml').run()"
 )
 
+# These are the times of the solution of MocoInverse.
 START = 0.45
 """Start of the analyses (s)."""
 
@@ -48,6 +49,7 @@ def main(core: Path, picture: str) -> None:
         states = solution.states
         write_sto(folder / "states.sto", "", states.times, states.columns, states.rows)
         muscles = write_models(folder)
+        # The solution has activations and states; the analysis computes forces from them.
         (forces,) = run_analysis(
             folder,
             "moco.osim",
@@ -148,6 +150,7 @@ def run_analysis(
         final_time=END,
         states_file=states,
         coordinates_file="" if states else GAIT[1],
+        # This is the filter that MocoInverse applies to the measured motion.
         lowpass_cutoff_frequency_for_coordinates=-1.0 if states else 6.0,
         external_loads_file=GAIT[2],
     )
@@ -216,6 +219,7 @@ def draw_forces(names: list[str], forces: StoTable, static_forces: StoTable, pic
     """
     import matplotlib.pyplot as plt
 
+    # The right leg has nine muscles.
     figure, axes = plt.subplots(3, 3, figsize=(9.0, 6.5), sharex=True, layout="constrained")
     for name, panel in zip(names, axes.flat, strict=True):
         panel.plot(forces.times, forces[name], color="#c0392b", label="MocoInverse")

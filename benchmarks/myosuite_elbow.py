@@ -72,11 +72,13 @@ def compute_mujoco_moments(file: Path, times: Any, angles: Any) -> Any:
     """
     model = mujoco.MjModel.from_xml_path(str(file))
     model.dof_armature[:] = 0.0
+    # This flag also disables the limits of joints.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     data = mujoco.MjData(model)
     moments = []
     for instant, angle in zip(times, angles, strict=True):
         data.qpos[:] = 0.0, angle
+        # These are the derivatives of the angle of `main`.
         data.qvel[:] = 0.0, AMPLITUDE * math.pi * math.sin(math.pi * instant)
         data.qacc[:] = 0.0, AMPLITUDE * math.pi**2 * math.cos(math.pi * instant)
         mujoco.mj_inverse(model, data)
@@ -114,6 +116,7 @@ def print_static_optimization(model: osimlite.Model, motion: dict[str, Any], tim
         motion: values (n,) by coordinate, rad.
         times: times (n,), s.
     """
+    # Reserve actuators make the problem feasible where muscles are too weak.
     reserves = [
         osimlite.CoordinateActuator(name=f"{name}_reserve", coordinate=name, optimal_force=1.0)
         for name in COORDINATES

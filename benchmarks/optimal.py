@@ -144,7 +144,7 @@ class Solver(NamedTuple):
 
     @property
     def is_moco(self) -> bool:
-        """Whether this is Moco."""
+        """True for Moco itself."""
         return self.script == OPENSIM_SCRIPT
 
 
@@ -199,6 +199,7 @@ def _write_warm_up(folder: Path, core: Path) -> Path:
     """Write a small study, which a process solves before the timed one; return its file."""
     get_saved_study("sliding-100")(folder, core)
     file = folder / "study.omoco"
+    # Five intervals are solved in a moment, and load the same libraries.
     text = file.read_text(encoding="utf-8")
     file.write_text(
         text.replace("<num_mesh_intervals>100<", "<num_mesh_intervals>5<"), encoding="utf-8"
@@ -254,6 +255,7 @@ def _solve_study(
                 numbers, _ = _run_script(solver.script, [solver.hessian, ""], folder)
                 record.process_times.append(Solve(*numbers).process_seconds)
             if name in LONG:
+                # Moco needs too long for these studies.
                 record.violation = "-"
             else:
                 file = "theirs.sto" if solver.is_moco else "ours.sto"
@@ -309,6 +311,7 @@ def _run_script(code: str, arguments: list[str], folder: Path) -> tuple[list[flo
         cwd=folder,
         capture_output=True,
         text=True,
+        # More threads would increase the processor time of Moco.
         env=os.environ | {"OPENSIM_MOCO_PARALLEL": "0"},
         check=False,
     )

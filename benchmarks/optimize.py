@@ -51,6 +51,7 @@ FORWARD_SPEED = "Pelvis_tx/speed"
 VARIABLES = (*JOINTS, FORWARD_SPEED, *(f"{name}/speed" for name in JOINTS))
 """Variables of the search, in the order of the example."""
 
+# The following settings are those of OpenSim's example.
 TO = 10.0
 """End of each simulation (s)."""
 
@@ -74,6 +75,7 @@ PENALTY_WEIGHT = 10.0
 
 DEFAULT_SEEDS = (1, 2, 3, 4, 5)
 
+# The following settings are for the search with bounds.
 BOUND = 0.7
 """Distance of the bounds from the first candidate, unless a variable has others (rad, rad/s)."""
 
@@ -341,6 +343,7 @@ def optimize_in_opensim(opensim: Any, start: Floats, seed: int) -> tuple[float, 
         for joint, angle, rate in zip(joints, row[:4], row[5:], strict=True):
             joint.setValue(state, angle, False)
             joint.setSpeedValue(state, rate)
+        # Every candidate starts at the origin, so that its final position is the distance.
         forward.setValue(state, 0.0, False)
         forward.setSpeedValue(state, row[4])
         manager = opensim.Manager(model)

@@ -72,6 +72,7 @@ SIZE_GROUPS = {
 
 def compute_rms(errors: Array) -> float:
     """Return the root mean square (mm) of distances (m)."""
+    # Markers that are not visible have no position (NaN).
     return 1000.0 * float(np.sqrt(np.nanmean(errors**2)))
 
 
@@ -162,6 +163,7 @@ def compute_published_error(
     stations = find_marker_stations(model, mechanism)
     errors = []
     for instant, positions in zip(data.times, data.select_values(names), strict=True):
+        # Published tables may have other times than the recording.
         row = int(np.argmin(np.abs(table.times - instant)))
         state = mechanism.at(read_pose(mechanism, table, row))
         errors.append(
@@ -247,6 +249,7 @@ def draw_sizes(model: osimlite.Model, rng: np.random.Generator) -> dict[str, flo
     names = [body.name for body in model.components(Body)]
     for name in names:
         part = name.split("_")[0]
+        # Factors outside this range would be no plausible sizes.
         size = float(np.clip(rng.normal(1.0, 0.08), 0.8, 1.2))
         sizes[name] = sizes.setdefault(SIZE_GROUPS.get(part, part), size)
     # Remove the entries of groups, which are no bodies.
@@ -281,6 +284,7 @@ def main() -> None:
     folder, *count = sys.argv[1:]
     poses = np.concatenate(compare_with_expert(Path(folder)))
     generic = osimlite.read(Path(folder) / "generic.osim")
+    # These frames are evenly distributed over all trials.
     selected = poses[np.linspace(0, len(poses) - 1, FRAMES).astype(int)]
     for seed in range(int(count[0]) if count else 0):
         fit_synthetic_person(generic, selected, seed)

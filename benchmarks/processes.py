@@ -49,7 +49,7 @@ manager.integrate(2.0)
 """
 
 
-class Case(NamedTuple):
+class ProcessCase(NamedTuple):
     """Two commands that do the same in one folder."""
 
     name: str
@@ -90,7 +90,7 @@ def unpack_steps(folder: Path) -> Path:
     return target
 
 
-def list_cases(folder: Path) -> list[Case]:
+def list_cases(folder: Path) -> list[ProcessCase]:
     """Return the cases, whose files are copied into subfolders of a folder."""
     osimlite = [sys.executable, "-m", "osimlite"]
     cases = []
@@ -114,12 +114,12 @@ def list_cases(folder: Path) -> list[Case]:
         ("CMCTool", steps, "cmc.xml"),
     ):
         theirs = [sys.executable, "-c", TOOL_SCRIPT.format(tool=name, setup=setup)]
-        cases.append(Case(name, source, [*osimlite, "run", setup, "--overwrite"], theirs))
+        cases.append(ProcessCase(name, source, [*osimlite, "run", setup, "--overwrite"], theirs))
     walker = folder / "walker"
     walker.mkdir()
     shutil.copy(WALKER, walker)
     ours = [*osimlite, "simulate", WALKER.name, "--to", "2", "-o", "results"]
-    cases.append(Case("simulate", walker, ours, [sys.executable, "-c", SIMULATION_SCRIPT]))
+    cases.append(ProcessCase("simulate", walker, ours, [sys.executable, "-c", SIMULATION_SCRIPT]))
     return cases
 
 
@@ -149,7 +149,7 @@ def measure_process(command: list[str], folder: Path) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def measure_case(case: Case, rounds: int) -> list[float]:
+def measure_case(case: ProcessCase, rounds: int) -> list[float]:
     """Run both commands of a case in turn.
 
     Args:

@@ -306,6 +306,7 @@ def compare_setups(folder: Path) -> Iterator[str]:
         for path in sorted(copy.rglob("*.xml")):
             try:
                 tool = osimlite.read_document(path)
+            # Folders also have XML files that are no documents of OpenSim.
             except OsimliteError:
                 continue
             if isinstance(tool, osimlite.ScaleTool | osimlite.InverseKinematicsTool):
@@ -316,6 +317,7 @@ def compare_setups(folder: Path) -> Iterator[str]:
             try:
                 sentences = list(compare(tool, path))
             except OsimliteError as error:
+                # The path of the temporary folder would differ in every run.
                 sentences = [str(error).replace(temporary, "")]
             yield f"{path.relative_to(temporary)}: {'; '.join(sentences)}"
 
@@ -363,11 +365,13 @@ def compare_trial(model: osimlite.Model, folder: Path, trial: Path) -> str:
     osimlite.write(tool, folder / "theirs.xml")
     opensim_seconds = run_in_opensim(tool, folder / "theirs.xml", 10 * TIME_LIMIT)
     published = trial.with_suffix(".mot")
+    # Without published coordinates, all frames are compared.
     frames = np.arange(len(motion.times))
     published_error = ""
     opensim_error = ""
     if published.exists():
         table = read_sto(published)
+        # Published times may differ from those of the recording by rounding.
         frames = np.searchsorted(motion.times, table.times - 1e-6)
         errors = compute_marker_errors(motion, read_poses(motion, table), frames)
         published_error = format_rms(errors)

@@ -43,6 +43,7 @@ def find_commit(folder: Path) -> str:
 
 def get_file_kind(file: str) -> str:
     """Return whether a project file is one of "models", "setups" and "tables"."""
+    # Some projects have suffixes in upper case.
     name = file.lower()
     if name.endswith(TABLE_SUFFIXES):
         return "tables"

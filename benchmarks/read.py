@@ -45,6 +45,7 @@ def measure_peak_memory(path: Path) -> float:
     """Return the peak memory (MB) that Python allocates while reading, by `tracemalloc`."""
     import osimlite
 
+    # Tracing slows reading down, so that memory is measured in a run of its own.
     tracemalloc.start()
     osimlite.read(path)
     _, peak = tracemalloc.get_traced_memory()
@@ -63,6 +64,7 @@ def time_models(files: list[Path], rounds: int) -> list[Pair]:
 
     import osimlite
 
+    # Each function has its own path: a loop variable would change before the call.
     return [
         time_pair(
             f"{path.stem} {path.stat().st_size / 1e3:.0f} kB",
@@ -105,6 +107,7 @@ def print_summary(files: list[Path], rows: list[Pair]) -> None:
         for path, row in zip(files, rows, strict=True)
         if path.stat().st_size > MIN_GROWTH_SIZE
     ]
+    # Two files or fewer determine no slope.
     if len(large) > 2:
         power = compute_growth([size for size, _ in large], [time for _, time in large])
         print(f"osimlite's time grows with the size to the power {power:.2f}")

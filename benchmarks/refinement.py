@@ -102,6 +102,7 @@ def main(names: list[str]) -> None:
             study = STUDIES[name]
             file = write_study(name, Path(folder))
             print(f"| {name} | error {study.tolerance:g} | | | | | |")
+            # Approximate Hessians are cheaper, but need more iterations.
             for hessian in ("exact", "limited-memory"):
                 refine = f"{study.tolerance}:{hessian}"
                 solve_and_print(f"refined, {hessian}", name, study.initial, refine, file)
@@ -125,6 +126,7 @@ def solve_and_print(title: str, name: str, intervals: int, refine: str, file: Pa
     done = subprocess.run(
         [sys.executable, "-c", SOLVE_SCRIPT, *arguments], capture_output=True, text=True, check=True
     )
+    # The solver prints messages before the last line.
     success, mesh, error, iterations, objective, seconds = json.loads(done.stdout.splitlines()[-1])
     note = "" if success else " (not solved)"
     print(

@@ -150,6 +150,7 @@ def measure_opensim(walk_file: Path) -> float:
         text=True,
         check=True,
     )
+    # OpenSim may print messages before the time.
     return float(done.stdout.split()[-1])
 
 

@@ -67,6 +67,7 @@ def main() -> None:
     simulations = {
         name: Simulation(osimlite.read(MODEL), engine) for name, engine in ENGINES.items()
     }
+    # All programs converge to the same motion, so that one of them can provide the reference.
     exact = prepare_osimlite_runs(simulations["compiled"], REFERENCE_ACCURACY)()
     errors = Table(title=f"Error at {TO:g} s, rad or m")
     for heading in ("accuracy", *ENGINES, "OpenSim"):

@@ -112,6 +112,7 @@ def compare_with_opensim(starts: Plan, path: Path, console: Console) -> None:
         ours=prepare_sweep(starts, path),
         theirs=theirs,
         rounds=ROUNDS,
+        # Everything was made and compiled by the runs before.
         warmup=0,
         clock=time.process_time,
     )
@@ -147,6 +148,7 @@ def prepare_opensim_runs(opensim: Any, rows: Any) -> Callable[[], list[float]]:
         opensim: OpenSim's module.
         rows: angles of the hips (rad) and speed of the pelvis (m/s) of each walker (walkers, 3).
     """
+    # Model and state are made once, as in OpenSim's examples.
     model = opensim.Model(str(MODEL))
     state = model.initSystem()
     coordinates = model.getCoordinateSet()
@@ -188,6 +190,7 @@ def compare_workers(sweep_plan: Plan, path: Path) -> Table:
     sweep_rates = []
     with start_separate_processes(sweep_plan) as measure_rate:
         for _ in range(WORKER_ROUNDS):
+            # Both ways take turns, so that they meet the same machine.
             separate_rates.append([measure_rate(count) for count in (1, 2)])
             sweep_rates.append(
                 [
@@ -221,7 +224,7 @@ def measure_seconds(work: Callable[[], object]) -> float:
 
 @contextmanager
 def start_separate_processes(sweep_plan: Plan) -> Iterator[Callable[[int], float]]:
-    """Start two processes that share nothing, each of which can simulate all walkers.
+    """Start two independent processes that can both simulate all walkers.
 
     Args:
         sweep_plan: plan of the sweep.
@@ -242,6 +245,7 @@ def start_separate_processes(sweep_plan: Plan) -> Iterator[Callable[[int], float
         ends = [end for end, _ in pipes[:count]]
         for end in ends:
             end.send(WALKERS)
+        # The processes work at the same time, and the slower one counts.
         return count * WALKERS / max(end.recv() for end in ends)
 
     for process in processes:
@@ -304,6 +308,7 @@ def measure_many_walkers(path: Path) -> Table:
         table.add_column(heading, justify="right")
     sweep_plan = plan(osimlite.read(MODEL), START_RANGES, to=TO)
     started = time.perf_counter()
+    # If memory grew with the number of runs, these rows would show it.
     marks = [int(MANY_WALKERS * fraction) for fraction in (0.01, 0.1, 0.25, 0.5, 0.75, 1.0)]
 
     def report_progress(done: float, _total: float) -> None:
@@ -314,6 +319,7 @@ def measure_many_walkers(path: Path) -> Table:
 
     samples = choose_samples(sweep_plan.variables, "lhs", MANY_WALKERS)
     outcome = sweep(sweep_plan, samples, path, progress=report_progress)
+    # Linux reports kilobytes.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     table.caption = (
         f"{MANY_WALKERS / outcome.seconds:.0f} walkers/s; at most {peak:.0f} MB; "

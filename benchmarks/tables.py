@@ -157,6 +157,7 @@ def write_tables(folder: Path, size: int) -> tuple[int, int]:
     Returns:
         Size (bytes) and number of the written files.
     """
+    # The seed makes the files of all runs of this script equal.
     draw = Random(1)
     written = 0
     for number in count():

@@ -61,7 +61,7 @@ OPENSIM_SCRIPT = (
 """Script of a complete OpenSim process."""
 
 
-class Case(NamedTuple):
+class ToolCase(NamedTuple):
     """Setup that both programs run."""
 
     name: str
@@ -88,7 +88,7 @@ class Case(NamedTuple):
         """Return the number of frames of the results."""
         return len(next(iter(osimlite.run(self.setup).tables.values())).times)
 
-    def create_half(self) -> Case:
+    def create_half(self) -> ToolCase:
         """Write a setup with half of the frames, and return its case."""
         assert self.half is not None
         setup = self.setup.with_name("half.xml")
@@ -108,13 +108,13 @@ class FrameTimes(NamedTuple):
 class Row(NamedTuple):
     """Times of a case."""
 
-    case: Case
+    case: ToolCase
     complete: Pair
     """Times of complete runs."""
     frame: FrameTimes | None = None
 
 
-def time_case(case: Case, rounds: int) -> Row:
+def time_case(case: ToolCase, rounds: int) -> Row:
     """Time a case, and the time of an additional frame if half of its frames can be run.
 
     Args:
@@ -191,7 +191,7 @@ def change_dynamics_setup(folder: Path, setup: str, **fields: object) -> Path:
     )
 
 
-def create_cases(folder: Path) -> Iterator[Case]:
+def create_cases(folder: Path) -> Iterator[ToolCase]:
     """Write the files of all cases into subfolders.
 
     Args:
@@ -211,7 +211,7 @@ def create_cases(folder: Path) -> Iterator[Case]:
     yield create_scaling(folder / "scale")
 
 
-def create_gait10_kinematics(folder: Path) -> Case:
+def create_gait10_kinematics(folder: Path) -> ToolCase:
     """Return the case of inverse kinematics of gait10."""
     unpack(folder, "ik_gait10/walk_Setup_IK.xml", "ik_gait10/*.trc.gz", f"models/{GAIT10}.gz")
     setup = change_setup(
@@ -221,26 +221,26 @@ def create_gait10_kinematics(folder: Path) -> Case:
         marker_file="subject01_walk.trc",
         output_motion_file="ik.mot",
     )
-    return Case("IK gait10", "InverseKinematicsTool", setup, 10, ("time_range", (0.0, 1.25)))
+    return ToolCase("IK gait10", "InverseKinematicsTool", setup, 10, ("time_range", (0.0, 1.25)))
 
 
-def create_gait2354_kinematics(folder: Path) -> Case:
+def create_gait2354_kinematics(folder: Path) -> ToolCase:
     """Return the case of inverse kinematics of gait2354."""
     unpack(folder, "ik_id_gait2354/*_IK.xml", "ik_id_gait2354/*.trc.gz", f"models/{GAIT2354}.gz")
     setup = change_setup(
         folder, "subject01_Setup_IK.xml", model_file=GAIT2354, output_motion_file="ik.mot"
     )
-    return Case("IK gait2354", "InverseKinematicsTool", setup, 10, ("time_range", (0.4, 1.0)))
+    return ToolCase("IK gait2354", "InverseKinematicsTool", setup, 10, ("time_range", (0.4, 1.0)))
 
 
-def create_inverse_dynamics(folder: Path) -> Case:
+def create_inverse_dynamics(folder: Path) -> ToolCase:
     """Return the case of inverse dynamics of gait10."""
     unpack(folder, "id_gait10/*", "ik_gait10/subject01_walk_IK.mot", f"models/{GAIT10}.gz")
     setup = change_dynamics_setup(folder, "walk_Setup_ID.xml")
-    return Case("ID gait10", "InverseDynamicsTool", setup, 10, ("time_range", (0.0, 1.25)))
+    return ToolCase("ID gait10", "InverseDynamicsTool", setup, 10, ("time_range", (0.0, 1.25)))
 
 
-def create_static_optimization(folder: Path) -> Case:
+def create_static_optimization(folder: Path) -> ToolCase:
     """Return the case of static optimization of gait10."""
     unpack(
         folder,
@@ -252,10 +252,10 @@ def create_static_optimization(folder: Path) -> Case:
     setup = change_dynamics_setup(
         folder, "walk_Setup_SO.xml", force_set_files=("gait10dof_Reserve_Actuators.xml",)
     )
-    return Case("StaticOptimization gait10", "AnalyzeTool", setup, 20, ("final_time", 1.0))
+    return ToolCase("StaticOptimization gait10", "AnalyzeTool", setup, 20, ("final_time", 1.0))
 
 
-def create_muscle_analysis(folder: Path) -> Case:
+def create_muscle_analysis(folder: Path) -> ToolCase:
     """Return the case of a muscle analysis of gait10, without the other analyses of its setup."""
     unpack(folder, "analyses_gait10/*", "id_gait10/*_grf.mot.gz", f"models/{GAIT10}.gz")
     shutil.copy(folder / GAIT10, folder / "model.osim")
@@ -263,10 +263,10 @@ def create_muscle_analysis(folder: Path) -> Case:
     document = osimlite.read_document(setup)
     document.analysis_set.objects = [osimlite.MuscleAnalysis(name="MuscleAnalysis")]
     osimlite.write(document, setup)
-    return Case("MuscleAnalysis gait10", "AnalyzeTool", setup, 30, ("final_time", 0.8))
+    return ToolCase("MuscleAnalysis gait10", "AnalyzeTool", setup, 30, ("final_time", 0.8))
 
 
-def create_scaling(folder: Path) -> Case:
+def create_scaling(folder: Path) -> ToolCase:
     """Return the case of scaling gait2354."""
     unpack(
         folder,
@@ -274,7 +274,7 @@ def create_scaling(folder: Path) -> Case:
         "scale_gait2354/static.trc.gz",
         "scale_gait2354/gait2354.osim.gz",
     )
-    return Case("Scale gait2354", "ScaleTool", folder / "scale.xml", 5)
+    return ToolCase("Scale gait2354", "ScaleTool", folder / "scale.xml", 5)
 
 
 def create_motion(model: osimlite.Model, frames: int) -> RecordedMotion:
@@ -294,7 +294,7 @@ def create_motion(model: osimlite.Model, frames: int) -> RecordedMotion:
     return RecordedMotion(mechanism, times, np.array(columns).T).assembled()
 
 
-def create_rajagopal_kinematics(folder: Path, frames: int) -> Case:
+def create_rajagopal_kinematics(folder: Path, frames: int) -> ToolCase:
     """Return the case of inverse kinematics of Rajagopal2016, whose knees have constraints.
 
     Args:
@@ -315,15 +315,17 @@ def create_rajagopal_kinematics(folder: Path, frames: int) -> Case:
         model_file="model.osim",
         marker_file="trial.trc",
         output_motion_file="ik.mot",
+        # The motion is shorter, so that all frames are used.
         time_range=(0.0, 9.0),
     )
     osimlite.write(tool, folder / "setup.xml")
+    # Frames are 0.01 s apart, so that this is half of the motion.
     half = ("time_range", (0.0, 0.005 * frames))
     name = "IK Rajagopal2016, with constraints"
-    return Case(name, "InverseKinematicsTool", folder / "setup.xml", 50, half)
+    return ToolCase(name, "InverseKinematicsTool", folder / "setup.xml", 50, half)
 
 
-def create_sensor_kinematics(folder: Path, frames: int) -> Case:
+def create_sensor_kinematics(folder: Path, frames: int) -> ToolCase:
     """Return the case of inverse kinematics of sensors on all bodies of Rajagopal2016.
 
     Args:
@@ -334,6 +336,7 @@ def create_sensor_kinematics(folder: Path, frames: int) -> Case:
     (folder / "plain.osim").write_bytes(gzip.decompress(RAJAGOPAL.read_bytes()))
     model = osimlite.read(folder / "plain.osim")
     names = [f"{body.name}_imu" for body in model.body_set.objects]
+    # Identity rotations: in the default pose, all sensors have the axes of ground.
     place_sensors(model, OrientationData.from_source({name: np.eye(3) for name in names}))
     osimlite.write(model, folder / "model.osim")
     motion = create_motion(model, frames)
@@ -344,12 +347,14 @@ def create_sensor_kinematics(folder: Path, frames: int) -> Case:
         model_file="model.osim",
         orientations_file="trial.sto",
         results_directory="results",
+        # The motion is shorter, so that all frames are used.
         time_range=(0.0, 9.0),
     )
     osimlite.write(tool, folder / "setup.xml")
+    # Frames are 0.01 s apart, so that this is half of the motion.
     half = ("time_range", (0.0, 0.005 * frames))
     name = "IMU IK Rajagopal2016, with constraints"
-    return Case(name, "IMUInverseKinematicsTool", folder / "setup.xml", 50, half)
+    return ToolCase(name, "IMUInverseKinematicsTool", folder / "setup.xml", 50, half)
 
 
 def simulate_sensors(motion: RecordedMotion, names: list[str]) -> list[list[float]]:
@@ -359,6 +364,7 @@ def simulate_sensors(motion: RecordedMotion, names: list[str]) -> list[list[floa
         motion: motion of a model with sensors.
         names: names of the frames of the sensors.
     """
+    # The seed makes the noise of all runs of this script equal.
     rng = np.random.default_rng(1)
     sensors = {path.rpartition("/")[2]: frame for path, frame in motion.mechanism.frames.items()}
     rows = []
@@ -418,7 +424,7 @@ def make_table(rows: list[Row]) -> Table:
     return table
 
 
-def time_process(case: Case, rounds: int) -> Row:
+def time_process(case: ToolCase, rounds: int) -> Row:
     """Time complete processes that run a case.
 
     Args:
@@ -436,7 +442,7 @@ def time_process(case: Case, rounds: int) -> Row:
     return Row(case._replace(name=complete.name, target=1), complete)
 
 
-def measure_throughput(case: Case, trials: int, folder: Path) -> str:
+def measure_throughput(case: ToolCase, trials: int, folder: Path) -> str:
     """Return a sentence about the frames per second of many trials in one command.
 
     Args:
@@ -449,6 +455,7 @@ def measure_throughput(case: Case, trials: int, folder: Path) -> str:
         trial.mkdir(parents=True)
         for file in case.setup.parent.iterdir():
             if file.is_file():
+                # Inputs are only read, so that links are enough.
                 (trial / file.name).hardlink_to(file)
     start = time.perf_counter()
     run_command([*build_command("run"), str(folder / "*" / case.setup.name), "--workers", "2"])

@@ -81,6 +81,7 @@ def time_single_models(rounds: int, files: list[Path], each: bool) -> None:
     for path in files:
         try:
             initialize_in_opensim(path)
+        # OpenSim cannot initialise some models of the corpus.
         except RuntimeError:
             continue
         size = path.stat().st_size

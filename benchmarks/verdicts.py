@@ -202,7 +202,9 @@ class Judge:
             try:
                 answer_requests(paths, results)
             finally:
+                # The exit handlers are those of the parent, and must not run here.
                 os._exit(0)
+        # Otherwise the child would not see when the parent closes the pipe.
         os.close(paths)
         os.close(results)
         self._requests = os.fdopen(requests, "w")
@@ -412,6 +414,7 @@ class Comparison:
 
     def compare(self, trial: Trial) -> None:
         """Count the verdicts of OpenSim and of all linters on one trial."""
+        # Files of the model are in the same folder.
         edited = trial.path.with_name("edited.osim")
         edited.write_text(trial.text, encoding="utf-8")
         # All start before the first answer is read, so that they work at the same time.

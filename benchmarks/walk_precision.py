@@ -77,6 +77,7 @@ class Integrations:
         self.steps = steps
         walk = scenario.walk(scenario.best(), duration=seconds)
         walkers = scenario.get_walkers(1)
+        # Tables and integrator have different orders of the states.
         order = np.argsort([*walkers.offsets.values()])
         # The last state is the one from which `steps` control steps are left.
         self.first_rows = np.arange(0, len(walk.states.times) - 1 - steps, STATE_INTERVAL)
@@ -111,8 +112,10 @@ class Integrations:
             copies.set_states(slice(None), self.starts)
             before = time.process_time()
             for step in range(self.steps):
+                # Each state continues with the excitations that the walk had after it.
                 copies.step_all(self.excitations[self.first_rows + step])
             times.append(time.process_time() - before)
+        # Values and speeds are the first states.
         ends = copies.states[:, : 2 * self.coordinate_count].copy()
         copies.close()
         return ends, min(times)
