@@ -164,7 +164,7 @@ def run(
             cluster=cluster,
             resume=resume,
             progress=lambda done, total: progress(done, total),
-            kept=outcomes,
+            outcomes=outcomes,
             overwrite=overwrite,
             write_outside=write_outside,
         )

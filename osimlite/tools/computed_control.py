@@ -229,7 +229,9 @@ class ComputedControl:
         names = simulation.forces.controls.names
         paths = {path.rpartition("/")[2]: path for path in names}
         self._paths = [paths[name] for name in sharing.names]
-        self._places = [self.engine.find_offsets(path, ("actuation",))[0] for path in self._paths]
+        self._actuation_offsets = [
+            self.engine.find_offsets(path, ("actuation",))[0] for path in self._paths
+        ]
         self._corrections = np.zeros((2, len(simulation.mechanism.coordinates)))
         self._poses: dict[float, list[float]] = {}
         self.has_states = self.engine.state.size > self._first
@@ -407,7 +409,9 @@ class ComputedControl:
             target,
             *self._predict_state(target, self._predict_auxiliary_states(t, target, z, controls)),
         ]
-        return self.engine.evaluate_moments(np.array([moment]), self._places, STAGE.FORCE)[0]
+        return self.engine.evaluate_moments(
+            np.array([moment]), self._actuation_offsets, STAGE.FORCE
+        )[0]
 
     def _predict_state(self, t: float, z: Array) -> list[float]:
         """Return the predicted state (y,) at a time, with given auxiliary states."""

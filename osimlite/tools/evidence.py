@@ -36,7 +36,7 @@ class Evidence:
     turning: Sequence[bool]  # whether each coordinate is an angle (n,)
     markers: Sequence[str] = ()  # names of the m fitted markers
     measured: Array | None = None  # measured positions (t, m, 3), m; NaN if unseen
-    places: Array | None = None  # positions in the model (t, m, 3), m
+    positions: Array | None = None  # positions in the model (t, m, 3), m
     loads: Path | None = None  # file of measured loads
     sensors: Sequence[str] = ()  # names of the k fitted sensors
     # Rotation angles of the sensors from their measurements (t, k), rad; NaN if not measured.

@@ -77,7 +77,7 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         motion.values,
         markers=motion.markers,
         measured=motion.measured,
-        places=motion.places,
+        positions=motion.places,
     )
     if message := describe_unknown(model, NO_EFFECT):
         outcome.add_warning("unknown classes", message)

@@ -23,7 +23,7 @@ from osimlite.io.document.cache import get_object
 from osimlite.lint.project_files import is_table
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
-from osimlite.tools.named_files import find_named_files, find_own_results
+from osimlite.tools.named_files import find_named_files, find_prefixed_results
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.patterns import find_files
 from osimlite.tools.running import list_runnable, run
@@ -121,7 +121,7 @@ def run_many(
     cluster: str | None = None,
     resume: bool = False,
     progress: Callable[[int, int], object] | None = None,
-    kept: dict[str | Path, Outcome] | None = None,
+    outcomes: dict[str | Path, Outcome] | None = None,
     overwrite: bool = False,
     write_outside: bool = False,
 ) -> list[RunRecord]:
@@ -140,7 +140,7 @@ def run_many(
         resume: whether to skip setups that an earlier run has finished, if their inputs and results
             are unchanged.
         progress: function that receives the number of finished setups and of all setups.
-        kept: mapping to which the outcome of each setup is added; it needs one worker in this
+        outcomes: mapping to which the outcome of each setup is added; it needs one worker in this
             process.
         overwrite: whether to replace any file; by default only results of the same kind are
             replaced.
@@ -153,10 +153,10 @@ def run_many(
         RunInterruption: the keyboard stopped the run; `resume` continues it.
         OsimliteError: the cluster cannot be reached.
     """
-    journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
+    journal = _Journal(output or Path(), resume, is_saved=len(setups) > 1)
     folders = assign_folders(setups, output)
     work = _Schedule(setups, journal, progress)
-    do = partial(_run_one, folders, work.needs, kept, overwrite, write_outside)
+    do = partial(_run_one, folders, work.needs, outcomes, overwrite, write_outside)
     try:
         if cluster is None and workers == 1:
             for setup in work.yield_ready():
@@ -230,9 +230,9 @@ def find_substitutes(
         if folder is None:
             continue
         outputs = {os.path.realpath(name) for name in find_named_files(str(writer), "output-file")}
-        own = find_own_results(str(writer))
+        prefixed = find_prefixed_results(str(writer))
         for path in input_paths:
-            if path not in outputs and not _is_own_result(path, own):
+            if path not in outputs and not _is_prefixed_result(path, prefixed):
                 continue
             present_path = folder / os.path.basename(path)
             # The other setup may have failed to write this result.
@@ -301,11 +301,11 @@ def compute_digest(setup: Path) -> str:
 class _Journal:
     """Journal of finished runs; a run of one setup has none."""
 
-    def __init__(self, folder: Path, resume: bool, *, is_kept: bool) -> None:
+    def __init__(self, folder: Path, resume: bool, *, is_saved: bool) -> None:
         self.path = folder / JOURNAL
         self.noted = dict[str, RunRecord]()
         self._saved = time.monotonic()
-        self._is_kept = is_kept
+        self._is_saved = is_saved
         lines: list[bytes] = []
         # Without a readable journal all setups are run again.
         with suppress(OsimliteError):
@@ -338,7 +338,7 @@ class _Journal:
     def save(self) -> None:
         """Write the journal, unless it is empty."""
         self._saved = time.monotonic()
-        if self._is_kept and self.noted and self.path.parent.is_dir():
+        if self._is_saved and self.noted and self.path.parent.is_dir():
             lines = (
                 json.dumps({**vars(trial), "was_done": False}) for trial in self.noted.values()
             )
@@ -395,7 +395,7 @@ class _Schedule:
         self.progress = progress
         self.trials: dict[Path, RunRecord] = {}
         self.needs = _find_needs(setups)
-        self._given: set[Path] = set()
+        self._scheduled: set[Path] = set()
 
     def yield_ready(self) -> Iterator[Path]:
         """Yield setups whose inputs exist; record setups whose inputs cannot be made."""
@@ -403,12 +403,12 @@ class _Schedule:
         while has_progress:
             has_progress = False
             for setup in self.setups:
-                if setup in self._given or not all(
+                if setup in self._scheduled or not all(
                     need in self.trials for need in self.needs[setup]
                 ):
                     continue
                 has_progress = True
-                self._given.add(setup)
+                self._scheduled.add(setup)
                 need_names = [str(need) for need in self.needs[setup]]
                 failed_needs = [
                     need
@@ -477,10 +477,12 @@ class _Schedule:
                     )
 
 
-def _is_own_result(path: str, own: tuple[str, re.Pattern[str]] | None) -> bool:
-    """Return whether a real path is among the results of :func:`find_own_results`."""
+def _is_prefixed_result(path: str, prefixed: tuple[str, re.Pattern[str]] | None) -> bool:
+    """Return whether a real path is among the results of :func:`find_prefixed_results`."""
     folder, name = os.path.split(path)
-    return own is not None and folder == own[0] and own[1].fullmatch(name) is not None
+    return (
+        prefixed is not None and folder == prefixed[0] and prefixed[1].fullmatch(name) is not None
+    )
 
 
 def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
@@ -497,10 +499,10 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
             (os.path.realpath(name), setup) for name in find_named_files(str(setup), "output-file")
         )
     # By folder, because each input is compared with all of them.
-    own_results: dict[str, list[tuple[Path, tuple[str, re.Pattern[str]]]]] = {}
+    prefixed_by_folder: dict[str, list[tuple[Path, tuple[str, re.Pattern[str]]]]] = {}
     for setup in runnable:
-        if (own := find_own_results(str(setup))) is not None:
-            own_results.setdefault(own[0], []).append((setup, own))
+        if (prefixed := find_prefixed_results(str(setup))) is not None:
+            prefixed_by_folder.setdefault(prefixed[0], []).append((setup, prefixed))
     needs_by_setup: dict[Path, list[Path]] = {}
     for setup in setups:
         needs: dict[Path, None] = {}
@@ -511,8 +513,8 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
             writer = writers.get(name) or next(
                 (
                     other
-                    for other, own in own_results.get(os.path.dirname(name), ())
-                    if _is_own_result(name, own)
+                    for other, prefixed in prefixed_by_folder.get(os.path.dirname(name), ())
+                    if _is_prefixed_result(name, prefixed)
                 ),
                 None,
             )

@@ -77,13 +77,13 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
                 waiting.append(naming.path)
 
 
-_OWN_RESULT = (
+_PREFIXED_RESULT = (
     r"(?:states|states_degrees|controls|pErr|avgResiduals|(?:Kinematics|Actuation)_\w+)\.\w+"
 )
 """Ends of the names of results that tools call by their own names."""
 
 
-def find_own_results(setup: str) -> tuple[str, re.Pattern[str]] | None:
+def find_prefixed_results(setup: str) -> tuple[str, re.Pattern[str]] | None:
     """Return where a tool writes results whose names follow from its own, such as `so_Kinematics_q.sto`.
 
     Args:
@@ -99,7 +99,7 @@ def find_own_results(setup: str) -> tuple[str, re.Pattern[str]] | None:
     results = str(getattr(top, "results_directory", "")).strip()
     folder = os.path.realpath(os.path.join(os.path.dirname(setup), results))
     analyses = getattr(getattr(top, "analysis_set", None), "objects", ())
-    ends = [_OWN_RESULT, *(f"{re.escape(analysis.name)}_.*" for analysis in analyses)]
+    ends = [_PREFIXED_RESULT, *(f"{re.escape(analysis.name)}_.*" for analysis in analyses)]
     return folder, re.compile(f"{re.escape(top.name)}_(?:{'|'.join(ends)})")
 
 

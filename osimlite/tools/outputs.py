@@ -334,25 +334,30 @@ MUSCLE_OUTPUTS: dict[str, Callable[[dict[str, Array]], Array]] = {
         )
     },
     "active_force_length_multiplier": itemgetter("active_force_length"),
-    "cos_pennation_angle": lambda found: np.cos(found["PennationAngle"]),
-    "fiber_force_along_tendon": lambda found: found["FiberForce"] * np.cos(found["PennationAngle"]),
-    "fiber_length_along_tendon": lambda found: (
-        found["FiberLength"] * np.cos(found["PennationAngle"])
+    "cos_pennation_angle": lambda quantities: np.cos(quantities["PennationAngle"]),
+    "fiber_force_along_tendon": lambda quantities: (
+        quantities["FiberForce"] * np.cos(quantities["PennationAngle"])
+    ),
+    "fiber_length_along_tendon": lambda quantities: (
+        quantities["FiberLength"] * np.cos(quantities["PennationAngle"])
     ),
     "fiber_velocity_along_tendon": itemgetter("along"),
     "force_velocity_multiplier": itemgetter("force_velocity"),
     "muscle_power": itemgetter("MuscleActuatorPower"),
     "normalized_fiber_velocity": itemgetter("NormFiberVelocity"),
-    "passive_fiber_damping_force": lambda found: found["PassiveFiberForce"] - found[SPRING],
-    "passive_fiber_damping_force_along_tendon": lambda found: (
-        (found["PassiveFiberForce"] - found[SPRING]) * np.cos(found["PennationAngle"])
+    "passive_fiber_damping_force": lambda quantities: (
+        quantities["PassiveFiberForce"] - quantities[SPRING]
+    ),
+    "passive_fiber_damping_force_along_tendon": lambda quantities: (
+        (quantities["PassiveFiberForce"] - quantities[SPRING])
+        * np.cos(quantities["PennationAngle"])
     ),
     "passive_fiber_elastic_force": itemgetter(SPRING),
-    "passive_fiber_elastic_force_along_tendon": lambda found: (
-        found[SPRING] * np.cos(found["PennationAngle"])
+    "passive_fiber_elastic_force_along_tendon": lambda quantities: (
+        quantities[SPRING] * np.cos(quantities["PennationAngle"])
     ),
-    "tendon_strain": lambda found: found["TendonLength"] / found["slack"] - 1.0,
-    "tendon_velocity": lambda found: found["rate"] - found["along"],
+    "tendon_strain": lambda quantities: quantities["TendonLength"] / quantities["slack"] - 1.0,
+    "tendon_velocity": lambda quantities: quantities["rate"] - quantities["along"],
 }
 """Outputs of muscles whose classes are compared with OpenSim in the tests."""
 LAW_OUTPUTS = {

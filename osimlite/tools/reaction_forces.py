@@ -228,16 +228,16 @@ class JointWrenches:
         if controls is not None:
             system.set_controls(controls)
         balanced = motion.select_times(motion.balanced) if motion.unbalanced else motion
-        self.moved = LinkMotion.compute(
+        self.link_motion = LinkMotion.compute(
             system, balanced.table, balanced.accelerations[:, list(system.order)]
         )
         if self.mechanism.constrained:
             for links, forces in zip(
-                self.moved.links, ConstraintForces.compute_along(balanced), strict=True
+                self.link_motion.links, ConstraintForces.compute_along(balanced), strict=True
             ):
                 self._add_constraint_forces(links, forces)
         if motion.unbalanced:
-            self.moved = LinkMotion(system, self._add_unbalanced_times(motion))
+            self.link_motion = LinkMotion(system, self._add_unbalanced_times(motion))
 
     def _add_unbalanced_times(self, motion: Motion) -> Array:
         """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
@@ -249,7 +249,7 @@ class JointWrenches:
         links = unloaded.compute_accelerated_links(
             moments, motion.accelerations[:, list(unloaded.order)]
         )
-        links[motion.balanced] = self.moved.links
+        links[motion.balanced] = self.link_motion.links
         return links
 
     def _add_constraint_forces(self, links: Array, forces: ConstraintForces) -> None:
@@ -285,13 +285,13 @@ class JointWrenches:
         """
         outer_index = self.carried[joint.path]
         body = self.mechanism.bodies[outer_index]
-        link = self.moved.links[:, outer_index]
+        link = self.link_motion.links[:, outer_index]
         mobilizer = body.mobilizer
         # The outer body of the joint in the tree receives the wrench, the inner body the
         # opposite.
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
-        _, point = self.moved.locate_frame(outer_index if is_outer else body.parent, frame)
+        _, point = self.link_motion.locate_frame(outer_index if is_outer else body.parent, frame)
         arm = point - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), point

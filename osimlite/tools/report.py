@@ -195,15 +195,15 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
         stations_by_name = {
             path.rpartition("/")[2]: station for path, station in mechanism.stations.items()
         }
-        known_indices = [
+        mapped_indices = [
             index for index, name in enumerate(evidence.markers) if name in stations_by_name
         ]
-        names = [evidence.markers[index] for index in known_indices]
+        names = [evidence.markers[index] for index in mapped_indices]
         stations = [
             (stations_by_name[name].body, np.asarray(stations_by_name[name].location))
             for name in names
         ]
-        measured = MeasuredMarkers(names, stations, evidence.measured[:, known_indices])
+        measured = MeasuredMarkers(names, stations, evidence.measured[:, mapped_indices])
     motion = create_recording(
         replace(evidence, states={**evidence.states, **states}), mechanism, measured
     )
@@ -316,8 +316,8 @@ def _render_errors(trial: TrialOutcomes, name: str) -> Iterator[str]:
     evidence = trial.evidence
     if evidence is None:
         return
-    if evidence.measured is not None and evidence.places is not None and evidence.markers:
-        errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
+    if evidence.measured is not None and evidence.positions is not None and evidence.markers:
+        errors = 100.0 * np.linalg.norm(evidence.positions - evidence.measured, axis=2)
         figure = _draw_errors(
             evidence.times,
             evidence.markers,
@@ -353,20 +353,20 @@ def _draw_errors(
         Figure of matplotlib.
     """
     is_measured = np.isfinite(errors)
-    known_errors = np.where(is_measured, errors, 0.0)
+    measured_errors = np.where(is_measured, errors, 0.0)
     # A frame without any measured marker divides by 1, not by 0.
-    rms = np.sqrt((known_errors**2).sum(axis=1) / np.maximum(is_measured.sum(axis=1), 1))
+    rms = np.sqrt((measured_errors**2).sum(axis=1) / np.maximum(is_measured.sum(axis=1), 1))
     figure = make_figure("", (11.0, 3.4))
     time_axes, name_axes = figure.subplots(1, 2, width_ratios=(2, 1))
     time_axes.plot(times, rms, color=COLORS[0], lw=1.6, label="root mean square")
-    time_axes.plot(times, known_errors.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
+    time_axes.plot(times, measured_errors.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
     for limit, color in zip(limits, COLORS, strict=False):
         time_axes.axhline(limit, color=color, lw=0.8, ls="--")
     time_axes.set_ylabel(f"{noun} error ({unit})")
     time_axes.set_ylim(bottom=0.0)
     time_axes.legend(frameon=False, fontsize=8)
     _style_axes(time_axes, "time (s)")
-    rms_by_name = np.sqrt((known_errors**2).sum(axis=0) / np.maximum(is_measured.sum(axis=0), 1))
+    rms_by_name = np.sqrt((measured_errors**2).sum(axis=0) / np.maximum(is_measured.sum(axis=0), 1))
     worst_indices = np.argsort(-rms_by_name)[:MAX_NAMED_MARKERS][::-1]
     name_axes.barh(
         [names[index] for index in worst_indices],

@@ -127,17 +127,17 @@ def run(
     # Errors are cheaper to find before a tool that may run for hours.
     if check:
         report_stage("checking the setup")
-        files_elsewhere: dict[str, None] = {}
-        report = _shorten_paths(merge_reports(_check_documents(str(file), files_elsewhere)))
+        current_folder_files: dict[str, None] = {}
+        report = _shorten_paths(merge_reports(_check_documents(str(file), current_folder_files)))
         # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
         ]:
             raise FaultySetup(Report(errors, report.texts))
-        if files_elsewhere:
+        if current_folder_files:
             outcome.add_message(
                 "current folder",
-                f"contains {join_words(files_elsewhere)}, which the folder of the setup lacks",
+                f"contains {join_words(current_folder_files)}, which the folder of the setup lacks",
             )
         outcome.warnings = sorted(
             report.errors + report.warnings, key=lambda finding: finding.suggestion is None
@@ -227,12 +227,12 @@ def list_runnable() -> list[str]:
     return [class_name for class_name in MODULES if class_name in TOOLS]
 
 
-def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[Report]:
+def _check_documents(setup: str, current_folder_files: dict[str, None]) -> Iterator[Report]:
     """Yield reports on a document and on documents and tables that it names, without models.
 
     Args:
         setup: path of the document.
-        files_elsewhere: mapping to which files are added that are in the current folder, but not in
+        current_folder_files: mapping to which files are added that are in the current folder, but not in
             the folder of the document that names them.
     """
     waiting = deque([setup])
@@ -251,7 +251,7 @@ def _check_documents(setup: str, files_elsewhere: dict[str, None]) -> Iterator[R
                 continue
             # The file was found relative to the current folder, not to that of the document.
             if path == naming.name.strip() and not os.path.isabs(path):
-                files_elsewhere[path] = None
+                current_folder_files[path] = None
             real = os.path.realpath(path)
             if real not in visited and (is_table(path) or path.lower().endswith(".xml")):
                 visited.add(real)

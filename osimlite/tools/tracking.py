@@ -175,7 +175,7 @@ class CoordinateTask(NamedTuple):
     Attributes:
         name: name of the task.
         coordinate: index of the coordinate that follows.
-        wanted: index of the coordinate whose desired motion it follows.
+        reference_index: index of the coordinate whose desired motion it follows.
         weight: weight of the task.
         kp: gain of the position error, 1/s².
         kv: gain of the speed error, 1/s.
@@ -185,7 +185,7 @@ class CoordinateTask(NamedTuple):
 
     name: str
     coordinate: int
-    wanted: int
+    reference_index: int
     weight: float
     kp: float
     kv: float
@@ -271,7 +271,7 @@ class TrackingTasks:
             Errors of the values and of the speeds, each (k,) for k tasks.
         """
         followers = self.coordinates
-        desired_indices = [task.wanted for task in self.tasks]
+        desired_indices = [task.reference_index for task in self.tasks]
         return desired[0, desired_indices] - q[followers], desired[2, desired_indices] - u[
             followers
         ]
@@ -284,7 +284,7 @@ class TrackingTasks:
             desired: desired motion (4, n) at the end of the window.
         """
         kp, kv, ka = np.array([(task.kp, task.kv, task.ka) for task in self.tasks]).T
-        accelerations: Array = ka * desired[3, [task.wanted for task in self.tasks]]
+        accelerations: Array = ka * desired[3, [task.reference_index for task in self.tasks]]
         return accelerations + kv * errors[1] + kp * errors[0]
 
     def compute_force_weight(self, errors: Array) -> float:

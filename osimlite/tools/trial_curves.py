@@ -170,9 +170,9 @@ def collect_controls(trials: Sequence[TrialOutcomes]) -> dict[str, list[TrialCur
             stem, side = split_side(label.rpartition("/")[2])
             column = evidence.controls[label]
             times = evidence.controls.times
-            is_known = np.isfinite(column)
+            is_finite = np.isfinite(column)
             line = TrialCurve(
-                times[is_known], column[is_known], side, STYLES[number % 3], trial.name, {}
+                times[is_finite], column[is_finite], side, STYLES[number % 3], trial.name, {}
             )
             panels.setdefault(stem, []).append(line)
     return panels

@@ -222,7 +222,9 @@ def _locate(station: Marker | PathPoint, placements: Placements) -> tuple[str, A
     return base, matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
 
 
-def _place(station: Marker | PathPoint, robot: Robot, placements: Placements) -> tuple[str, Array]:
+def _locate_in_segment(
+    station: Marker | PathPoint, robot: Robot, placements: Placements
+) -> tuple[str, Array]:
     """Return the segment of a point, and its position there (3,), m."""
     base, point = _locate(station, placements)
     link, body = robot.link_of[base]
@@ -236,7 +238,7 @@ def _format_markers(
     names = UniqueNames()
     for marker in model.components(Marker):
         name = names(marker.name)
-        segment, point = _place(marker, robot, placements)
+        segment, point = _locate_in_segment(marker, robot, placements)
         fidelity.translated[marker.path] = f"marker {name}"
         yield from (f"marker {name}", f"\tparent {segment}", f"\tposition {_format_numbers(point)}")
         yield from ("\ttechnical 1", "endmarker", "")
@@ -354,7 +356,7 @@ def _format_muscles(
             )
         name = names(muscle.name)
         # The first and the last point are attributes of the group, the others are via points.
-        positions = [_place(point, robot, placements) for point in points]
+        positions = [_locate_in_segment(point, robot, placements) for point in points]
         (first, origin), *via_points, (last, insertion) = positions
         yield from (
             f"musclegroup {name}_group",

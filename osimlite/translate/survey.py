@@ -50,7 +50,7 @@ def record_losses(model: Model, robot: Robot, fidelity: Fidelity) -> None:
     _Survey(model, robot, fidelity).run()
 
 
-def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
+def record_dropped_components(tree: Tree, fidelity: Fidelity) -> None:
     """Record every component that is not accounted for as left out.
 
     Parts of such components need no record.
@@ -108,7 +108,7 @@ class _Survey:
                     self.fidelity.translated[shape.source] = f"{shape_type} of link {link.name}"
         self._record_couplers()
         self._record_frames()
-        account_for_rest(self.tree, self.fidelity)
+        record_dropped_components(self.tree, self.fidelity)
 
     def _record_gravity(self) -> None:
         """Record the gravity, and units other than those of the SI."""

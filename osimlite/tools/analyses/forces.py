@@ -61,7 +61,7 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
         frame = _find_frame_path(motion, requested, bases, tables)
         force, moment, point = loads.get_reaction(joint, side)
-        rotation, origin = loads.moved.locate_frame(*mechanism.placement(frame))
+        rotation, origin = loads.link_motion.locate_frame(*mechanism.placement(frame))
         # From ground to the frame in which the results are expressed.
         ground_to_frame = rotation.transpose(0, 2, 1)
         rows += [

@@ -151,8 +151,8 @@ def check_trial(
         findings += run_rules(trial).findings
         report.verdicts += trial.verdicts
     for name in _find_documents(folder):
-        own_config = find_settings(name).config_for(name, base_config)
-        subject = load_subject(name, own_config)
+        file_config = find_settings(name).config_for(name, base_config)
+        subject = load_subject(name, file_config)
         findings += [
             finding
             for finding in run_rules(subject, measure=False)
@@ -188,7 +188,7 @@ PlannedMeasurement = tuple[str, Callable[[], Numbers]]
 
 def _plan_measurements(folder: TrialFolder) -> Iterator[PlannedMeasurement]:
     """Yield all measurements of a trial."""
-    looked: set[tuple[object, ...]] = set()
+    checked_inputs: set[tuple[object, ...]] = set()
     claimed: set[Path] = set()
     # RRA and CMC reduce the residuals of inverse dynamics, which then are not the final ones.
     followed = any(
@@ -212,9 +212,9 @@ def _plan_measurements(folder: TrialFolder) -> Iterator[PlannedMeasurement]:
         elif tool.tag == "AnalyzeTool":
             yield from _plan_static_optimization(tool, folder.tools, claimed)
         if tool.tag not in ("ScaleTool", "InverseKinematicsTool"):
-            yield from _plan_inputs(tool, looked)
+            yield from _plan_inputs(tool, checked_inputs)
     # Files that the user names singly are not searched for results of other tools.
-    if folder.is_whole:
+    if folder.has_folder:
         yield from _plan_results_without_setup(folder, claimed)
 
 

@@ -254,10 +254,10 @@ def _find_swapped_markers(
         Names of both markers, and the numbers of the frames in which the exchange fits better.
     """
     errors = motion.marker_errors
-    known_errors = np.where(np.isfinite(errors), errors, 0.0)
-    worst_frame = int(np.argmax(known_errors.max(axis=1)))
+    finite_errors = np.where(np.isfinite(errors), errors, 0.0)
+    worst_frame = int(np.argmax(finite_errors.max(axis=1)))
     # A swap moves two markers far: without a large error there was no swap.
-    if known_errors[worst_frame].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
+    if finite_errors[worst_frame].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
         return
     stations = find_marker_stations(tool.model, motion.mechanism)
     weights = {task.name: float(task.weight) for task in tool.setup.ik_task_set.objects}
@@ -421,7 +421,10 @@ def measure_filter(tool: TrialTool) -> Numbers:
         )
         yield tool.job.file, Measurement("filter-content", "change", subject, size, unit)
         motion = filtered
-    if _is_from_markers(file) and (noise_share := _measure_noise(motion, start, end)) is not None:
+    if (
+        _is_from_markers(file)
+        and (noise_fraction := _measure_noise(motion, start, end)) is not None
+    ):
         subject = "noise: the part of the power of the accelerations that is above 15 Hz"
         filter_note = (
             f"the motion is filtered at {tool.cutoff:g} Hz"
@@ -431,7 +434,7 @@ def measure_filter(tool: TrialTool) -> Numbers:
         yield (
             tool.job.file,
             Measurement(
-                "filter-content", "noise", subject, 100.0 * noise_share, "%", side=filter_note
+                "filter-content", "noise", subject, 100.0 * noise_fraction, "%", side=filter_note
             ),
         )
 

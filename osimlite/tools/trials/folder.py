@@ -71,9 +71,9 @@ class TrialFolder:
 
     def __init__(self, paths: Sequence[str | Path], written: Iterable[Path] = ()) -> None:
         self.tools: list[TrialTool] = []
-        self.is_whole = any(map(os.path.isdir, paths))
+        self.has_folder = any(map(os.path.isdir, paths))
         self._written = {file.name: file for file in written}
-        self._kept: dict[Any, Any] = {}
+        self._cache: dict[Any, Any] = {}
         self._named: dict[str, list[Path]] = {}
         setups: dict[str, Path] = {}
         for path in map(Path, paths):
@@ -114,9 +114,9 @@ class TrialFolder:
             key: key of the value.
             compute: function that computes it.
         """
-        if key not in self._kept:
-            self._kept[key] = compute()
-        return self._kept[key]
+        if key not in self._cache:
+            self._cache[key] = compute()
+        return self._cache[key]
 
     def find_file(self, path: Path) -> Path | None:
         """Return a path if the file exists, or else the nearest file of its name, or None."""

@@ -20,7 +20,7 @@ from osimlite.tools.trials.folder import MOTIONS, MissingInput, TrialTool
 
 MAX_ROWS = 100
 """Number of times at which a motion is analysed, at most."""
-MIN_SHARE_PERCENT = 1.0
+MIN_PASSIVE_PERCENT = 1.0
 """Smallest passive force, in % of the strength, that is reported for a muscle."""
 
 
@@ -45,7 +45,7 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
         column = np.where(np.isfinite(table[name]), table[name], 0.0)
         row = int(np.argmax(column))
         percentage = 100.0 * float(column[row]) / strengths[name] if strengths.get(name) else 0.0
-        if percentage >= MIN_SHARE_PERCENT:
+        if percentage >= MIN_PASSIVE_PERCENT:
             reported_count += 1
             time = float(table.times[row])
             position = tool.folder.locate_time(file, time)

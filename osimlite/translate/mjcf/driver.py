@@ -41,7 +41,7 @@ class _FollowerJoint(NamedTuple):
 
     Attributes:
         equality: index of the equality.
-        own: address of the joint in qpos.
+        address: address of the joint in qpos.
         dof: address of the joint in qvel.
         addresses: addresses of the leaders in qpos; empty for a function of time.
         leaders: addresses of the leaders in qvel.
@@ -50,7 +50,7 @@ class _FollowerJoint(NamedTuple):
     """
 
     equality: int
-    own: int
+    address: int
     dof: int
     addresses: list[int]
     leaders: list[int]
@@ -133,14 +133,16 @@ class Driver:
         self.data = self._mujoco.MjData(self.model)
         self._mechanism = mechanism = self.mjcf.robot.mechanism
         # Only ball and free joints have speeds that are not the rates of coordinates.
-        self._turns = not all(body.mobilizer.speeds_are_rates for body in mechanism.bodies)
+        self._speeds_differ_from_rates = not all(
+            body.mobilizer.speeds_are_rates for body in mechanism.bodies
+        )
         self._restore_inertias()
         forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
         self.system = System(mechanism, forces)
         self._equilibrate = equilibrate
         self._add_controls()
-        self._places = np.array(sorted(self.mjcf.leads), dtype=int)
-        leaders = [self.mjcf.leads[index] for index in self._places]
+        self._leading_coordinates = np.array(sorted(self.mjcf.leads), dtype=int)
+        leaders = [self.mjcf.leads[index] for index in self._leading_coordinates]
         joints = [self.model.joint(leader.joint) for leader in leaders]
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self._dofs = np.array([joint.dofadr[0] for joint in joints], dtype=int)
@@ -153,7 +155,7 @@ class Driver:
             if k not in leading_indices
         }
         self._followed = [self._make_follower(name) for name in self.mjcf.followers]
-        self._free = np.setdiff1d(
+        self._free_dofs = np.setdiff1d(
             np.arange(self.model.nv), [follower.dof for follower in self._followed]
         )
         self._rates: list[float] = []
@@ -206,7 +208,7 @@ class Driver:
         for joint, rate in zip(robot.moving, robot.joint_jacobian(q) @ rates, strict=True):
             self.data.joint(joint.name).qvel[0] = rate
         # Joints of coordinates are linear functions of them.
-        self.data.qvel[self._dofs] = rates[self._places] * self._slopes
+        self.data.qvel[self._dofs] = rates[self._leading_coordinates] * self._slopes
         self.forward()
 
     def step(self, count: int = 1) -> None:
@@ -230,13 +232,13 @@ class Driver:
         mujoco = self._mujoco
         previous = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
 
-        def push(model: Any, data: Any) -> None:
+        def apply_driver_forces(model: Any, data: Any) -> None:
             # Callbacks of other code continue to act.
             if previous[0] is not None:
                 previous[0](model, data)
             self._apply_forces(data)
 
-        mujoco.set_mjcb_control(push)
+        mujoco.set_mjcb_control(apply_driver_forces)
         mujoco.set_mjcb_act_dyn(self._compute_activation_rates)
         try:
             yield
@@ -272,13 +274,13 @@ class Driver:
         forces = np.zeros(len(q))
         forces[list(state.order)] = row[count : 2 * count]
         # Generalized forces of speeds are transformed to those of coordinate rates: Q = N^-T f.
-        if self._turns:
+        if self._speeds_differ_from_rates:
             forces[:] = np.linalg.solve(self._mechanism.rate_matrix(q).T, forces)
-        for place, (leader, slope) in slopes.items():
+        for coordinate, (leader, slope) in slopes.items():
             # The force of a follower acts on its leader by the chain rule.
-            forces[leader] += slope * forces[place]
+            forces[leader] += slope * forces[coordinate]
         # Passive forces: MuJoCo adds them to all others without further processing.
-        data.qfrc_passive[self._dofs] += forces[self._places] / self._slopes
+        data.qfrc_passive[self._dofs] += forces[self._leading_coordinates] / self._slopes
         self._apply_equality_forces(data)
 
     def _apply_equality_forces(self, data: Any) -> None:
@@ -294,15 +296,15 @@ class Driver:
         """
         if not data.ne:
             return
-        # Accelerations are `from_free` @ those of the free joints + `prescribed`.
-        from_free = np.eye(self.model.nv)
+        # Accelerations are `free_to_all` @ those of the free joints + `prescribed`.
+        free_to_all = np.eye(self.model.nv)
         prescribed = np.zeros(self.model.nv)
         for follower in self._followed:
             _, gradient, _, prescribed[follower.dof] = follower.evaluate(data)
-            from_free[follower.dof, follower.dof] = 0.0
+            free_to_all[follower.dof, follower.dof] = 0.0
             if follower.leaders:
-                from_free[follower.dof, follower.leaders] = gradient
-        from_free = from_free[:, self._free]
+                free_to_all[follower.dof, follower.leaders] = gradient
+        free_to_all = free_to_all[:, self._free_dofs]
         # MuJoCo puts the rows of equalities first, in their order.
         equality_rows = np.searchsorted(
             data.efc_id[: data.ne], [follower_joint.equality for follower_joint in self._followed]
@@ -311,14 +313,14 @@ class Driver:
         jacobian = data.efc_J.reshape(-1, self.model.nv)[other_rows]
         applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
         inertia = (
-            np.array([self._multiply_mass(data, column) for column in from_free.T.copy()])
-            @ from_free
+            np.array([self._multiply_mass(data, column) for column in free_to_all.T.copy()])
+            @ free_to_all
         )
         right_side = np.append(
-            from_free.T @ (applied - self._multiply_mass(data, prescribed)),
+            free_to_all.T @ (applied - self._multiply_mass(data, prescribed)),
             data.efc_aref[other_rows] - jacobian @ prescribed,
         )
-        free_jacobian = jacobian @ from_free
+        free_jacobian = jacobian @ free_to_all
         matrix = np.block(
             [
                 [inertia, free_jacobian.T],
@@ -330,7 +332,7 @@ class Driver:
             if len(other_rows)
             else np.linalg.solve(matrix, right_side)
         )
-        accelerations = from_free @ result[: len(self._free)] + prescribed
+        accelerations = free_to_all @ result[: len(self._free_dofs)] + prescribed
         # Forces that produce exactly these accelerations.
         data.qfrc_passive += self._multiply_mass(data, accelerations) - applied
         # `_update_equalities` writes for the start of a step; within the step fitted equalities have no
@@ -374,15 +376,21 @@ class Driver:
         """
         q = self._mechanism.values({})
         rates = np.zeros(len(self._mechanism.coordinates))
-        q[self._places] = (data.qpos[self._qpos] - self._starts) / self._slopes
-        rates[self._places] = data.qvel[self._dofs] / self._slopes
+        q[self._leading_coordinates] = (data.qpos[self._qpos] - self._starts) / self._slopes
+        rates[self._leading_coordinates] = data.qvel[self._dofs] / self._slopes
         slopes = {}
-        for place, (leader, function) in self._following.items():
-            q[place], gradient, _ = function.evaluate(q[[0 if leader is None else leader]])
+        for coordinate, (leader, function) in self._following.items():
+            q[coordinate], gradient, _ = function.evaluate(q[[0 if leader is None else leader]])
             if leader is not None:
-                slopes[place] = leader, float(gradient[0])
-                rates[place] = gradient[0] * rates[leader]
-        return q, self._mechanism.speeds_from_rates(q, rates) if self._turns else rates, slopes
+                slopes[coordinate] = leader, float(gradient[0])
+                rates[coordinate] = gradient[0] * rates[leader]
+        return (
+            q,
+            self._mechanism.speeds_from_rates(q, rates)
+            if self._speeds_differ_from_rates
+            else rates,
+            slopes,
+        )
 
     # ----------------------------------------------------------------------------------------------- equalities
     def _update_equalities(self) -> None:
@@ -393,7 +401,7 @@ class Driver:
         for follower in self._followed:
             if follower.fitted:
                 value, gradient, rate, _ = follower.evaluate(self.data)
-                self.data.qpos[follower.own], self.data.qvel[follower.dof] = value, rate
+                self.data.qpos[follower.address], self.data.qvel[follower.dof] = value, rate
                 polynomial = np.zeros(5)
                 polynomial[0] = value
                 if len(follower.leaders) == 1:

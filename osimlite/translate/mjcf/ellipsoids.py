@@ -59,7 +59,7 @@ def _add_ellipsoid_follower(
             radii[joint.function.component] = joint.function.radius
     base = draft.frames.get(slides[0].parent)
     end = draft.frames.get(rotations[-1].child) if rotations else None
-    same_coordinates = {place for joint in rotations for place in joint.coordinates} == set(
+    same_coordinates = {index for joint in rotations for index in joint.coordinates} == set(
         slides[0].coordinates
     )
     # Another arrangement of axes is left to the general treatment of functions.

@@ -47,7 +47,7 @@ from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.paths import add_paths
 from osimlite.translate.mjcf.scenery import add_camera, add_markers, add_shapes
 from osimlite.translate.mjcf.time_step import DEFAULT_STEP_S, choose_step
-from osimlite.translate.survey import account_for_rest
+from osimlite.translate.survey import record_dropped_components
 
 Pass = Callable[[MjcfDraft], None]
 """Function that adds the elements of one kind of component to a draft."""
@@ -103,8 +103,8 @@ class Mjcf:
         """
         values = self.robot.mechanism.values(q)
         leads = {
-            joint: line.slope * values[place] + line.offset
-            for place, (joint, line) in self.leads.items()
+            joint: line.slope * values[index] + line.offset
+            for index, (joint, line) in self.leads.items()
         }
         # The robot has the exact functions; `leads` adds joints that it does not have.
         result = leads | self.robot.joint_values(values)
@@ -206,7 +206,7 @@ def to_mjcf(
     ):
         run_pass(draft)
     # Components that no pass has accounted for are lost.
-    account_for_rest(draft.tree, fidelity)
+    record_dropped_components(draft.tree, fidelity)
     for section in list(draft.root):
         # Empty sections would only clutter the file.
         if not section.attrib and not len(section) and not isinstance(section, _Comment):

@@ -52,7 +52,7 @@ def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
     # From the end, so that indices of earlier pieces remain valid.
     for first, last in reversed(list(pairwise(fixed_indices))):
         segment = tendon[first : last + 1]
-        if any(map(_is_free, segment)):
+        if any(map(_is_adjustable, segment)):
             result = _fit_piece(segment, router.make_piece_residuals(tendon, segment))
             tendon = (*tendon[:first], *result, *tendon[last + 1 :])
     return tendon
@@ -69,15 +69,15 @@ def _fit_piece(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     for _ in range(MAX_ROUNDS):
         start = best
         variable_count = sum(
-            7 if isinstance(part, WrapGeom) else 3 for part in start if _is_free(part)
+            7 if isinstance(part, WrapGeom) else 3 for part in start if _is_adjustable(part)
         )
         guess = search(
             # Millimetres: tolerances of least_squares are for residuals near 1.
-            lambda x, t=start: 1e3 * compute_residuals(_move_free_parts(t, x)).ravel(),
+            lambda x, t=start: 1e3 * compute_residuals(_move_adjustable_parts(t, x)).ravel(),
             np.zeros(variable_count),
             max_nfev=40,
         )
-        result = _choose_sides(_move_free_parts(start, guess.x), compute_residuals)
+        result = _choose_sides(_move_adjustable_parts(start, guess.x), compute_residuals)
         error = _compute_error(compute_residuals(result))
         if error < smallest_error:
             best = result
@@ -98,7 +98,7 @@ def _choose_sides(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     directions = np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)
     # The length of a tendon jumps with the side, which no gradient shows: all sides are tried.
     for index, part in enumerate(piece):
-        if isinstance(part, WrapGeom) and _is_free(part):
+        if isinstance(part, WrapGeom) and _is_adjustable(part):
             options = [
                 (*piece[:index], part.replace_side(direction), *piece[index + 1 :])
                 for direction in (None, *directions)
@@ -109,18 +109,18 @@ def _choose_sides(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     return piece
 
 
-def _is_free(part: TendonSite | WrapGeom) -> bool:
+def _is_adjustable(part: TendonSite | WrapGeom) -> bool:
     """Return whether a fit may move a part: a surface with a fixed side, or an unnamed site."""
     if isinstance(part, WrapGeom):
         return part.side is None or part.side.slides is None
     return not part.name
 
 
-def _move_free_parts(piece: Tendon, x: Array) -> Tendon:
+def _move_adjustable_parts(piece: Tendon, x: Array) -> Tendon:
     """Return the piece with its free parts changed by the variables of the search."""
     parts: list[TendonSite | WrapGeom] = []
     for part in piece:
-        if not _is_free(part):
+        if not _is_adjustable(part):
             parts.append(part)
         elif isinstance(part, TendonSite):
             parts.append(replace(part, position=part.position + SHIFT_SCALE_M * x[:3]))

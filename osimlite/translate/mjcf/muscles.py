@@ -356,14 +356,14 @@ def _fit_curves(initial: Curves, lengths: Array, tensions: Array, *, free: bool)
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
 
     def make_curves(x: Sequence[Any]) -> Curves:
-        lmin, lmax, end, fpmax, *rest = x
-        tendon, fiber, strength, shift = rest or (0.0, 0.0, 0.0, 0.0)
-        moved = (
+        lmin, lmax, end, fpmax, *tendon_terms = x
+        tendon, fiber, strength, shift = tendon_terms or (0.0, 0.0, 0.0, 0.0)
+        scaled = (
             initial.tendon + tendon * initial.fiber,
             initial.fiber * (1.0 + fiber),
             initial.force * (1.0 + strength),
         )
-        return Curves(*moved, lmin, lmax, end, fpmax, shift)
+        return Curves(*scaled, lmin, lmax, end, fpmax, shift)
 
     def compute_residuals(x: Array) -> Array:
         return ((make_curves(x.tolist()).compute_tensions(lengths) - tensions) / initial.force)[
@@ -375,11 +375,13 @@ def _fit_curves(initial: Curves, lengths: Array, tensions: Array, *, free: bool)
         # columns in one call.
         step = np.where(x >= 0.0, DIFFERENCE_STEP, -DIFFERENCE_STEP) * np.maximum(1.0, np.abs(x))
         step = np.where((x + step < lower) | (x + step > upper), -step, step)
-        moved = make_curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).compute_tensions(
-            lengths
-        )
+        displaced_tensions = make_curves(
+            [*np.vstack((x, x + np.diag(step))).T[:, :, None]]
+        ).compute_tensions(lengths)
         residuals = (
-            ((moved - tensions[:, None]) / initial.force).swapaxes(1, 2)[is_compared].T.copy()
+            ((displaced_tensions - tensions[:, None]) / initial.force)
+            .swapaxes(1, 2)[is_compared]
+            .T.copy()
         )
         return ((residuals[1:] - residuals[0]) / (x + step - x)[:, None]).T
 

@@ -101,13 +101,13 @@ class Router:
         slots: list[Tendon] = []
         choosers: dict[int, Callable[[Choose], Tendon]] = {}
         points = list(enumerate(self.route.points))
-        for comes_and_goes, group in groupby(
+        for is_conditional, group in groupby(
             points, lambda numbered_point: numbered_point[1].kind == NODE_TYPE.CONDITIONAL
         ):
             numbers = [number for number, _ in group]
-            for run in [numbers] if comes_and_goes else [[number] for number in numbers]:
+            for run in [numbers] if is_conditional else [[number] for number in numbers]:
                 sites = tuple(make_site(self.route.points[number]) for number in run)
-                if comes_and_goes:
+                if is_conditional:
                     point_options = [
                         [(point,), (), *self._make_switches(number)]
                         for point, number in zip(sites, run, strict=True)

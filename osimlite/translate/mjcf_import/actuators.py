@@ -29,7 +29,7 @@ from osimlite.translate.mjcf_import.draft import (
 )
 from osimlite.translate.mjcf_import.joints import BALL, FREE
 from osimlite.translate.mjcf_import.muscles import make_muscle
-from osimlite.translate.mjcf_import.poses import place, sample_qpos
+from osimlite.translate.mjcf_import.poses import compute_poses, sample_qpos
 from osimlite.translate.mjcf_import.tendon_lengths import read_tendon, tendon_lengths
 
 LENGTH_POSES = 60
@@ -84,7 +84,7 @@ def _sample_lengths(draft: ConversionDraft) -> Array:
     """Return lengths (T, P) of all tendons in sampled poses, m."""
     source = draft.source
     tendons = [read_tendon(source, index) for index in range(draft.mj.ntendon)]
-    poses = place(source, sample_qpos(source, LENGTH_POSES, 3))
+    poses = compute_poses(source, sample_qpos(source, LENGTH_POSES, 3))
     return tendon_lengths(source, tendons, poses, draft.version)
 
 

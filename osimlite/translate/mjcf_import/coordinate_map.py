@@ -19,7 +19,7 @@ class JointRecord(NamedTuple):
 
     kind: int  # mjtJoint
     address: int  # offset of the first number of the joint in qpos
-    rest: Array  # orientation (3, 3) of the body in the file, for a free joint
+    default_rotation: Array  # orientation (3, 3) of the body in the file, for a free joint
     names: tuple[str, ...]  # names of the coordinates of the joint
 
 

@@ -30,7 +30,7 @@ from osimlite.translate.mjcf_import.draft import (
     vector,
 )
 from osimlite.translate.mjcf_import.path_comparison import Bench
-from osimlite.translate.mjcf_import.poses import SampledPoses, place
+from osimlite.translate.mjcf_import.poses import SampledPoses, compute_poses
 from osimlite.translate.mjcf_import.tendon_lengths import (
     CYLINDER,
     Tendon,
@@ -89,7 +89,7 @@ def find_default_pose(draft: ConversionDraft) -> SampledPoses:
     for key in range(model.nkey):
         if draft.source.name_of("key", key) == draft.options.keyframe:
             qpos = np.array(model.key_qpos[key])
-    return place(draft.source, qpos[None, :])
+    return compute_poses(draft.source, qpos[None, :])
 
 
 def find_hint(
@@ -111,7 +111,7 @@ def find_hint(
         so that no path over the surface exists.
     """
     radius = float(draft.mj.geom_size[segment.geom, 0])
-    rotation, center = pose.turns[0, segment.geom], pose.geoms[0, segment.geom]
+    rotation, center = pose.rotations[0, segment.geom], pose.geoms[0, segment.geom]
     first_point, second_point = (
         rotation.T @ (pose.sites[0, site] - center) for site in (segment.first, segment.second)
     )
@@ -227,7 +227,7 @@ def find_hints(
 
 def measure_clearance(draft: ConversionDraft, segment: TendonSegment, poses: SampledPoses) -> float:
     """Return the smallest distance (m) of the ends of a segment from its geom, negative inside."""
-    axis = poses.turns[:, segment.geom, :, 2]
+    axis = poses.rotations[:, segment.geom, :, 2]
     result = np.inf
     for site in (segment.first, segment.second):
         offset = poses.sites[:, site] - poses.geoms[:, segment.geom]

@@ -109,8 +109,8 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
     rotation = quaternion_matrix(model.body_quat[body])
     if not groups:
         weld = WeldJoint(name=draft.unique("joint", f"{frame.name}_joint"))
-        turned = angles_of(rotation)
-        draft.model.add(weld.between(parent, frame, at=vector(position), turned=turned))
+        angles = angles_of(rotation)
+        draft.model.add(weld.between(parent, frame, at=vector(position), turned=angles))
         return
     for number, group in enumerate(groups):
         is_last = number == len(groups) - 1

@@ -23,13 +23,13 @@ class SampledPoses:
         qpos: positions (P, nq).
         sites: places (P, nsite, 3) of the sites, m.
         geoms: places (P, ngeom, 3) of the geoms, m.
-        turns: orientations (P, ngeom, 3, 3) of the geoms.
+        rotations: orientations (P, ngeom, 3, 3) of the geoms.
     """
 
     qpos: Array
     sites: Array
     geoms: Array
-    turns: Array
+    rotations: Array
 
 
 def sample_qpos(source: MjcfSource, count: int, seed: int) -> Array:
@@ -82,7 +82,7 @@ def satisfy_equalities(source: MjcfSource, qpos: Array) -> None:
             qpos[:, address] = model.qpos0[address] + value
 
 
-def place(source: MjcfSource, qpos: Array) -> SampledPoses:
+def compute_poses(source: MjcfSource, qpos: Array) -> SampledPoses:
     """Return the poses of positions (P, nq)."""
     model, mujoco = source.model, source.mujoco
     data = mujoco.MjData(model)

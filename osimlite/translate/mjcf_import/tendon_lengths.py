@@ -111,7 +111,7 @@ def segment_lengths(
             groups.setdefault((surface_type, segment.side >= 0), []).append(number)
     for (surface_type, has_side), members in groups.items():
         geoms = [segments[number].geom for number in members]
-        rotations, centers = poses.turns[:, geoms], poses.geoms[:, geoms]
+        rotations, centers = poses.rotations[:, geoms], poses.geoms[:, geoms]
 
         # Points in the frame of each geom; the defaults bind the arrays of this round.
         def local(points: Array, rotations: Array = rotations, centers: Array = centers) -> Array:

@@ -36,7 +36,7 @@ from osimlite.translate.mjcf_import.path_parts import Quadrant, Surfaces, make_g
 from osimlite.translate.mjcf_import.polynomials import fit_polynomial, samples_for
 from osimlite.translate.mjcf_import.poses import (
     SampledPoses,
-    place,
+    compute_poses,
     sample_qpos,
     satisfy_equalities,
 )
@@ -108,7 +108,7 @@ def add_tendon_paths(draft: ConversionDraft) -> None:
             draft.paths[tendon.number] = _make_linear_path(draft, tendon)
     if not spatial:
         return
-    poses = place(source, sample_qpos(source, draft.options.poses, draft.options.seed))
+    poses = compute_poses(source, sample_qpos(source, draft.options.poses, draft.options.seed))
     version = find_version(draft, spatial, poses)
     draft.version = version
     _Selection(draft, spatial, poses, version).run()
@@ -124,7 +124,7 @@ class _Selection:
         self.tendons, self.poses, self.version = tendons, poses, version
         self.reach = _find_reach(draft, tendons, poses)
         # Other poses than those that decide, so that errors are honest.
-        self.checks = place(self.source, sample_qpos(self.source, CHECK_POSES, 1))
+        self.checks = compute_poses(self.source, sample_qpos(self.source, CHECK_POSES, 1))
         self.truth = tendon_lengths(self.source, tendons, self.checks, version)
 
     def run(self) -> None:
@@ -162,7 +162,7 @@ class _Selection:
                 [
                     self.poses,
                     self.checks,
-                    place(self.source, sample_qpos(self.source, TRIAL_POSES, 3)),
+                    compute_poses(self.source, sample_qpos(self.source, TRIAL_POSES, 3)),
                 ],
                 self.version,
             )
@@ -269,7 +269,7 @@ class _Selection:
         """
         draft, source = self.draft, self.source
         tendon = self.tendons[row]
-        poses = place(source, sample_qpos(source, max(samples_for(len(joints)), 400), 2))
+        poses = compute_poses(source, sample_qpos(source, max(samples_for(len(joints)), 400), 2))
         lengths = tendon_lengths(source, [tendon], poses, self.version)[0]
         addresses = [int(draft.mj.jnt_qposadr[joint]) for joint in joints]
         function, fit_errors = fit_polynomial(
@@ -323,7 +323,7 @@ class _Selection:
                 shifted[:, int(model.jnt_qposadr[joint])] += sign * STEP
                 satisfy_equalities(source, shifted)
                 shifted_lengths.append(
-                    tendon_lengths(source, tendons, place(source, shifted), self.version)
+                    tendon_lengths(source, tendons, compute_poses(source, shifted), self.version)
                 )
             arms[:, :, column] = (shifted_lengths[0] - shifted_lengths[1]) / (2.0 * STEP)
         return arms, joints
@@ -488,7 +488,7 @@ def _find_reach(
         for segment in tendon.segments:
             if segment.geom < 0:
                 continue
-            axis = poses.turns[:, segment.geom, :, 2]
+            axis = poses.rotations[:, segment.geom, :, 2]
             for site in (segment.first, segment.second):
                 offset = poses.sites[:, site] - poses.geoms[:, segment.geom]
                 height = float(np.abs(np.einsum("pi,pi->p", offset, axis)).max())

@@ -26,7 +26,7 @@ def compare_errors(folder: Path) -> tuple[np.ndarray, list[tuple[float, float]]]
     outcome = run(folder / "ik.xml")
     table = outcome.tables["ik_ik_marker_errors.sto"]
     evidence: Any = outcome.evidence
-    errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
+    errors = 100.0 * np.linalg.norm(evidence.positions - evidence.measured, axis=2)
     summary = (
         100.0 * outcome.summary["rms_marker_error"],
         100.0 * outcome.summary["largest_marker_error"],

@@ -81,7 +81,7 @@ def speed_jacobian(model: Any, made: Osim, qpos: Array) -> Array:
             jacobian[dof : dof + 3, columns[3:]] = np.eye(3)
             turns = slice(dof + 3, dof + 6)
         angles = [values[name] for name in own[:3]]
-        rest = made.coordinates.joints[joint].rest if len(own) == 6 else np.eye(3)
+        rest = made.coordinates.joints[joint].default_rotation if len(own) == 6 else np.eye(3)
         jacobian[turns, columns[:3]] = rest.T @ body_rates(angles)
     return jacobian
 

@@ -16,7 +16,7 @@ import osimlite
 mujoco = pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
 
 from osimlite.translate.mjcf_import.convert import Osim  # noqa: E402
-from osimlite.translate.mjcf_import.poses import place, sample_qpos  # noqa: E402
+from osimlite.translate.mjcf_import.poses import compute_poses, sample_qpos  # noqa: E402
 from osimlite.translate.mjcf_import.source import load_mjcf  # noqa: E402
 from osimlite.translate.mjcf_import.tendon_lengths import (  # noqa: E402
     read_tendon,
@@ -88,7 +88,7 @@ def test_lengths_and_forces_in_osimlite(case):
         pytest.skip("no tendons")
     qpos = sample_qpos(source, POSES, 77)
     tendons = [read_tendon(source, index) for index in range(model.ntendon)]
-    truth = tendon_lengths(source, tendons, place(source, qpos), source.major)
+    truth = tendon_lengths(source, tendons, compute_poses(source, qpos), source.major)
     data, paths = mujoco.MjData(model), osimlite.paths(made.model)
     lengths = [paths.lengths(made.coordinates.values(pose)) for pose in qpos]
     errors = []

@@ -10,7 +10,7 @@ from osimlite.errors import SettingError
 
 mujoco = pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
 
-from osimlite.translate.mjcf_import.poses import place, sample_qpos  # noqa: E402
+from osimlite.translate.mjcf_import.poses import compute_poses, sample_qpos  # noqa: E402
 from osimlite.translate.mjcf_import.source import load_mjcf  # noqa: E402
 from osimlite.translate.mjcf_import.tendon_lengths import (  # noqa: E402
     read_tendon,
@@ -40,7 +40,7 @@ def test_lengths_by_our_rules_are_mujocos(arm):
     source = load_mjcf(arm)
     qpos = sample_qpos(source, 50, 4)
     tendons = [read_tendon(source, index) for index in range(source.model.ntendon)]
-    lengths = tendon_lengths(source, tendons, place(source, qpos), source.major)
+    lengths = tendon_lengths(source, tendons, compute_poses(source, qpos), source.major)
     data = mujoco.MjData(source.model)
     for pose, column in zip(qpos, lengths.T, strict=True):
         data.qpos[:] = pose
