@@ -18,6 +18,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
+from osimlite.view.drawn_forces import DrawnForces
 from osimlite.view.motion import (
     DrawableMotion,
     activity_color,
@@ -27,7 +28,6 @@ from osimlite.view.motion import (
     read_activations,
 )
 from osimlite.view.picture import FORCE, INK, SKY, Camera, ForceArrow, Style, draw_scene
-from osimlite.view.pushes import DrawnForces
 from osimlite.view.scene import STEEPEST, Scene
 
 Plane = Literal["xy", "yz", "xz"]
@@ -160,7 +160,7 @@ class Film:
         self.q = interpolate_columns(motion, values, self.times)
         self.poses = self.scene.compute_all_poses(self.q)
         self.moving = find_moving_bodies(self.poses)
-        self.pushes = DrawnForces.from_motion(self.scene, motion, self.times)
+        self.drawn_forces = DrawnForces.from_motion(self.scene, motion, self.times)
         self.activity = {
             path: np.interp(self.times, recorded, levels)
             for path, levels in read_activations(self.scene, motion).items()
@@ -247,7 +247,7 @@ class _Painter:
         half_width, half_height = (1.12 * film.reach).tolist()
         aspect = size[0] / size[1]
         self.half = max(half_width, half_height * aspect), max(half_height, half_width / aspect)
-        largest_force = film.pushes.largest
+        largest_force = film.drawn_forces.largest
         self.meters_per_newton = (
             LONGEST_ARROW * self.half[1] / largest_force if largest_force > 0.0 else 0.0
         )
@@ -257,7 +257,7 @@ class _Painter:
         film = self.film
         pose = self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)
-        drawn_forces = film.pushes.locate_forces(number, pose)
+        drawn_forces = film.drawn_forces.locate_forces(number, pose)
         arrows = [
             ForceArrow(point, force * self.meters_per_newton) for _, point, force in drawn_forces
         ]

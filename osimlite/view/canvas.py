@@ -11,7 +11,7 @@ from osimlite.base.named_tuples import NamedTuple
 from osimlite.io.meshes.surface import Indices
 from osimlite.mechanics.multibody.spatial import Array
 
-_AT_ONCE = 300_000
+_PORTION_PIXELS = 300_000
 """Number of pixels in one portion of work; more would exceed the caches of the processor."""
 
 
@@ -129,7 +129,9 @@ class Canvas:
         )
         total = np.cumsum(lengths)
         # Portions of limited size, cut between rows.
-        cuts = np.searchsorted(total, np.arange(_AT_ONCE, total[-1] if len(total) else 0, _AT_ONCE))
+        cuts = np.searchsorted(
+            total, np.arange(_PORTION_PIXELS, total[-1] if len(total) else 0, _PORTION_PIXELS)
+        )
         for portion in np.split(np.arange(len(rows)), cuts):
             triangle, row, start = triangles[portion], rows[portion], starts[portion]
             weights = _compute_weights(

@@ -118,7 +118,7 @@ class _SceneCollector:
         self.builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
         self.tree = self.builder.tree
         self.surfaces: list[Surface] = []
-        self.places: dict[int, int] = {}
+        self.surface_indices: dict[int, int] = {}
         self.meshes: dict[Path, Surface] = {}
         self.items: list[Item] = []
         self.lines: list[Line] = []
@@ -450,12 +450,21 @@ class _SceneCollector:
         if not np.isfinite(matrix).all():
             raise ModelError("has a size or position that is not a finite number")
         # Unit shapes are shared by all components that use them.
-        if id(surface) not in self.places:
-            self.places[id(surface)] = len(self.surfaces)
+        if id(surface) not in self.surface_indices:
+            self.surface_indices[id(surface)] = len(self.surfaces)
             self.surfaces.append(surface)
         opacity = min(max(float(opacity), 0.0), 1.0)
         self.items.append(
-            Item(path, layer, body, self.places[id(surface)], matrix, color, opacity, visible)
+            Item(
+                path,
+                layer,
+                body,
+                self.surface_indices[id(surface)],
+                matrix,
+                color,
+                opacity,
+                visible,
+            )
         )
         if layer == "geometry" and visible:
             self.drawn.add(body)

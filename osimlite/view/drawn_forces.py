@@ -86,12 +86,17 @@ class DrawnForces:
     def largest(self) -> float:
         """Largest absolute component of any force, N; 0 without forces."""
         return max(
-            (float(np.abs(push.forces).max(initial=0.0)) for push in self.forces), default=0.0
+            (float(np.abs(drawn_force.forces).max(initial=0.0)) for drawn_force in self.forces),
+            default=0.0,
         )
 
     def locate_forces(self, number: int, bodies: Bodies) -> list[tuple[ForceAnchor, Array, Array]]:
         """Return anchor, point (3,), m, and vector (3,), N, in ground of each force at an index."""
         return [
-            (push.anchor, push.locate_point(number, bodies), push.forces[number])
-            for push in self.forces
+            (
+                drawn_force.anchor,
+                drawn_force.locate_point(number, bodies),
+                drawn_force.forces[number],
+            )
+            for drawn_force in self.forces
         ]

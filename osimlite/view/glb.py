@@ -20,9 +20,9 @@ from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.progress import watch_items
 from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
+from osimlite.view.drawn_forces import LONGEST_ARROW, DrawnForces
 from osimlite.view.motion import DrawableMotion, get_values, interpolate_columns
 from osimlite.view.picture import FORCE
-from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Bodies, Color, Scene
 
 RATE = 60.0
@@ -103,7 +103,7 @@ def _list_segments(
     The last segments of a path that has fewer corners in a pose have no length there.
     """
     for index, line in enumerate(scene.lines):
-        if line.visible and line.layer in scene.shown:
+        if line.visible and line.layer in scene.visible_layers:
             corners_by_pose = [pose.lines[index] for pose in poses]
             corner_count = max(map(len, corners_by_pose))
             padded_corners = [
@@ -191,9 +191,9 @@ class _GlbWriter:
         self.materials: list[dict[str, Any]] = []
         self.channels: list[dict[str, Any]] = []
         self.samplers: list[dict[str, Any]] = []
-        self._known: dict[Any, int] = {}
-        self._moves = len(times) > 1
-        self._times = self._add_accessor(times[:, None], bounds=True) if self._moves else 0
+        self._indices: dict[Any, int] = {}
+        self._is_animated = len(times) > 1
+        self._times = self._add_accessor(times[:, None], bounds=True) if self._is_animated else 0
 
     def _add_accessor(
         self,
@@ -219,18 +219,18 @@ class _GlbWriter:
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
-    def _add_once(self, key: Any, entries: list[dict[str, Any]], entry: dict[str, Any]) -> int:
+    def _add_unique(self, key: Any, entries: list[dict[str, Any]], entry: dict[str, Any]) -> int:
         """Return the index of an entry, and append the entry if its key is new."""
-        if key not in self._known:
-            self._known[key] = len(entries)
+        if key not in self._indices:
+            self._indices[key] = len(entries)
             entries.append(entry)
-        return self._known[key]
+        return self._indices[key]
 
     def add_mesh(self, surface: Any, color: Color, opacity: float) -> int:
         """Return the index of a mesh with the shape of a surface and a colour (sRGB, 0 to 1)."""
         key = (id(surface), color, opacity)
-        if key in self._known:
-            return self._known[key]
+        if key in self._indices:
+            return self._indices[key]
         # glTF has linear colours.
         light = [
             channel / 12.92 if channel <= 0.04045 else ((channel + 0.055) / 1.055) ** 2.4
@@ -247,19 +247,19 @@ class _GlbWriter:
         }
         # Geometry is stored once, whatever the number of its colours.
         geometry = ("geometry", id(surface))
-        if geometry not in self._known:
-            self._known[geometry] = self._add_accessor(
+        if geometry not in self._indices:
+            self._indices[geometry] = self._add_accessor(
                 surface.points, bounds=True, target=_VERTICES
             )
             self._add_accessor(compute_normals(surface), target=_VERTICES)
             self._add_accessor(surface.triangles.reshape(-1, 1), _UINT32, target=_CORNERS)
-        first = self._known[geometry]
+        first = self._indices[geometry]
         primitive = {
             "attributes": {"POSITION": first, "NORMAL": first + 1},
             "indices": first + 2,
-            "material": self._add_once((color, opacity), self.materials, material),
+            "material": self._add_unique((color, opacity), self.materials, material),
         }
-        return self._add_once(key, self.meshes, {"primitives": [primitive]})
+        return self._add_unique(key, self.meshes, {"primitives": [primitive]})
 
     def add_node(self, name: str, track: _Track, mesh: int | None = None) -> int:
         """Add a node in ground, animated unless its track is constant; return its index."""
@@ -271,7 +271,7 @@ class _GlbWriter:
             array = np.asarray(values)
             node[property_name] = array[0].tolist()
             # A node that never moves needs no channel.
-            if self._moves and np.ptp(array, axis=0).max() > 0.0:
+            if self._is_animated and np.ptp(array, axis=0).max() > 0.0:
                 self.samplers.append({"input": self._times, "output": self._add_accessor(array)})
                 target = {"node": index, "path": property_name}
                 self.channels.append({"sampler": len(self.samplers) - 1, "target": target})

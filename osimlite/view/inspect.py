@@ -57,7 +57,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
             "values": [
                 text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows
             ],
-            "given": [index for index, (_, _, is_given) in enumerate(rows) if is_given],
+            "given": [index for index, (_, _, is_explicit) in enumerate(rows) if is_explicit],
         }
         # Most components of a class have the same properties, which are written once.
         if tags.setdefault(class_tag, names) != names:
@@ -74,7 +74,7 @@ def _list_properties(tree: Tree, owner: Object, prefix: str) -> Iterator[tuple[s
         return
     for spec in get_field_specs(type(owner)).values():
         value = getattr(owner, spec.name)
-        is_given = spec.name in owner.model_fields_set
+        is_explicit = spec.name in owner.model_fields_set
         if isinstance(spec.kind, ObjectField):
             for member in value if isinstance(value, list) else [value]:
                 if isinstance(member, Object) and not isinstance(member, Component):
@@ -85,9 +85,13 @@ def _list_properties(tree: Tree, owner: Object, prefix: str) -> Iterator[tuple[s
                     )
                     yield from _list_properties(tree, member, prefix + name)
         elif isinstance(spec.kind, Reference):
-            yield prefix + spec.tag, _name_values(tree, owner, spec.kind, value), is_given
+            yield prefix + spec.tag, _name_values(tree, owner, spec.kind, value), is_explicit
         else:
-            yield prefix + spec.tag, make_formatter(spec.kind, "shortest")(value).strip(), is_given
+            yield (
+                prefix + spec.tag,
+                make_formatter(spec.kind, "shortest")(value).strip(),
+                is_explicit,
+            )
 
 
 def _name_values(tree: Tree, owner: Object, reference: Reference, value: Any) -> str:

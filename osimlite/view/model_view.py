@@ -20,6 +20,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
+from osimlite.view.drawn_forces import LONGEST_ARROW, DrawnForces
 from osimlite.view.glb import write_glb
 from osimlite.view.incomplete import build_showable, describe_left_out
 from osimlite.view.motion import (
@@ -31,7 +32,6 @@ from osimlite.view.motion import (
 )
 from osimlite.view.page import Story, page_data, page_text
 from osimlite.view.picture import Camera, ForceArrow, Style, draw_scene
-from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.recording import Recording, read_recording
 from osimlite.view.rrd import write_rrd
 from osimlite.view.scene import Color, Scene

@@ -24,11 +24,11 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.translate.sidecar import replace_non_finite
+from osimlite.view.drawn_forces import DrawnForces
 from osimlite.view.incomplete import describe_left_out
 from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
 from osimlite.view.motion import DrawableMotion, find_moving_bodies, get_values, read_activations
-from osimlite.view.pushes import DrawnForces
 from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
 
@@ -125,11 +125,11 @@ def page_data(
             "server": server,
             "story": None if story is None else story._asdict(),
             "layers": LAYERS,
-            "shown": sorted(scene.shown),
+            "shown": sorted(scene.visible_layers),
             "labelled": hints.show_labels,
             "up": scene.up.tolist(),
             "gravity": mechanism.gravity.tolist(),
-            "floor": _place_floor(scene, start),
+            "floor": _describe_floor(scene, start),
             "center": (0.5 * (lowest + highest)).tolist(),
             "size": float(np.linalg.norm(highest - lowest)),
             "directions": _list_directions(scene.up),
@@ -178,17 +178,17 @@ def _describe_items(scene: Scene) -> dict[str, Any]:
                 **{
                     name: value
                     for name, value in vars(line).items()
-                    if name not in ("course", "wraps")
+                    if name not in ("route", "wraps")
                 },
                 **(
                     {
                         "points": [
                             {"body": point.body, "at": point.location.tolist()}
-                            for point in line.course
+                            for point in line.route
                         ]
                     }
-                    if isinstance(line.course, tuple)
-                    else {"route": next(routes), "most": line.course.corners, "wraps": line.wraps}
+                    if isinstance(line.route, tuple)
+                    else {"route": next(routes), "most": line.route.corners, "wraps": line.wraps}
                 ),
             }
             for line in scene.lines
@@ -285,7 +285,7 @@ def _describe_measured_markers(markers: MeasuredMarkers | None) -> dict[str, Any
             {"name": name, "body": body, "at": point.tolist()}
             for name, (body, point) in named_stations
         ],
-        "places": text_of(markers.places.astype("<f4")),
+        "places": text_of(markers.positions.astype("<f4")),
     }
 
 
@@ -325,7 +325,7 @@ def _choose_directions(up: Array) -> tuple[Array, Array]:
     return front, np.cross(front, up)
 
 
-def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
+def _describe_floor(scene: Scene, q: Array) -> dict[str, Any]:
     """Return body and frame of the grid (its X-Z plane): a contact half space or a level floor."""
     bodies = scene.compute_poses(q)
     for drawn_item in scene.iterate_visible_items():

@@ -186,11 +186,11 @@ def _fill_background(
         )
     for line, corners in zip(scene.lines, bodies.lines, strict=True):
         # A path that cannot be traced in this pose has no corners.
-        if line.visible and line.layer in scene.shown and len(corners):
+        if line.visible and line.layer in scene.visible_layers and len(corners):
             surface, is_tendon = build_tube(line, corners)
             color = style.colors.get(line.path, line.color)
             triangles.add_surface(surface, _IN_GROUND, np.where(is_tendon[:, None], TENDON, color))
-    if "frames" in scene.shown:
+    if "frames" in scene.visible_layers:
         for axes in scene.axes:
             transform = bodies.transform_frame(axes.body, axes.matrix)
             for axis in range(3):

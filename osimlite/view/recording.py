@@ -25,7 +25,7 @@ class MeasuredMarkers(NamedTuple):
     names: Sequence[str]  # names of the m markers
     # index of the body of each marker (-1 for ground), and its position in the body (3,), m
     stations: Sequence[tuple[int, Array]]
-    places: Array  # measured positions (t, m, 3) in ground, m; NaN where a marker was not seen
+    positions: Array  # measured positions (t, m, 3) in ground, m; NaN where a marker was not seen
 
 
 @dataclass(frozen=True, eq=False)

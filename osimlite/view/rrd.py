@@ -15,9 +15,9 @@ import numpy as np
 from osimlite.base.files import write_atomically
 from osimlite.base.require import require
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.view.drawn_forces import LONGEST_ARROW, DrawnForces
 from osimlite.view.motion import DrawableMotion, activity_color, get_values, read_activations
 from osimlite.view.picture import FORCE
-from osimlite.view.pushes import LONGEST_ARROW, DrawnForces
 from osimlite.view.scene import Color, Scene
 
 
@@ -92,7 +92,7 @@ def write_rrd(scene: Scene, q: Array, motion: DrawableMotion | None, path: str |
 
     levels = {} if motion is None else read_activations(scene, motion)
     for index, line in enumerate(scene.lines):
-        if line.visible and line.layer in scene.shown:
+        if line.visible and line.layer in scene.visible_layers:
             name = make_entity("model", line.layer, line.path)
             strips = [pose.lines[index] for pose in poses]
             log_static(name, rr.LineStrips3D.from_fields(radii=line.radius))

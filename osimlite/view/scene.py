@@ -65,7 +65,7 @@ class Line:
     path: str  # absolute path of the component it shows
     layer: Layer  # layer with which it is shown or hidden
     # Two or more corners that are fixed to bodies, or a path that computes its corners.
-    course: tuple[LinePoint, ...] | TraceablePath
+    route: tuple[LinePoint, ...] | TraceablePath
     color: Color  # red, green, blue, 0 to 1
     radius: float = 0.004  # radius of the drawn line, m
     visible: bool = True  # whether the model wants it shown
@@ -77,12 +77,12 @@ class Line:
     @property
     def start(self) -> LinePoint:
         """First point of the line."""
-        return self.course[0] if isinstance(self.course, tuple) else LinePoint(*self.course.start)
+        return self.route[0] if isinstance(self.route, tuple) else LinePoint(*self.route.start)
 
     @property
     def body(self) -> int | None:
         """Index of the body to which all corners are fixed; None for several bodies or a path."""
-        bodies = {point.body for point in self.course} if isinstance(self.course, tuple) else set()
+        bodies = {point.body for point in self.route} if isinstance(self.route, tuple) else set()
         return bodies.pop() if len(bodies) == 1 else None
 
 
@@ -127,9 +127,9 @@ class Bodies:
         paths = iter(self.scene.polylines.trace(self.q, self.rotations[:-1], self.origins[:-1]))
         return [
             np.concatenate(
-                [self.transform_points(point.body, point.location[None]) for point in line.course]
+                [self.transform_points(point.body, point.location[None]) for point in line.route]
             )
-            if isinstance(line.course, tuple)
+            if isinstance(line.route, tuple)
             else next(paths)
             for line in self.scene.lines
         ]
@@ -158,7 +158,7 @@ class Scene:
     axes: Sequence[Axes]  # all frames
     force_anchors: Sequence[ForceAnchor] = ()  # points where contact forces are shown
     # Layers that the model shows at first.
-    shown: frozenset[Layer] = frozenset(LAYERS)
+    visible_layers: frozenset[Layer] = frozenset(LAYERS)
     # Paths of the half spaces, whose items are squares of limited size.
     half_spaces: frozenset[str] = frozenset()
     remarks: Sequence[tuple[str, str]] = ()  # path and reason of components that are not shown
@@ -188,7 +188,7 @@ class Scene:
         """Paths among the lines, to be traced together."""
         return Polylines(
             self.mechanism,
-            [line.course for line in self.lines if not isinstance(line.course, tuple)],
+            [line.route for line in self.lines if not isinstance(line.route, tuple)],
         )
 
     @cached_property
@@ -203,7 +203,7 @@ class Scene:
         return (
             drawn_item
             for drawn_item in self.items
-            if drawn_item.visible and drawn_item.layer in self.shown
+            if drawn_item.visible and drawn_item.layer in self.visible_layers
         )
 
     @cached_property
@@ -243,13 +243,17 @@ class Scene:
         """
         # Lines between several bodies belong to none of them.
         for index, drawn_item in enumerate(self.items):
-            if drawn_item.visible and drawn_item.layer in self.shown and index not in self.large:
+            if (
+                drawn_item.visible
+                and drawn_item.layer in self.visible_layers
+                and index not in self.large
+            ):
                 yield (
                     drawn_item.body,
                     bodies.transform_points(drawn_item.body, self.compute_corners(drawn_item)),
                 )
         for line, corners in zip(self.lines, bodies.lines, strict=True):
-            if line.visible and line.layer in self.shown:
+            if line.visible and line.layer in self.visible_layers:
                 yield -2 if line.body is None else line.body, corners
 
     def compute_box(self, q: Array) -> tuple[Array, Array]:

@@ -102,11 +102,11 @@ def _make_handler(
 
         def do_GET(self) -> None:
             if not self._is_for_us():
-                self._answer(HTTPStatus.FORBIDDEN, b"", "text/plain")
+                self._respond(HTTPStatus.FORBIDDEN, b"", "text/plain")
             elif self.path == "/":
-                self._answer(HTTPStatus.OK, page, "text/html; charset=utf-8")
+                self._respond(HTTPStatus.OK, page, "text/html; charset=utf-8")
             else:
-                self._answer(HTTPStatus.NOT_FOUND, b"", "text/plain")
+                self._respond(HTTPStatus.NOT_FOUND, b"", "text/plain")
 
         def do_POST(self) -> None:
             try:
@@ -117,7 +117,7 @@ def _make_handler(
                 result = {"error": str(problem)}
                 # The rest of a refused request is not the next request.
                 self.close_connection = True
-            self._answer(status, json.dumps(result).encode(), "application/json")
+            self._respond(status, json.dumps(result).encode(), "application/json")
 
         def _question(self) -> bytes:
             if not self._is_for_us() or self.path != "/assemble":
@@ -137,7 +137,7 @@ def _make_handler(
             # model.
             return (self.headers.get("Host") or "").partition(":")[0] in (HOST, "localhost")
 
-        def _answer(self, status: HTTPStatus, body: bytes, content_type: str) -> None:
+        def _respond(self, status: HTTPStatus, body: bytes, content_type: str) -> None:
             self.send_response(status)
             self.send_header("Content-Type", content_type)
             self.send_header("Content-Length", str(len(body)))

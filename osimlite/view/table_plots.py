@@ -217,7 +217,7 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
     for label, values in table.table[1].items():
         column = _describe_column(label, np.asarray(values, dtype=float), table, names)
         # Values, speeds, activations and so on of a table of states come one after the other.
-        quantity = _find_kind(label)
+        quantity = _find_quantity(label)
         section = SECTIONS.get(quantity, quantity.replace("_", " "))
         column = column._replace(section=section)
         if section == SECTIONS["activation"]:
@@ -228,7 +228,7 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
     return [column._replace(group=groups[column.group][0]) for column in all_columns]
 
 
-def _find_kind(label: str) -> str:
+def _find_quantity(label: str) -> str:
     """Return the kind of a state by its label; "" for columns that are no states."""
     owner, _, quantity = label.rpartition("/")
     # Labels of states are paths; those of older files have dots.

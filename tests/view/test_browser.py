@@ -369,7 +369,7 @@ def test_the_camera_has_all_of_a_motion_in_sight_and_follows_what_travels(open_p
 def test_an_arrow_starts_where_the_force_acts(open_page, tmp_path):
     model, motion = dynamic_walker(), stroll()
     view = ModelView.from_model(model, build_mechanism(model), motion=motion)
-    from osimlite.view.pushes import DrawnForces
+    from osimlite.view.drawn_forces import DrawnForces
 
     row = 20
     pushes = DrawnForces.from_motion(view.scene, motion, motion.times)

@@ -13,9 +13,9 @@ import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.view.collect import build_scene
+from osimlite.view.drawn_forces import DrawnForces
 from osimlite.view.glb import RATE, write_glb
 from osimlite.view.motion import order_columns
-from osimlite.view.pushes import DrawnForces
 from tests.view.motions import Recorded, stroll
 
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}

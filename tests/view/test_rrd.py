@@ -12,7 +12,7 @@ import pytest
 from osimlite.errors import MissingDependency
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.view import ModelView
-from osimlite.view.pushes import DrawnForces
+from osimlite.view.drawn_forces import DrawnForces
 from tests.view.motions import stroll
 
 

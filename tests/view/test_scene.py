@@ -126,7 +126,7 @@ def test_a_hidden_shape_is_kept_but_not_drawn():
 def test_a_line_is_a_line():
     scene, _ = with_shape(LineGeometry(start_point=(0.0, 0.0, 0.0), end_point=(1.0, 2.0, 3.0)))
     line = next(line for line in scene.lines if "Pelvis_geom" in line.path)
-    assert line.course[1].location.tolist() == [1.0, 2.0, 3.0]
+    assert line.route[1].location.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_contact_surfaces_are_where_the_forces_find_them():
