@@ -164,7 +164,7 @@ class System(StateEvaluator):
         first = 0
         for number, element in enumerate(self.forces.elements):
             columns = slice(first, first := first + len(element.columns))
-            offsets = element.find_copied_places()
+            offsets = element.find_copied_offsets()
             if offsets is None:
                 computed.append((number, columns))
             elif offsets:

@@ -19,7 +19,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.states import list_states
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import ForceType
-from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Together
+from osimlite.simulation.elements.parameters import Fields, Number, Numbers, ParameterGroup
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 ROUNDING = 1e-9
@@ -133,7 +133,7 @@ def find_fibers(
         single_terms = (
             single_term
             for term in terms
-            for single_term in (term.terms if isinstance(term, Together) else (term,))
+            for single_term in (term.terms if isinstance(term, ParameterGroup) else (term,))
         )
         # Laws with curves or other objects as parameters would have to be compiled.
         if not all(

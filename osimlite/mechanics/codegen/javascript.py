@@ -38,7 +38,7 @@ COMPARISONS = {
 """Signs of comparisons."""
 SIGNS = {ast.USub: "-", ast.UAdd: "+"}
 """Signs before an operand."""
-CALLED: dict[Any, str] = {
+BUILT_IN_NAMES: dict[Any, str] = {
     abs: "Math.abs",
     min: "minimum",
     max: "maximum",
@@ -356,9 +356,9 @@ class _JavaScriptWriter(Kernel):
             case ast.Starred(value=value):
                 return f"...{self.expression(value)}"
             case ast.Call(func=function, args=arguments, keywords=[]):
-                called = self.value(function) if not self._is_local(function) else None
+                callee = self.value(function) if not self._is_local(function) else None
                 return self.call(
-                    called, function, [self.expression(argument) for argument in arguments], node
+                    callee, function, [self.expression(argument) for argument in arguments], node
                 )
         raise self.refuse(node)
 
@@ -452,27 +452,27 @@ class _JavaScriptWriter(Kernel):
         return f"({' && '.join(tests)})"
 
     def call(
-        self, called: Any, function: ast.expr, arguments: Sequence[str], node: ast.expr
+        self, callee: Any, function: ast.expr, arguments: Sequence[str], node: ast.expr
     ) -> str:
         """Return the text of a call.
 
         Args:
-            called: the function, None for a local one.
+            callee: the function, None for a local one.
             function: expression of the function.
             arguments: texts of the arguments.
             node: the call, for messages.
         """
         if self._is_local(function):
             return f"{self.expression(function)}({', '.join(arguments)})"
-        if isinstance(called, FunctionType):
-            if called in POINTERS:
-                return POINTERS[called](*arguments)
-            self.functions.append(called)
-            return f"{name_of(called)}({', '.join(arguments)})"
-        if isinstance(called, type) and issubclass(called, tuple) and hasattr(called, "_fields"):
-            return self.new_record(called, arguments)
-        if isinstance(called, type | type(abs)) and called in CALLED:
-            return f"{CALLED[called]}({', '.join(arguments)})"
+        if isinstance(callee, FunctionType):
+            if callee in POINTERS:
+                return POINTERS[callee](*arguments)
+            self.functions.append(callee)
+            return f"{name_of(callee)}({', '.join(arguments)})"
+        if isinstance(callee, type) and issubclass(callee, tuple) and hasattr(callee, "_fields"):
+            return self.new_record(callee, arguments)
+        if isinstance(callee, type | type(abs)) and callee in BUILT_IN_NAMES:
+            return f"{BUILT_IN_NAMES[callee]}({', '.join(arguments)})"
         raise self.refuse(node)
 
     def new_record(self, record: Any, arguments: Sequence[str]) -> str:

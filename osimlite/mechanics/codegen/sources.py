@@ -37,7 +37,7 @@ def compute_digest(function: Any, settings: str = "") -> str:
     """
     descriptions = [
         settings,
-        *(_describe_function(called) for called in collect_functions(function)),
+        *(_describe_function(callee) for callee in collect_functions(function)),
     ]
     return hashlib.sha256(repr(descriptions).encode()).hexdigest()[:16]
 
@@ -50,12 +50,12 @@ def collect_functions(function: Any) -> Iterator[FunctionType]:
     Functions that are called by their address are not included: they are kernels of their own.
     """
     pending = [function]
-    seen = set()
+    visited = set()
     while pending:
         current = pending.pop()
-        if current in seen:
+        if current in visited:
             continue
-        seen.add(current)
+        visited.add(current)
         yield current
         pending += [value for _, value in _global_values(current) if _is_local(value)]
 

@@ -107,11 +107,11 @@ class PairContact:
     vt: float
     early_return: bool = False
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records that the kernels compute.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             A record for each pair. With Simbody's early return, the forces depend on one another,
@@ -121,20 +121,20 @@ class PairContact:
         for pair in self.pairs:
             one = self.surfaces[pair.first]
             two = self.surfaces[pair.second]
-            links, numbers = self.pack_pair(pair, places)
+            links, numbers = self.pack_pair(pair, link_map)
             kernel = "touch_half_space" if one.is_half_space else "touch_spheres"
             if one.radii or two.radii:
                 kernel = "touch_ellipsoid" if one.is_half_space else "touch_ellipsoids"
                 shapes = (surface for surface in (one, two) if not surface.is_half_space)
                 numbers = (
                     *numbers,
-                    *(x for surface in shapes for x in _pack_shape(surface, places)),
+                    *(x for surface in shapes for x in _pack_shape(surface, link_map)),
                 )
             result.append(
                 ForceRecord(kernel, links, numbers, is_contact=True, is_part=self.early_return)
             )
         if self.early_return:
-            result.append(self._make_early_return(places))
+            result.append(self._make_early_return(link_map))
         else:
             result += self._make_responses()
         return result
@@ -164,22 +164,22 @@ class PairContact:
         return result
 
     def pack_pair(
-        self, pair: ContactPair, places: LinkMap
+        self, pair: ContactPair, link_map: LinkMap
     ) -> tuple[tuple[int, int], tuple[float, ...]]:
         """Return links and numbers of a pair.
 
         Args:
             pair: the pair.
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             The links of both surfaces, and the numbers of the kernel.
         """
         one = self.surfaces[pair.first]
         two = self.surfaces[pair.second]
-        first, center = places.station(one.body, one.center)
-        second, other = places.station(two.body, two.center)
-        normal = places.direction(one.body, one.normal)
+        first, center = link_map.station(one.body, one.center)
+        second, other = link_map.station(two.body, two.center)
+        normal = link_map.direction(one.body, one.normal)
         # An infinite radius would give NaN in the kernels' products with zero.
         radius = 0.0 if one.is_half_space else one.radius
         return (first, second), (
@@ -192,15 +192,15 @@ class PairContact:
             self.vt,
         )
 
-    def _make_early_return(self, places: LinkMap) -> ForceRecord:
+    def _make_early_return(self, link_map: LinkMap) -> ForceRecord:
         """Return the record that computes the pairs one by one in Simbody's order.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
         """
-        stations = [places.station(surface.body, surface.center) for surface in self.surfaces]
+        stations = [link_map.station(surface.body, surface.center) for surface in self.surfaces]
         links = (link for link, _ in stations)
-        pairs = (place for pair in self.pairs for place in (pair.first, pair.second))
+        pairs = (station for pair in self.pairs for station in (pair.first, pair.second))
         numbers = (
             x
             for (_, center), surface in zip(stations, self.surfaces, strict=True)
@@ -235,7 +235,7 @@ class PairContact:
             f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels
         )
 
-    def find_copied_places(self) -> None:
+    def find_copied_offsets(self) -> None:
         """Return None, since the report adds up the loads of pairs."""
 
     def report(
@@ -348,12 +348,12 @@ class HuntCrossley(PairContact):
         return cls(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
 
 
-def _pack_shape(surface: ContactSurface, places: LinkMap) -> tuple[float, ...]:
+def _pack_shape(surface: ContactSurface, link_map: LinkMap) -> tuple[float, ...]:
     """Return an ellipsoid or a sphere as numbers of a kernel.
 
     Args:
         surface: the surface.
-        places: placement of the bodies in the links of the tree.
+        link_map: placement of the bodies in the links of the tree.
 
     Returns:
         Three axes in the link, and the half axes (m) along them.
@@ -373,7 +373,7 @@ def _pack_shape(surface: ContactSurface, places: LinkMap) -> tuple[float, ...]:
             surface.radius,
             surface.radius,
         )
-    axes = (places.direction(surface.body, axis) for axis in zip(*surface.axes, strict=True))
+    axes = (link_map.direction(surface.body, axis) for axis in zip(*surface.axes, strict=True))
     return (*(x for axis in axes for x in axis), *surface.radii)
 
 
@@ -435,9 +435,9 @@ def read_surface(
         raise builder.make_unsupported_error(
             force, f" on the {get_class_name(geometry)} '{builder.path(geometry)}'"
         )
-    frame, body, placed = find_frame(builder, geometry)
-    center = placed[:3, 3]
-    axes = placed[:3, :3]
+    frame, body, frame_in_body = find_frame(builder, geometry)
+    center = frame_in_body[:3, 3]
+    axes = frame_in_body[:3, :3]
     # The half space is solid at x > 0 of the geometry's frame.
     normal = -axes[:, 0]
     if is_a(geometry, "ContactEllipsoid"):
@@ -446,7 +446,7 @@ def read_surface(
             raise ModelError(
                 f"the radii of '{builder.path(geometry)}' are not all positive; make them positive"
             )
-        place = to_triple(center)
+        center_in_body = to_triple(center)
         still = (0.0, 0.0, 0.0)
         rows = to_triple(axes[0]), to_triple(axes[1]), to_triple(axes[2])
         # The longest radius bounds the ellipsoid, as a sphere's radius does, where only a bound is
@@ -454,7 +454,7 @@ def read_surface(
         longest = max(geometry.radii)
         radii = to_triple(geometry.radii)
         return ContactSurface(
-            geometry.name, body, frame, place, longest, still, material, radii, rows
+            geometry.name, body, frame, center_in_body, longest, still, material, radii, rows
         )
     radius = geometry.radius if is_a(geometry, "ContactSphere") else inf
     builder.check_finite(geometry, (*center, *normal, 0.0 if radius == inf else radius))
@@ -481,5 +481,5 @@ def find_frame(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str,
         raise UnsupportedError(
             f"the contact geometry '{builder.path(geometry)}' on the {get_class_name(frame)} '{builder.path(frame)}'"
         )
-    body, placed = builder.find_placement(frame)
-    return frame.name, body, placed @ make_offset(geometry.location, geometry.orientation)
+    body, frame_in_body = builder.find_placement(frame)
+    return frame.name, body, frame_in_body @ make_offset(geometry.location, geometry.orientation)

@@ -30,7 +30,7 @@ from osimlite.mechanics.multibody.smoothing_spline import natural_splines
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.force_type import DeclaredForce, ForceType
-from osimlite.simulation.elements.geometries.load import GivenLoad, Load
+from osimlite.simulation.elements.geometries.load import Load, LoadGeometry
 from osimlite.simulation.elements.registry import register_force_type
 
 if TYPE_CHECKING:
@@ -314,26 +314,27 @@ class _Columns:
             DocumentError: there are not exactly three columns, or one has a gap.
         """
         labels = self.table.columns
-        places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
-        if len(places) != 3:
+        indices = [index for index, label in enumerate(labels) if label.startswith(identifier)]
+        if len(indices) != 3:
             raise DocumentError(
-                f"{what} is '{identifier}'; {self._explain_mismatch(identifier, places)}", file=file
+                f"{what} is '{identifier}'; {self._explain_mismatch(identifier, indices)}",
+                file=file,
             )
-        rows = self.table.rows[:, places]
+        rows = self.table.rows[:, indices]
         bad = np.argwhere(~np.isfinite(rows))
         if len(bad):
             row, column = bad[0]
             raise DocumentError(
-                f"'{labels[places[column]]}' is {rows[row, column]} at {self.table.times[row]:g} s; fill the gap",
+                f"'{labels[indices[column]]}' is {rows[row, column]} at {self.table.times[row]:g} s; fill the gap",
                 file=self.table.file,
             )
-        x, y, z = (self._functions[place] for place in places)
+        x, y, z = (self._functions[index] for index in indices)
         return x, y, z
 
-    def _explain_mismatch(self, identifier: str, places: Sequence[int]) -> str:
+    def _explain_mismatch(self, identifier: str, indices: Sequence[int]) -> str:
         file, labels = self.table.file, self.table.columns
-        if places:
-            result = join_words([labels[place] for place in places])
+        if indices:
+            result = join_words([labels[index] for index in indices])
             return f"exactly three columns must begin with it, and '{file}' has {result}"
         # Labels without their last letter are the possible identifiers.
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
@@ -362,7 +363,7 @@ def make_column_functions(times: Array, columns: Array) -> list[SmoothFunction]:
     return [*natural_splines(times, columns, 2)]
 
 
-class MeasuredLoad(GivenLoad):
+class MeasuredLoad(LoadGeometry):
     """Load of an ExternalForce in a set of ExternalLoads that is part of the model."""
 
     def read(self, builder: ElementBuilder, force: Any) -> Load:

@@ -86,11 +86,11 @@ class ForceElement(Protocol):
             One entry for each state.
         """
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records that the kernels compute.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
         """
 
     @property
@@ -114,7 +114,7 @@ class ForceElement(Protocol):
             One number for each of `columns`, SI units.
         """
 
-    def find_copied_places(self) -> Sequence[int] | None:
+    def find_copied_offsets(self) -> Sequence[int] | None:
         """Return the offsets in the last record that :meth:`report` copies.
 
         With them, tables copy complete columns.
@@ -145,7 +145,7 @@ class Silent:
         """Return an empty row, since there are no columns."""
         return []
 
-    def find_copied_places(self) -> Sequence[int] | None:
+    def find_copied_offsets(self) -> Sequence[int] | None:
         """Return no offsets, since there are no columns."""
         return ()
 

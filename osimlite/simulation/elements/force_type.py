@@ -252,18 +252,18 @@ class ForceType:
         """Generator of the kernels of this type."""
         return KernelText(self)
 
-    def make_records(self, force: DeclaredForce, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, force: DeclaredForce, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records of a force: the parts of its geometry, then the force itself.
 
         Args:
             force: the element.
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             The records, each before those that refer to it.
         """
-        parts = self.geometry.make_parts(force.location, places)
-        ints, numbers = self.geometry.pack(force.location, places)
+        parts = self.geometry.make_parts(force.location, link_map)
+        ints, numbers = self.geometry.pack(force.location, link_map)
         # The geometry's integers begin with the distance back to the record of its last part, a
         # path.
         if parts:
@@ -344,10 +344,10 @@ class DeclaredForce:
         """
         return tuple(state for state in self.optional_states if state is not None)
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records that the kernels compute; none if the force type has no outputs."""
         return (
-            self.force_type.make_records(self, places)
+            self.force_type.make_records(self, link_map)
             if self.force_type.outputs or self.force_type.geometry.apply_code
             else []
         )
@@ -383,7 +383,7 @@ class DeclaredForce:
             for output in force_type.labels.values()
         ]
 
-    def find_copied_places(self) -> Sequence[int] | None:
+    def find_copied_offsets(self) -> Sequence[int] | None:
         """Return the offset of each column in the last record; None if the geometry computes them."""
         force_type = self.force_type
         if force_type.labels is None:
@@ -406,7 +406,9 @@ class DeclaredForce:
                 numbers[term.name] = value
             elif isinstance(term, Fields):
                 numbers |= zip(term.names, value, strict=True)
-        return numbers | {name: record[place] for name, place in force_type.record_offsets.items()}
+        return numbers | {
+            name: record[offset] for name, offset in force_type.record_offsets.items()
+        }
 
     def describe_failure(self, record: Sequence[float]) -> str:
         """Return the words for a message about a force whose law has no solution.
@@ -451,9 +453,9 @@ class ForceOff(Silent, DeclaredForce):
 
     form = OFF
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records of the force; none if its states do not change."""
-        return super().make_records(places) if self.force_type.states_change_when_off else []
+        return super().make_records(link_map) if self.force_type.states_change_when_off else []
 
 
 @dataclass(frozen=True)

@@ -90,29 +90,31 @@ class ElasticFoundation(PairContact):
             force.transition_velocity,
         )
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return a contact record for each pair, then the records that compute them."""
         contacts = [
             ForceRecord("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True)
             for _ in self.pairs
         ]
         return contacts + [
-            self._make_pair(number, pair, places) for number, pair in enumerate(self.pairs)
+            self._make_pair(number, pair, link_map) for number, pair in enumerate(self.pairs)
         ]
 
-    def _make_pair(self, number: int, pair: ContactPair, places: LinkMap) -> ForceRecord:
+    def _make_pair(self, number: int, pair: ContactPair, link_map: LinkMap) -> ForceRecord:
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
-        links, numbers = self.pack_pair(pair, places)
+        links, numbers = self.pack_pair(pair, link_map)
         # The kernel takes the springs of one mesh; two meshes are computed in Python.
         assert two.mesh is not None
         ints = *links, number, len(two.mesh.areas), int(one.is_half_space)
         if one.mesh is not None:
             touching = _Meshes(
-                Springs(one, two, self.vt), places.placement(one.body), places.placement(two.body)
+                Springs(one, two, self.vt),
+                link_map.placement(one.body),
+                link_map.placement(two.body),
             )
             return ForceRecord("", ints, numbers, record_size=MESH_WORK, python=touching)
         stiffness, *material = two.material
-        middles = (places.station(two.body, middle)[1] for middle in two.mesh.centroids.tolist())
+        middles = (link_map.station(two.body, middle)[1] for middle in two.mesh.centroids.tolist())
         springs = (
             x
             for area, middle in zip(two.mesh.areas.tolist(), middles, strict=True)
@@ -135,15 +137,15 @@ class ElasticFoundation(PairContact):
 def _read_mesh(
     builder: ElementBuilder, force: Any, geometry: ContactMesh, material: Material
 ) -> ContactSurface:
-    frame, body, placed = find_frame(builder, geometry)
-    builder.check_finite(geometry, placed.ravel().tolist())
+    frame, body, frame_in_body = find_frame(builder, geometry)
+    builder.check_finite(geometry, frame_in_body.ravel().tolist())
     if not geometry.filename:
         raise ModelError(f"the contact mesh '{builder.path(geometry)}' names no file; give it one")
     if material[0] < 0.0:
         raise ModelError(
             f"the force '{builder.path(force)}': a contact stiffness must not be negative"
         )
-    mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).transform(placed)
+    mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).transform(frame_in_body)
     center = to_triple(mesh.center)
     still = (0.0, 0.0, 0.0)
     return ContactSurface(
@@ -222,7 +224,7 @@ class Springs:
         force = torque = ZERO
         energy = 0.0
         for k, x, y, z, *end in acting:
-            push, turn, stored = spring_load(
+            spring_force, spring_torque, stored = spring_load(
                 FoundationSpring(k, c, us, ud, uv, self.vt),
                 (x, y, z),
                 to_triple(end),
@@ -230,8 +232,8 @@ class Springs:
                 v,
                 turning,
             )
-            force = plus(force, push)
-            torque = plus(torque, turn)
+            force = plus(force, spring_force)
+            torque = plus(torque, spring_torque)
             energy += stored
         return force, torque, energy
 
@@ -274,14 +276,18 @@ def _find_springs_inside(
     """
     middles = pose.points(mesh.centroids)
     # Springs in the frame of the other mesh, where its bounding box is fixed.
-    seen = (middles - theirs.origin) @ theirs.turn
+    middles_in_other = (middles - theirs.origin) @ theirs.turn
     # The bounding box excludes most springs before the costly search.
-    boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)
-    places = np.flatnonzero(boxed)
-    if not len(places):
+    is_in_box = np.all(
+        (middles_in_other >= other.points.min(axis=0))
+        & (middles_in_other <= other.points.max(axis=0)),
+        axis=1,
+    )
+    candidates = np.flatnonzero(is_in_box)
+    if not len(candidates):
         return []
-    ends, inside = other.find_nearest(seen[places])
-    acting = places[inside]
+    ends, inside = other.find_nearest(middles_in_other[candidates])
+    acting = candidates[inside]
     return np.column_stack(
         (stiffness[acting], middles[acting], theirs.points(ends[inside]))
     ).tolist()

@@ -66,11 +66,11 @@ class BatchedLaw(NamedTuple):
     The results equal those of the law to the last bit.
     """
 
-    known: type[Any]  # named tuple of the quantities that the stages compute
+    quantities: type[Any]  # named tuple of the quantities that the stages compute
     # function of the law's inputs and the first parameter that returns the quantities
     begin: Callable[..., Any]
-    asked: LookupStage  # first stage
-    sought: SearchStage  # second stage
+    lookup: LookupStage  # first stage
+    search: SearchStage  # second stage
     end: Callable[..., Any]  # function of the quantities and the first parameter: the law's results
 
 
@@ -101,9 +101,9 @@ class KernelText:
         ]
         lines += self._write_record((*force_type.geometry.inputs, *force_type.solved_states))
         lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
-        for place, state in self._state_indices.items():
+        for index, state in self._state_indices.items():
             if state.name in force_type.solved_states:
-                lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
+                lines += [f"if i[{index}] >= 0:", f"    y[i[{index}]] = {state.name}"]
         return self._write_function(EQUILIBRIUM, force_type.equilibrium, lines)
 
     @cached_property
@@ -137,8 +137,8 @@ class KernelText:
         directions = {column: direction for direction, column in enumerate(changed)}
         law = force_type.law_from_record or force_type.law
         count = len(changed)
-        for column, place in changed.items():
-            arguments[place] = f"seed_derivative({arguments[place]}, {directions[column]}, {count})"
+        for column, index in changed.items():
+            arguments[index] = f"seed_derivative({arguments[index]}, {directions[column]}, {count})"
         # Expressions compute in the record. The stored control already includes the reflex (rate 0).
         arguments = [
             f"make_dual_workspace({argument}, {count})"
@@ -147,11 +147,11 @@ class KernelText:
             for argument in arguments
         ]
         if force_type.law_from_record is not None and force_type.law is not None:
-            known_parameters = signature(force_type.law).parameters
+            law_parameters = signature(force_type.law).parameters
             arguments += [
                 f"record[{force_type.record_offsets[name]}]"
                 for name in signature(force_type.law_from_record).parameters
-                if name not in known_parameters
+                if name not in law_parameters
             ]
         # A rate may be named like another state (fiber_velocity), hence the suffix.
         lines = [
@@ -196,26 +196,24 @@ class KernelText:
         recorded = force_type.record_offsets
         arguments = self._arguments
         # The record stores the quantities between the stages.
-        offsets = (f"record[{place}]" for name, place in recorded.items() if name not in inputs)
-        known = dict(zip(stages.known._fields, offsets, strict=False))
+        offsets = (f"record[{offset}]" for name, offset in recorded.items() if name not in inputs)
+        record_texts = dict(zip(stages.quantities._fields, offsets, strict=False))
         of_moment = (
             len(self.input_names) + 1 + sum(state.is_argument for state in force_type.states)
         )
-        quantities = f"known({', '.join(known.values())}), {arguments[of_moment]}"
-        begin = (
-            f"{', '.join(known.values())} = {self._write_call(arguments[: of_moment + 1], 'begin')}"
-        )
+        quantities = f"known({', '.join(record_texts.values())}), {arguments[of_moment]}"
+        begin = f"{', '.join(record_texts.values())} = {self._write_call(arguments[: of_moment + 1], 'begin')}"
         # Forces of one kind are computed in lanes: first all requests of a stage, then their curves
         # together, then the law.
-        first, second = stages.asked, stages.sought
+        first, second = stages.lookup, stages.search
         *_, curves = force_type.terms
-        places = {}
+        table_offsets = {}
         number = self.size - curves.size
         for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
-            places[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
+            table_offsets[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
         count = len(first.curves)
         asks = [
-            f"request_value(reals, lanes, asked + {k}, {places[curve]}, {known[name]})"
+            f"request_value(reals, lanes, asked + {k}, {table_offsets[curve]}, {record_texts[name]})"
             for k, (curve, name) in enumerate(first.curves.items())
         ]
         lines = [
@@ -230,20 +228,22 @@ class KernelText:
                 ]
             ),
         ]
-        answers = ", ".join(f"request_result(lanes, {count} * asked + {k})" for k in range(count))
+        lookup_results = ", ".join(
+            f"request_result(lanes, {count} * asked + {k})" for k in range(count)
+        )
         # The last curve needs no condition: one of the curves is always chosen.
-        place = places[second.curves[-1]]
+        offset = table_offsets[second.curves[-1]]
         for number, curve in reversed([*enumerate(second.curves[:-1])]):
-            place = f"{places[curve]} if which == {number} else {place}"
+            offset = f"{table_offsets[curve]} if which == {number} else {offset}"
         # A force requests its second lookup in the lane of its first, whose result is used.
         lines += [
             "compute_requests(lanes, asked, 1)",
             "asked = 0",
             *self._write_loop(
                 [
-                    f"{', '.join(known[name] for name in first.results)} = law({quantities}, {answers})",
+                    f"{', '.join(record_texts[name] for name in first.results)} = law({quantities}, {lookup_results})",
                     f"which, of_curve, of_argument, total = asking({quantities})",
-                    f"place = {place}",
+                    f"place = {offset}",
                     "if of_curve == 0.0 and of_argument == 1.0:",
                     "    request_value(reals, lanes, asked, place, total)",
                     "else:",
@@ -253,7 +253,7 @@ class KernelText:
             ),
         ]
         lines += [f"compute_requests(lanes, asked, {SEARCH_ITERATIONS})", "asked = 0"]
-        results = ", ".join(known[name] for name in second.results)
+        results = ", ".join(record_texts[name] for name in second.results)
         ended = [
             f"{results} = search_law({quantities}, request_result(lanes, asked), request_residual(lanes, asked))",
             "asked += 1",
@@ -272,7 +272,7 @@ class KernelText:
                 "    first = end_of_part",
             ],
             **{
-                "known": stages.known,
+                "known": stages.quantities,
                 "begin": stages.begin,
                 "law": first.law,
                 "asking": second.asking,
@@ -357,13 +357,13 @@ class KernelText:
         ]
 
     def _compile_kernel(
-        self, form: str, place: str, lines: Sequence[str], **scope_of_form: Any
+        self, form: str, offset_name: str, lines: Sequence[str], **scope_of_form: Any
     ) -> Callable[..., int]:
         """Compile the text of one kernel in the module of the force's class.
 
         Args:
             form: end of the kernel's name, such as `RESPONSE`.
-            place: name of its last parameter, the offset of the item in the model.
+            offset_name: name of its last parameter, the offset of the item in the model.
             lines: statements of its body, without the final return.
             **scope_of_form: objects that the statements use, by name.
 
@@ -374,7 +374,7 @@ class KernelText:
         name = self.force_type.name + form
         source = "\n    ".join(
             [
-                f'def {name}({PARAMETERS}, {place}: "int") -> "int":',
+                f'def {name}({PARAMETERS}, {offset_name}: "int") -> "int":',
                 *lines,
                 "return OUTCOME.OK\n",
             ]
@@ -415,8 +415,8 @@ class KernelText:
         lines = self._write_record(names)
         if SOLVED in force_type.outputs:
             lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
-        for place, state in self._state_indices.items():
-            lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
+        for index, state in self._state_indices.items():
+            lines += [f"if i[{index}] >= 0:", f"    f[i[{index}]] = {state.rate}"]
         return lines
 
     def _write_record(self, names: Iterable[str]) -> list[str]:
@@ -437,8 +437,8 @@ class KernelText:
         """Arguments of the law, as expressions."""
         force_type = self.force_type
         terms = write_arguments(force_type.terms, ITEM.OWN, 0)
-        indices = [place for place, state in self._state_indices.items() if state.is_argument]
-        states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in indices]
+        indices = [index for index, state in self._state_indices.items() if state.is_argument]
+        states = [f"(y[i[{index}]] if i[{index}] >= 0 else 0.0)" for index in indices]
         count = 1 if force_type.has_control else 0
         return [*self.input_names, *terms[:count], *states, *terms[count:]]
 

@@ -138,14 +138,14 @@ def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Rea
     mechanism = builder.mechanism
     joints = find_members(builder, probe, probe.joint_names, "/jointset", "Joint")
     infos = [
-        (place, info)
-        for place, info in enumerate(mechanism.coordinates)
+        (index, info)
+        for index, info in enumerate(mechanism.coordinates)
         if info.prescribed is not None
     ]
     # OpenSim's joint power is that of the forces that prescribe the coordinates of the joint. The
     # forces of couplers and loops would have to be distributed over joints, which is not unique.
     driven = [
-        [place for place, info in infos if info.joint == builder.path(joint)] for joint in joints
+        [index for index, info in infos if info.joint == builder.path(joint)] for joint in joints
     ]
     if any(driven) and not all(
         isinstance(item, Lock | PrescribedCoordinate) for item in mechanism.constraints
@@ -179,7 +179,7 @@ def _measure_joint_power(
         # what prescribes the coordinates.
         udot = system.mechanism.acceleration(q, u, forces, time=t)
         powers = (system.mechanism.inverse_dynamics(q, u, udot) - forces) * u
-    result = [raise_to_power(float(sum(powers[places])), exponent) for places in driven]
+    result = [raise_to_power(float(sum(powers[indices])), exponent) for indices in driven]
     return [sum(result)] if is_sum else result
 
 

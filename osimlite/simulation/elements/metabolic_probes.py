@@ -52,11 +52,11 @@ def read_metabolic_probe(
         UnsupportedError: OpenSim disables the probe, because a muscle does not exist or a number
             has no meaning.
     """
-    known: dict[str, Any] = builder.tree.list_members("/forceset", "Muscle")
+    muscles_by_name: dict[str, Any] = builder.tree.list_members("/forceset", "Muscle")
     parameters = probe.metabolic_muscle_parameter_set.objects
     subjects = []
     for item in parameters:
-        muscle = known.get(item.name)
+        muscle = muscles_by_name.get(item.name)
         if muscle is None:
             raise builder.make_unsupported_error(
                 probe, f" of the muscle '{item.name}', which the model does not have"
@@ -258,12 +258,12 @@ def _measure_smoothed(
         total rate, W.
     """
     rates = []
-    for places, numbers in zip(probe.places, probe.numbers, strict=True):
+    for offsets, numbers in zip(probe.input_offsets, probe.numbers, strict=True):
         m = Bhargava2004(*numbers[: -len(SmoothTransitions._fields)])
         by = SmoothTransitions(*numbers[-len(SmoothTransitions._fields) :])
         # The record has the quantities in the order of `BHARGAVA_INPUTS`.
         activation, control, active, passive, length, velocity, factor = (
-            system.read_record(*place) for place in places
+            system.read_record(*offset) for offset in offsets
         )
         maintained, _, _ = MAINTENANCE_CURVE.derivatives(length / m.optimal_fiber_length)
         rates.append(
@@ -279,7 +279,7 @@ register_probe_type(
     ProbeType(
         Bhargava2004SmoothedMuscleMetabolics,
         _read_smoothed,
-        reads=BHARGAVA_INPUTS,
+        inputs=BHARGAVA_INPUTS,
         measure=_measure_smoothed,
     )
 )

@@ -290,7 +290,7 @@ class Curve(Parameter):
 
 
 @dataclass(frozen=True)
-class Together(Parameter):
+class ParameterGroup(Parameter):
     """Several parameters that the law takes as one named tuple."""
 
     type: type[Any]  # type of the tuple
@@ -331,7 +331,7 @@ class Together(Parameter):
         packed = [
             term.pack(item, tail, where) for term, item in zip(self.terms, value, strict=True)
         ]
-        return [place for ints, _ in packed for place in ints], [
+        return [integer for ints, _ in packed for integer in ints], [
             x for _, numbers in packed for x in numbers
         ]
 

@@ -82,7 +82,7 @@ class ProbeType:
         read: function that returns the inputs of a probe; it raises an UnsupportedError if osimlite
             cannot compute the probe.
         law: function that returns the quantity of one subject.
-        reads: inputs of the law from a subject: recorded quantities, or "actuation", "speed" and
+        inputs: inputs of the law from a subject: recorded quantities, or "actuation", "speed" and
             "control".
         numbers: type of the last argument of the law, a named tuple.
         measure: function that computes the results instead of a law, from the probe, the system
@@ -93,7 +93,7 @@ class ProbeType:
     component: type
     read: Callable[[ElementBuilder, Any], Reading]
     law: Callable[..., float] | None = None
-    reads: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
     numbers: Any = tuple
     measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
     has_curve: bool = False
@@ -114,7 +114,7 @@ class ProbeType:
         """Source text of the kernel."""
         # The text is restricted Python, so that the kernel can be translated to C++ like the
         # others.
-        size, count = len(self.numbers._fields), len(self.reads)
+        size, count = len(self.numbers._fields), len(self.inputs)
         arguments = [f"data[a[{k}]]" for k in range(count)]
         arguments += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
         arguments.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
@@ -153,7 +153,7 @@ class DeclaredProbe(Silent):
         gain: factor of the reported results.
         initial: initial values of integrals.
         reading: inputs.
-        places: path of the element whose record has the input, and offset of the input in this
+        input_offsets: path of the element whose record has the input, and offset of the input in this
             record, for each subject and each input.
         numbers: last argument of the law for each subject.
     """
@@ -165,7 +165,7 @@ class DeclaredProbe(Silent):
     gain: float
     initial: tuple[float, ...]
     reading: Reading
-    places: tuple[tuple[tuple[str, int], ...], ...] = ()
+    input_offsets: tuple[tuple[tuple[str, int], ...], ...] = ()
     numbers: tuple[tuple[float, ...], ...] = ()
 
     @property
@@ -183,19 +183,21 @@ class DeclaredProbe(Silent):
         labels = self.reading.labels if self.operation == INTEGRATE else ()
         return tuple(StateVariable(f"{self.path}/{label}", is_named=False) for label in labels)
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the record that the kernels compute; none if the probe has no law."""
         if self.probe_type.law is None:
             return []
         reading = self.reading
         integrals = len(self.states)
         numbers = [reading.constant, *(number for row in self.numbers for number in row)]
-        ints = [len(self.places), reading.first, integrals, 0, len(numbers)]
+        ints = [len(self.input_offsets), reading.first, integrals, 0, len(numbers)]
         # What a probe reads is in the records of forces, whose offsets are known after packing:
         # they are references.
-        reads = [read for row in self.places for read in row]
-        references = tuple((len(ints) + number, owner) for number, (owner, _) in enumerate(reads))
-        ints += [place for _, place in reads]
+        input_offsets = [read for row in self.input_offsets for read in row]
+        references = tuple(
+            (len(ints) + number, owner) for number, (owner, _) in enumerate(input_offsets)
+        )
+        ints += [offset for _, offset in input_offsets]
         if reading.curve is not None:
             numbers += table_of_one(reading.curve, f"the curve of '{self.path}'")
         return [
@@ -269,7 +271,7 @@ def _make_probe(
         gain,
         initial,
         reading,
-        tuple(places for places, _ in subjects),
+        tuple(offsets for offsets, _ in subjects),
         tuple(numbers for _, numbers in subjects),
     )
 
@@ -303,19 +305,19 @@ def _locate_inputs(
     element = elements.get(path)
     if not actuator.appliesForce and "factor" in getattr(numbers, "_fields", ()):
         # A force that is off is 0.
-        return (control,) * len(probe_type.reads), tuple(map(float, numbers._replace(factor=0.0)))
+        return (control,) * len(probe_type.inputs), tuple(map(float, numbers._replace(factor=0.0)))
     if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
         raise builder.make_unsupported_error(probe, f" of '{path}', whose force is not computed")
-    known = element.force_type.record_names
-    places = []
-    for name in probe_type.reads:
-        place = known.get(name)
-        if place is None and name != "control":
+    record_offsets = element.force_type.record_names
+    offsets = []
+    for name in probe_type.inputs:
+        offset = record_offsets.get(name)
+        if offset is None and name != "control":
             raise builder.make_unsupported_error(
                 probe, f" of '{path}', whose {name.replace('_', ' ')} is unknown"
             )
-        places.append(control if place is None else (path, place))
-    return tuple(places), tuple(map(float, numbers))
+        offsets.append(control if offset is None else (path, offset))
+    return tuple(offsets), tuple(map(float, numbers))
 
 
 def find_members(
@@ -336,14 +338,14 @@ def find_members(
     Raises:
         ModelError: the set has no component of a name.
     """
-    known = builder.tree.list_members(path, probe_type)
+    members = builder.tree.list_members(path, probe_type)
     names = [word if isinstance(word, str) else word.name for word in words]
     if names and names[0].upper() == "ALL":
-        return list(known.values())
+        return list(members.values())
     for name in names:
-        if name not in known:
+        if name not in members:
             raise ModelError(
                 f"'{builder.path(probe)}' names the {probe_type.lower()} '{name}', which the model does not have"
-                f"{suggest_name(name, known)}"
+                f"{suggest_name(name, members)}"
             )
-    return [known[name] for name in names]
+    return [members[name] for name in names]

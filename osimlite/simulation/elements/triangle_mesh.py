@@ -86,18 +86,18 @@ class TriangleMesh:
         different, which = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         points: list[Array] = []
         cells: dict[tuple[int, ...], int] = {}
-        place_of = np.empty(len(different), dtype=np.int64)
+        index_of = np.empty(len(different), dtype=np.int64)
         for number, point in enumerate(different):
             cell = np.floor(point / _SAME_POINT).astype(np.int64)
             # A grid of cells makes the search for equal points linear; a point near a cell's border
             # may be in a neighbour.
             around = (cells.get(tuple((cell + step).tolist()), -1) for step in _STEPS)
             same = (k for k in around if k >= 0 and np.abs(points[k] - point).max() <= _SAME_POINT)
-            place_of[number] = place = next(same, len(points))
-            if place == len(points):
+            index_of[number] = index = next(same, len(points))
+            if index == len(points):
                 points.append(point)
-                cells[tuple(cell.tolist())] = place
-        return cls._make_closed(np.array(points), place_of[which].reshape(-1, 3), file)
+                cells[tuple(cell.tolist())] = index
+        return cls._make_closed(np.array(points), index_of[which].reshape(-1, 3), file)
 
     @classmethod
     def from_polygons(cls, polygons: Polygons, file: str) -> TriangleMesh:
@@ -246,31 +246,31 @@ class TriangleMesh:
         return _edges_cross(self, other) or _edges_cross(other, self)
 
 
-def _find_nearest_on_triangles(corners: Array, places: Array) -> Array:
+def _find_nearest_on_triangles(corners: Array, points: Array) -> Array:
     """Return the nearest point of a triangle to a point, for many pairs.
 
     Args:
         corners: corners of the triangles (k, 3, 3).
-        places: the points (k, 3).
+        points: the points (k, 3).
 
     Returns:
         Points on the triangles (k, 3).
     """
     a, b, c = np.moveaxis(corners, 1, 0)
     normal = np.cross(b - a, c - a)
-    height = _dot_rows(places - a, normal) / _dot_rows(normal, normal)
-    on_plane = places - height[:, None] * normal
-    inside = np.ones(len(places), dtype=bool)
+    height = _dot_rows(points - a, normal) / _dot_rows(normal, normal)
+    on_plane = points - height[:, None] * normal
+    inside = np.ones(len(points), dtype=bool)
     best = on_plane.copy()
-    least = np.full(len(places), np.inf)
+    least = np.full(len(points), np.inf)
     for start, end in ((a, b), (b, c), (c, a)):
         along = end - start
         # The projection is inside the triangle if it is on the same side of all edges; else the
         # nearest point is on an edge.
         inside &= _dot_rows(np.cross(along, on_plane - start), normal) >= 0.0
-        part = np.clip(_dot_rows(places - start, along) / _dot_rows(along, along), 0.0, 1.0)
+        part = np.clip(_dot_rows(points - start, along) / _dot_rows(along, along), 0.0, 1.0)
         point = start + part[:, None] * along
-        distance = _dot_rows(point - places, point - places)
+        distance = _dot_rows(point - points, point - points)
         best = np.where((distance < least)[:, None], point, best)
         least = np.minimum(distance, least)
     return np.where(inside[:, None], on_plane, best)

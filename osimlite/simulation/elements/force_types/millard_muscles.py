@@ -56,7 +56,7 @@ from osimlite.simulation.elements.muscle import (
     define_curve,
     define_muscle,
 )
-from osimlite.simulation.elements.parameters import Fields, Number, Together, require_positive
+from osimlite.simulation.elements.parameters import Fields, Number, ParameterGroup, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 MIN_FIBER_DAMPING = 0.001
@@ -131,9 +131,13 @@ def _check_equilibrium_muscle(builder: ElementBuilder, force: Any) -> None:
 
 def _compute_equilibrium_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
-    known = force.list_named_values(record)
+    named_values = force.list_named_values(record)
     return millard2012_energy(
-        m, known["length"], known["fiber_length"], known["cos_pennation"], curves
+        m,
+        named_values["length"],
+        named_values["fiber_length"],
+        named_values["cos_pennation"],
+        curves,
     )
 
 
@@ -156,7 +160,7 @@ register_force_type(
             ),
             _read_equilibrium_fields,
         ),
-        Together(
+        ParameterGroup(
             MillardCurves,
             (
                 define_curve(
@@ -233,9 +237,13 @@ def _check_acceleration_muscle(builder: ElementBuilder, force: Any) -> None:
 
 def _compute_acceleration_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
-    known = force.list_named_values(record)
+    named_values = force.list_named_values(record)
     return millard2012_acceleration_energy(
-        m, known["length"], known["fiber_length"], known["cos_pennation"], curves
+        m,
+        named_values["length"],
+        named_values["fiber_length"],
+        named_values["cos_pennation"],
+        curves,
     )
 
 
@@ -260,7 +268,7 @@ register_force_type(
             ),
             _read_acceleration_fields,
         ),
-        Together(
+        ParameterGroup(
             AccelerationCurves,
             (
                 define_curve("active_force_length_curve", ACTIVE_SIZE, active_force_length),

@@ -34,7 +34,7 @@ from osimlite.simulation.elements.parameters import (
     Fields,
     Number,
     Parameter,
-    Together,
+    ParameterGroup,
     require_positive,
 )
 from osimlite.simulation.elements.registry import register_force_type
@@ -367,7 +367,7 @@ register_force_type(
                 require_positive("mass"),
             ),
         ),
-        Together(
+        ParameterGroup(
             DelpCurves,
             (
                 Curve("active_force_length_curve"),
@@ -530,7 +530,7 @@ register_force_type(
             ),
             _has_curve,
         ),
-        Together(
+        ParameterGroup(
             SchutteCurves,
             tuple(Curve(f"{name}_force_length_curve") for name in SchutteCurves._fields),
         ),

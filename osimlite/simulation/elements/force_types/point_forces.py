@@ -12,7 +12,7 @@ from osimlite.schema.springs import ExpressionBasedPointToPointForce, PointToPoi
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.geometries.line import BetweenPoints
-from osimlite.simulation.elements.geometries.load import GivenLoad, Load
+from osimlite.simulation.elements.geometries.load import Load, LoadGeometry
 from osimlite.simulation.elements.parameters import Expression
 from osimlite.simulation.elements.registry import register_force_type
 
@@ -54,7 +54,7 @@ register_force_type(
 )
 
 
-class PrescribedLoad(GivenLoad):
+class PrescribedLoad(LoadGeometry):
     """Load of a PrescribedForce.
 
     As in OpenSim, a set that does not have three functions is ignored.
@@ -63,7 +63,7 @@ class PrescribedLoad(GivenLoad):
     def read(self, builder: ElementBuilder, force: Any) -> Load:
         """Return the load of a force."""
         frame = builder.resolve_target(force, "socket_frame", force.socket_frame)
-        placed = builder.find_placement(frame)
+        placement = builder.find_placement(frame)
         ground = FramePlacement(GROUND, np.eye(4))
         groups = []
         for what in ("forceFunctions", "pointFunctions", "torqueFunctions"):
@@ -78,9 +78,9 @@ class PrescribedLoad(GivenLoad):
         start = f"{'ground' if force.forceIsGlobal else frame.name}_{force.name}"
         return Load(
             (f"{start}_f", f"{start}_p", f"{start}_torque_"),
-            placed,
-            ground if force.forceIsGlobal else placed,
-            ground if force.pointIsGlobal else placed,
+            placement,
+            ground if force.forceIsGlobal else placement,
+            ground if force.pointIsGlobal else placement,
             *groups,
         )
 

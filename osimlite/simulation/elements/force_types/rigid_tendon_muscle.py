@@ -12,7 +12,7 @@ from osimlite.simulation.elements.parameters import (
     Curve,
     Fields,
     Number,
-    Together,
+    ParameterGroup,
     require_positive,
 )
 from osimlite.simulation.elements.registry import register_force_type
@@ -125,7 +125,7 @@ register_force_type(
             ),
             compute_height,
         ),
-        Together(
+        ParameterGroup(
             RigidTendonCurves,
             (
                 Curve("active_force_length_curve"),

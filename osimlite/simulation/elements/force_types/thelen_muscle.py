@@ -51,9 +51,12 @@ def _read_derived_fields(builder: ElementBuilder, force: Thelen2003Muscle) -> tu
 
 
 def _compute_energy(force: DeclaredForce, record: Sequence[float]) -> float:
-    known = force.list_named_values(record)
+    named_values = force.list_named_values(record)
     return thelen2003_energy(
-        force.values[1], known["length"], known["fiber_length"], known["cos_pennation"]
+        force.values[1],
+        named_values["length"],
+        named_values["fiber_length"],
+        named_values["cos_pennation"],
     )
 
 

@@ -216,25 +216,25 @@ class Anchors(NamedTuple):
 class OnBodies(ForceGeometry):
     """Base of geometries with bodies, and points and directions fixed to them or to ground."""
 
-    def pack(self, location: Anchors, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Anchors, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the bodies, points and directions, and the vectors in these links.
 
         Args:
             location: the bodies, points and directions.
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             Integers and numbers of the geometry.
         """
-        links = [places.placement(body).link for body in location.bodies]
+        links = [link_map.placement(body).link for body in location.bodies]
         numbers: list[float] = []
         for body, point in location.points:
-            link, result = places.station(body, point)
+            link, result = link_map.station(body, point)
             links.append(link)
             numbers += result
         for body, along in location.directions:
-            links.append(places.placement(body).link)
-            numbers += places.direction(body, along)
+            links.append(link_map.placement(body).link)
+            numbers += link_map.direction(body, along)
         return links, numbers
 
 
@@ -252,17 +252,19 @@ class AboutAxis(OnBodies):
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
         """Return the bodies and the axis of an actuator."""
-        (one, placed), (two, _) = (
+        (one, frame_in_body), (two, _) = (
             builder.find_placement(builder.resolve_target(force, field, getattr(force, field)))
             for field in ("bodyA", "bodyB")
         )
-        axis = as_given = _normalize_direction(builder, force, force.axis)
+        axis = axis_in_file = _normalize_direction(builder, force, force.axis)
         if not force.torque_is_global:
             # The axis is given along the frame of bodyA, but stored along its body.
-            axis = to_triple(placed[:3, :3] @ axis)
+            axis = to_triple(frame_in_body[:3, :3] @ axis)
         # The second axis is for the speed: OpenSim reads the numbers as an axis of ground.
         return Anchors(
-            (one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given))
+            (one, two),
+            (),
+            ((GROUND if force.torque_is_global else one, axis), (GROUND, axis_in_file)),
         )
 
 
@@ -288,7 +290,7 @@ class AtPoint(OnBodies):
         return Anchors((body,), (point, (body, to_triple(force.point))), (along,))
 
 
-class ApartPoints(OnBodies):
+class PointPair(OnBodies):
     """Two points: the output `force` (N) pushes them apart."""
 
     inputs = ("speed",)
@@ -352,22 +354,22 @@ class AtStation(ForceGeometry):
     def read(self, builder: ElementBuilder, force: Any) -> NamedStation:
         """Return the station that a force names."""
         result = builder.resolve_target(force, "socket_station", force.socket_station)
-        body, placed = builder.find_placement(
+        body, frame_in_body = builder.find_placement(
             builder.resolve_target(result, "socket_parent_frame", result.socket_parent_frame)
         )
-        point = to_triple(placed[:3, :3] @ result.location + placed[:3, 3])
+        point = to_triple(frame_in_body[:3, :3] @ result.location + frame_in_body[:3, 3])
         builder.check_finite(force, point)
         return NamedStation(result.name, body, point)
 
     def pack(
-        self, location: NamedStation, places: LinkMap
+        self, location: NamedStation, link_map: LinkMap
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the link of the station and the position in it.
 
         Returns:
             Integers and numbers of the geometry.
         """
-        link, point = places.station(location.body, location.point)
+        link, point = link_map.station(location.body, location.point)
         return (link,), point
 
     def record_size(self, location: Any) -> int:
@@ -383,7 +385,7 @@ class AtStation(ForceGeometry):
         return tuple(f"{force.name}.{force.location.name}.force.{axis}" for axis in "XYZ")
 
 
-AXIS, POINT, POINTS, BODY, STATION = AboutAxis(), AtPoint(), ApartPoints(), OnBody(), AtStation()
+AXIS, POINT, POINTS, BODY, STATION = AboutAxis(), AtPoint(), PointPair(), OnBody(), AtStation()
 
 
 def _normalize_direction(builder: ElementBuilder, force: Any, along: Sequence[float]) -> Triple:

@@ -53,18 +53,18 @@ class OnCoordinate(ForceGeometry):
         """Return the index of the coordinate in the mechanism."""
         return builder.find_coordinate(force, self.field)
 
-    def pack(self, location: int, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: int, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the degree of freedom and the value of a locked coordinate.
 
         Args:
             location: index of the coordinate in the mechanism.
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             Integers: the degree of freedom, -1 if the coordinate is locked. Numbers: the value,
             which counts only then.
         """
-        return (places.freedom(location),), (places.get_locked_value(location),)
+        return (link_map.freedom(location),), (link_map.get_locked_value(location),)
 
 
 COORDINATE = OnCoordinate()

@@ -128,12 +128,12 @@ class Frame(NamedTuple):
     Attributes:
         name: name of the frame.
         body: index of the body that the frame is fixed to.
-        placed: transform of the frame in this body (4, 4).
+        frame_in_body: transform of the frame in this body (4, 4).
     """
 
     name: str
     body: int
-    placed: Array
+    frame_in_body: Array
 
 
 @dataclass(frozen=True)
@@ -171,14 +171,16 @@ class BetweenFrames(ForceGeometry):
         return tuple(frames)
 
     def pack(
-        self, location: tuple[Frame, ...], places: LinkMap
+        self, location: tuple[Frame, ...], link_map: LinkMap
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the frames, and axes and origin of each frame in its link.
 
         Returns:
             Integers and numbers of the geometry.
         """
-        (one, first), (two, second) = (places.frame(frame.body, frame.placed) for frame in location)
+        (one, first), (two, second) = (
+            link_map.frame(frame.body, frame.frame_in_body) for frame in location
+        )
         return (one, two), (*first, *second)
 
     def record_size(self, location: Any) -> int:
@@ -211,15 +213,15 @@ class BetweenFrames(ForceGeometry):
             origins of the frames or of their bodies.
         """
         # The record has the load on the second frame.
-        push, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)
+        load, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)
         first, second = start, end
         if self.about_bodies:
             first, second = (np.array(origins[frame.body]) for frame in force.location)
         # Both forces act at the origin of the second frame.
         row: list[Array] = [
-            -push,
-            -moment - np.cross(end - first, push),
-            push,
-            moment + np.cross(end - second, push),
+            -load,
+            -moment - np.cross(end - first, load),
+            load,
+            moment + np.cross(end - second, load),
         ]
         return [float(number) for part in row for number in part]

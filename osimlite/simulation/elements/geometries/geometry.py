@@ -56,23 +56,23 @@ class ForceGeometry:
             UnsupportedError: osimlite cannot compute a force there.
         """
 
-    def make_parts(self, location: Any, places: LinkMap) -> list[ForceRecord]:
+    def make_parts(self, location: Any, link_map: LinkMap) -> list[ForceRecord]:
         """Return records that the code of the geometry calls.
 
         `item - g[0]` is the offset of the last of them.
 
         Args:
             location: result of `read`.
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
         """
         return []
 
-    def pack(self, location: Any, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Any, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the integers and numbers of a location.
 
         Args:
             location: result of `read`.
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             Integers and numbers of the geometry.

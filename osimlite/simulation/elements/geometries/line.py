@@ -125,14 +125,14 @@ class BetweenPoints(ForceGeometry):
         )
         return Ends((names[0], names[1]), (one, two), points, (first_point, second_point))
 
-    def pack(self, location: Ends, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Ends, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the ends, and points and reported points in them.
 
         Returns:
             Integers and numbers of the geometry.
         """
         stations = [
-            places.station(body, point)
+            link_map.station(body, point)
             for points in (location.points, location.recorded)
             for body, point in zip(location.bodies, points, strict=True)
         ]

@@ -115,13 +115,13 @@ class Load(NamedTuple):
         return self.force, self.point if self.force else (), self.torque
 
 
-class GivenLoad(ForceGeometry):
+class LoadGeometry(ForceGeometry):
     """Geometry of a prescribed load, in which functions of time take the place of a law."""
 
     apply_code = ("apply_load(model, data, g, gp, work, data[WORK.TIME])",)
     called_functions = (apply_load,)
 
-    def pack(self, location: Load, places: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: Load, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return links and placements of the frames, and the tables of the functions.
 
         Returns:
@@ -130,7 +130,7 @@ class GivenLoad(ForceGeometry):
         links: list[int] = []
         numbers: list[float] = []
         for body, frame in (location.frame, location.force_frame, location.point_frame):
-            link, axes = places.frame(body, frame)
+            link, axes = link_map.frame(body, frame)
             links.append(link)
             numbers += axes
         tables: list[int] = []

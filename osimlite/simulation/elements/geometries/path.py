@@ -22,13 +22,13 @@ class Path(Protocol):
 
     coupled: bool
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records of the path; the last one is the path itself.
 
         See :mod:`osimlite.mechanics.kernels.paths`.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
         """
 
 
@@ -63,9 +63,9 @@ class AlongPath(ForceGeometry):
         path: Path = read_path(builder, force)
         return path
 
-    def make_parts(self, location: Path, places: LinkMap) -> list[ForceRecord]:
+    def make_parts(self, location: Path, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records of the path."""
-        return location.make_records(places)
+        return location.make_records(link_map)
 
 
 PATH = AlongPath()

@@ -125,7 +125,7 @@ class SphereOnPlane(ForceGeometry):
         return surfaces[0], surfaces[1]
 
     def pack(
-        self, location: tuple[ContactSurface, ContactSurface], places: LinkMap
+        self, location: tuple[ContactSurface, ContactSurface], link_map: LinkMap
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links, a point of the plane and its normal, and centre and radius of the sphere.
 
@@ -133,11 +133,11 @@ class SphereOnPlane(ForceGeometry):
             Integers and numbers of the geometry.
         """
         one, two = location
-        first, on_plane = places.station(one.body, one.center)
-        second, center = places.station(two.body, two.center)
+        first, on_plane = link_map.station(one.body, one.center)
+        second, center = link_map.station(two.body, two.center)
         return (first, second), (
             *on_plane,
-            *places.direction(one.body, one.normal),
+            *link_map.direction(one.body, one.normal),
             *center,
             two.radius,
         )
@@ -174,13 +174,13 @@ class SphereOnPlane(ForceGeometry):
             of the half space's.
         """
         half_space, sphere = force.location
-        pushed = np.array(record[:3], dtype=float)
+        force_on_sphere = np.array(record[:3], dtype=float)
         point = np.array(record[3:6], dtype=float)
         row: list[float] = []
         for sign, body in ((1.0, sphere.body), (-1.0, half_space.body)):
             row += [
-                *(sign * pushed).tolist(),
-                *np.cross(point - np.array(origins[body]), sign * pushed).tolist(),
+                *(sign * force_on_sphere).tolist(),
+                *np.cross(point - np.array(origins[body]), sign * force_on_sphere).tolist(),
             ]
         return row
 

@@ -49,18 +49,18 @@ class CoordinatePath:
 
     coupled: ClassVar[bool] = False
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records of the path.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             The record that pulls, those of the functions, and last that of the path.
         """
-        values = [places.get_locked_value(coordinate) for coordinate in self.coordinates]
-        freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
-        speeds = [freedom + len(places.freedoms) if freedom >= 0 else -1 for freedom in freedoms]
+        values = [link_map.get_locked_value(coordinate) for coordinate in self.coordinates]
+        freedoms = [link_map.freedom(coordinate) for coordinate in self.coordinates]
+        speeds = [freedom + len(link_map.freedoms) if freedom >= 0 else -1 for freedom in freedoms]
         of_values = [
             self._make_function_record(item, freedoms, values) for item in (self.length, *self.arms)
         ]

@@ -67,14 +67,14 @@ class Node:
     name: str = ""
 
     def pack(
-        self, places: LinkMap, of: int, first: int, path: str, piece: int
+        self, link_map: LinkMap, of: int, first: int, path: str, piece: int
     ) -> tuple[list[int], list[float]]:
         """Return the integers and numbers of the node.
 
         No line pulls between two consecutive nodes of the same piece.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
             of: index of the degree of freedom, or number of the surface, that the node belongs to.
             first: offset of the numbers of the node.
             path: owner of the path, for messages.
@@ -84,10 +84,10 @@ class Node:
             Integers and numbers of the node.
         """
         # The frame of the point in its link.
-        link, frame = places.placement(self.body)
+        link, frame = link_map.placement(self.body)
         frame = frame @ self.frame
         # A locked coordinate has no number in the state, so its value goes into the record.
-        value = places.get_locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
+        value = link_map.get_locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
         station = frame[:3, :3] @ self.location + frame[:3, 3]
         numbers = [*station.tolist(), value, *self.range, *frame[:3, :3].ravel().tolist()]
         tables = []
@@ -170,11 +170,11 @@ class ThroughPoints:
         first = self.points[0]
         return first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3]
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the records of the path.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             The record that pulls at the points, those of the surfaces, and last that of the path.
@@ -200,7 +200,7 @@ class ThroughPoints:
             else:
                 wraps.append(0)
             wraps += surface.first, surface.last
-        nodes = [(point, places.freedom(point.coordinate)) for point in self.points]
+        nodes = [(point, link_map.freedom(point.coordinate)) for point in self.points]
         # Each surface has two tangent points.
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
         ints = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)]
@@ -213,7 +213,7 @@ class ThroughPoints:
                 if not self.geodesic
                 else (-1 - of if node.kind == NODE_TYPE.TANGENT else number)
             )
-            node_ints, node_numbers = node.pack(places, of, len(numbers), self.path, piece)
+            node_ints, node_numbers = node.pack(link_map, of, len(numbers), self.path, piece)
             ints += node_ints
             numbers += node_numbers
         kernel = "wrapped_path" if self.surfaces else "straight_path"
@@ -339,9 +339,9 @@ def _read_surface(
     frame = surface
     while not isinstance(frame, PhysicalFrame):
         frame = builder.tree.parent_of(frame)
-    body, placed = builder.find_placement(frame)
-    placed = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
-    tangent = Node(body, placed, np.zeros(3), NODE_TYPE.TANGENT, name=surface.name)
+    body, frame_in_body = builder.find_placement(frame)
+    frame_in_body = frame_in_body @ make_offset(surface.translation, surface.xyz_body_rotation)
+    tangent = Node(body, frame_in_body, np.zeros(3), NODE_TYPE.TANGENT, name=surface.name)
     numbers = (*side, method, alone, *sizes)
     if builder.geodesic:
         numbers = (*side, *_list_geodesic_numbers(surface))

@@ -67,17 +67,17 @@ class CablePoint:
     size: ClassVar[int] = CABLE_POINT_WORK.SIZE
     is_obstacle: ClassVar[bool] = False
 
-    def pack(self, places: LinkMap) -> tuple[int, list[float]]:
+    def pack(self, link_map: LinkMap) -> tuple[int, list[float]]:
         """Return the link of the point and its numbers.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             Index of the link, and the stations of the cable and of its force in the link, m.
         """
-        link, runs = places.station(self.body, self.runs.tolist())
-        _, pulls = places.station(self.body, self.pulls.tolist())
+        link, runs = link_map.station(self.body, self.runs.tolist())
+        _, pulls = link_map.station(self.body, self.pulls.tolist())
         return link, [*runs, *pulls]
 
 
@@ -100,17 +100,17 @@ class CableObstacle:
     size: ClassVar[int] = OBSTACLE_WORK.SIZE
     is_obstacle: ClassVar[bool] = True
 
-    def pack(self, places: LinkMap) -> tuple[int, list[float]]:
+    def pack(self, link_map: LinkMap) -> tuple[int, list[float]]:
         """Return the link of the obstacle and its numbers.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
 
         Returns:
             Index of the link, and placement, initial contact and shape of the surface.
         """
-        link, placed = places.placement(self.body)
-        frame = placed @ self.frame
+        link, body_in_link = link_map.placement(self.body)
+        frame = body_in_link @ self.frame
         return link, [
             *frame[:3, :3].ravel().tolist(),
             *frame[:3, 3].tolist(),
@@ -149,11 +149,11 @@ class Cable:
         assert isinstance(first, CablePoint)
         return first.body, first.runs
 
-    def make_records(self, places: LinkMap) -> list[ForceRecord]:
+    def make_records(self, link_map: LinkMap) -> list[ForceRecord]:
         """Return the record that pulls, and that of the cable.
 
         Args:
-            places: placement of the bodies in the links of the tree.
+            link_map: placement of the bodies in the links of the tree.
         """
         longest_run = run_length = 0
         ints = list[int]()
@@ -164,7 +164,7 @@ class Cable:
             # run of obstacles.
             run_length = run_length + 1 if element.is_obstacle else 0
             longest_run = max(longest_run, run_length)
-            link, element_numbers = element.pack(places)
+            link, element_numbers = element.pack(link_map)
             ints += int(element.is_obstacle), link, len(numbers), work
             numbers += element_numbers
             work += element.size
@@ -209,13 +209,13 @@ class Cable:
         # its length is a number, but the record of the obstacle is not.
         if np.isnan(work).any():
             return None
-        kept = ints[CABLE.ELEMENTS + ELEMENT.KEPT :: ELEMENT.SIZE].tolist()
+        saved_offsets = ints[CABLE.ELEMENTS + ELEMENT.KEPT :: ELEMENT.SIZE].tolist()
         return Cable(
             tuple(
-                replace(element, begin=work[place : place + OBSTACLE_WORK.TOUCH_SIZE].copy())
+                replace(element, begin=work[offset : offset + OBSTACLE_WORK.TOUCH_SIZE].copy())
                 if isinstance(element, CableObstacle)
                 else element
-                for element, place in zip(self.elements, kept, strict=True)
+                for element, offset in zip(self.elements, saved_offsets, strict=True)
             )
         )
 
@@ -312,8 +312,8 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
     for q in poses:
         state = mechanism.at(q)
         frame = state.transform(body) @ make_offset(geometry.location, geometry.orientation)
-        placed = state.transform(point.body) @ np.array([*point.runs, 1.0])
-        x, y, z = (frame[:3, :3].T @ (placed[:3] - frame[:3, 3])).tolist()
+        position = state.transform(point.body) @ np.array([*point.runs, 1.0])
+        x, y, z = (frame[:3, :3].T @ (position[:3] - frame[:3, 3])).tolist()
         if surface_value(np.array(surface), (x, y, z)) > 0.0:
             return True
     return False
