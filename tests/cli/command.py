@@ -1,4 +1,4 @@
-"""The command ``osimlite`` as a user calls it, in a process of its own."""
+"""Run the command ``osimlite`` as a user does, in a separate process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ class Done(NamedTuple):
 
 
 def run(*words: object, folder: Path | None = None, text: str = "") -> Done:
-    """Call ``osimlite`` with some words in a folder, with a text on its standard input."""
+    """Run ``osimlite`` and return its exit code and output.
+
+    Args:
+        words: arguments of the command.
+        folder: working folder; by default the current one.
+        text: standard input.
+    """
     result = run_script(
         PROGRAM,
         *words,

@@ -1,4 +1,4 @@
-"""Commands called by tests keep nothing in the folders of whoever runs the tests."""
+"""Fixture that keeps the caches of commands out of the home folder of the person who runs the tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands import, imported: for the process whose copies run them (see `tests.scripts`)."""
+"""Import everything that commands import, in the process whose copies run them (see `tests.scripts`)."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from osimlite.cli import _progress
 
 
 def load_commands() -> None:
-    """Import the commands, and all that stands within their functions."""
+    """Import the modules of all commands, and those that are imported inside their functions."""
     for name in osimlite.cli.COMMANDS:
         path = Path(osimlite.cli.__file__).with_name(f"{name.replace('-', '_')}.py")
         osimlite.cli.load_command(name)
         for line in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            # What is not installed is missed by the command that needs it.
+            # An optional package may be absent; the command that needs it reports that.
             with suppress(ImportError):
                 for module in [line.module] if isinstance(line, ast.ImportFrom) else []:
                     import_module(module or "")
-    # Pictures need Matplotlib and the list of fonts that it makes anew for each empty cache, help
-    # needs Typer.
+    # Pictures need Matplotlib and its list of fonts, which it creates anew for each empty cache; help needs Typer.
     drawing = "matplotlib.figure", "matplotlib.backends.backend_agg", "matplotlib.font_manager"
     for module in (*drawing, "typer.main", "typer.rich_utils"):
         with suppress(ImportError):
@@ -31,5 +30,5 @@ def load_commands() -> None:
 
 
 load_commands()
-# Standard error is without the progress of long work: on a busy machine all work may be long.
+# Do not print progress on standard error: on a busy machine all work may exceed the time after which it appears.
 _progress.LONG_S = inf

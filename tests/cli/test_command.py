@@ -1,4 +1,4 @@
-"""Words are read here as typer reads them, or left to it."""
+"""Tests of the parser of command lines: it reads them as Typer does, or leaves them to Typer."""
 
 from __future__ import annotations
 
@@ -24,7 +24,16 @@ WORDS = [
 
 
 def by_typer(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch) -> dict[str, Any] | None:
-    """What typer gives the function; None if it refuses the words, or shows the help."""
+    """Return the values that Typer passes to the function of a command.
+
+    Args:
+        name: the command.
+        words: its arguments.
+        monkeypatch: replaces the call of the command.
+
+    Returns:
+        Values by parameter; None if Typer rejects the words or shows the help.
+    """
     seen: list[dict[str, Any]] = []
     with monkeypatch.context() as patch:
         patch.setattr(Command, "__call__", lambda self, **values: seen.append(values))
@@ -101,7 +110,7 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
     for choice in list_options(Options):
         default = getattr(Options(), choice.name)
         assert taken[choice.name].default == choice.default
-        # A command leaves out what its user has not set if the help shows the library's default.
+        # A default of None with a text means that the option is omitted and the library's default applies.
         assert choice.default == default or (
             choice.default is None and choice.default_text == f"{default}"
         )
@@ -122,7 +131,7 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
 
 
 def test_python_does_not_look_through_all_objects_at_the_end() -> None:
-    # What is registered first is called last.
+    # Functions of `atexit` run in reverse order: the first registered is called last.
     told = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 1000))"
     script = f"{told}; from osimlite.cli import main; main(['--version'])"
     done = subprocess.run(

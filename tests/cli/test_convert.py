@@ -1,4 +1,4 @@
-"""``convert``: formats are found by suffix and content, and every conversion has a record."""
+"""Tests of ``convert``: formats follow from suffix and content, and each conversion writes a record of losses."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_what_cannot_be_converted_is_said_in_one_line(
 
 
 class Names:
-    """Import of a list of names of bodies."""
+    """Importer of an example format: a list of names of bodies."""
 
     def __init__(self, path: Path, name: str) -> None:
         self.model: Any = osimlite.Model(name=name)
@@ -120,7 +120,7 @@ def test_a_new_importer_is_one_entry(
             main(["convert", "two.lst", *words])
         assert not done.value.code, capsys.readouterr().err
     assert len(osimlite.read("x/some.osim").body_set.objects) == 2
-    # What the first of two steps loses is lost in the result.
+    # Losses of the first of two steps are recorded in the result.
     for folder in "xy":
         records = json.loads(Path(folder, "fidelity.json").read_text())["records"]
         assert records[0]["kind"] == "list"
@@ -135,7 +135,7 @@ def test_summaries_of_other_commands_are_not_replaced(walker: Path) -> None:
     assert done.code == 2 and "r/summary.json" in done.err and "another folder" in done.err
     assert (walker / "r" / "summary.json").read_bytes() == before
     assert not (walker / "r" / "w.glb").exists()
-    # A conversion replaces the summary of an earlier one.
+    # A conversion replaces the summary of an earlier conversion.
     for _ in range(2):
         assert run(*words, "new/w.glb", folder=walker).code == 0
 

@@ -1,4 +1,4 @@
-"""The tour, as a newcomer takes it."""
+"""Test of ``demo``, the tour for newcomers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
 
 
 def test_the_whole_tour(tmp_path: Path) -> None:
-    # .ci/run takes the tour with its pictures, and tests/view has them of shorter motions.
+    # The quick suite leaves out the pictures: .ci/run makes them, and tests/view draws shorter motions.
     pictures = is_full()
     words = () if pictures else ("--no-pictures",)
     done = run("demo", "-o", "out", *words, folder=tmp_path)
@@ -47,7 +47,7 @@ def test_the_whole_tour(tmp_path: Path) -> None:
         assert apart is not None and 0.0 < float(apart[1]) < 1e-6 and apart[2] == apart[3]
     else:
         assert "pip install 'osimlite[bullet]'" in said
-    # What OpenSim's motions and docs/gaits.md say of the other two.
+    # The expected speeds and heights are those of OpenSim's motions and of docs/gaits.md.
     assert "6 steps in 5 s, at 0.83 m/s" in said
     assert "rises from 0.75 to 1.28 m, and nothing touches the ground for 0.42 s" in said
     walked = re.search(r"walks for 10 s at (\S+) m/s, in (\d+) steps, by reflexes alone", said)

@@ -1,4 +1,4 @@
-"""The account of an installation."""
+"""Tests of ``doctor``, which describes the installation."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
 
 
 MODULES = {"pillow": "PIL", "pyyaml": "yaml", "rerun-sdk": "rerun"}
-"""What is imported of a package, where that is not its name."""
+"""Import name of each package whose import name differs from its distribution name."""
 
 EXAMPLES = {
     "build": "build dynamic-walker -o built.osim",
@@ -107,7 +107,7 @@ SLOW = {
     "gait", "optimize", "simulate --animate", "simulate --engine bullet", "simulate --plot", "sweep",
     "view --screenshot",
 }  # fmt: skip
-"""Uses that the full suite tries: each starts several processes that load large libraries."""
+"""Uses that only the full suite tries, because each starts several processes that load large libraries."""
 
 SCRIPT = """
 import sys
@@ -154,12 +154,12 @@ def test_what_is_needed_is_enough_and_is_needed(work: Path, use: str) -> None:
         "distributed",
     }
     needed = {MODULES.get(name, name) for name in NEEDS[use]}
-    # Drawing libraries need packages of their own.
+    # Matplotlib itself imports Pillow and numpy, so they must not be blocked.
     brought = {"PIL", "numpy"} if "matplotlib" in needed else set()
     if needed - {*filter(find_spec, needed)}:
         pytest.skip(f"needs {', '.join(sorted(needed))}")
     code, told = call(EXAMPLES[use], every - needed - brought, work)
-    # A short walk has no cycle.
+    # A short walk has no gait cycle, so `gait` ends with 1.
     assert code == (1 if use == "gait" else 0), told
     for name in needed:
         code, told = call(EXAMPLES[use], {name}, work)
@@ -251,7 +251,7 @@ def test_an_interrupt_does_not_wait_for_packages(
     with pytest.raises(KeyboardInterrupt):
         doctor()
     assert time.monotonic() - started < 10.0
-    # Threads that have not started their process yet do not start it any more.
+    # After the interruption no thread may start another slow process: this examination must be quick.
     started = time.monotonic()
     assert examine_package("lxml").name == "lxml"
     assert time.monotonic() - started < 10.0

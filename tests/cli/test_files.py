@@ -1,4 +1,4 @@
-"""``build``, ``format``, ``diff`` and ``info`` from the command line."""
+"""Tests of ``build``, ``format``, ``diff`` and ``info`` on the command line."""
 
 from __future__ import annotations
 

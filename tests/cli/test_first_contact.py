@@ -1,4 +1,4 @@
-"""What a newcomer types first, and what the answers lead to."""
+"""Tests of the commands that a newcomer types first, and of the next steps that their messages suggest."""
 
 from __future__ import annotations
 

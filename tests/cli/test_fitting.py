@@ -1,4 +1,4 @@
-"""``ik`` and ``scale`` from the command line."""
+"""Tests of ``ik``, ``scale`` and ``fit`` on the command line."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ POINTS = {
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Path:
-    """A body with markers, and a trial of it."""
+    """Return a folder with a model of a marked body and a trial of its markers."""
     model = make_marked_body(POINTS, "box")
     osimlite.write(model, tmp_path / "box.osim")
     mechanism: Any = osimlite.mechanism(model)
@@ -146,7 +146,7 @@ def test_a_model_is_scaled(lab: Path) -> None:
 
 
 def test_a_model_is_fitted_to_a_person(lab: Path) -> None:
-    """Markers stay where they are held; the setup leads to the same model."""
+    """Markers of --hold keep their positions; the written setup reproduces the model."""
     done = run(
         "fit",
         "box.osim",
@@ -172,7 +172,7 @@ def test_a_model_is_fitted_to_a_person(lab: Path) -> None:
 
 
 def test_trials_of_two_folders_may_have_one_name(lab: Path) -> None:
-    """Each is fitted, and told."""
+    """Each trial is fitted and reported."""
     (lab / "second").mkdir()
     (lab / "second" / "walk.trc").write_bytes((lab / "walk.trc").read_bytes())
     done = run("fit", "box.osim", "walk.trc", "second/walk.trc", "-o", "out", folder=lab)
@@ -184,6 +184,6 @@ def test_trials_of_two_folders_may_have_one_name(lab: Path) -> None:
 
 
 def test_a_marker_that_is_not_there_cannot_be_held(lab: Path) -> None:
-    """The nearest spelling is told, and nothing is written."""
+    """The message suggests the nearest name, and nothing is written."""
     done = run("fit", "box.osim", "walk.trc", "--hold", "on", "-o", "out", folder=lab)
     assert done.code != 0 and "one" in done.err and not (lab / "out").exists()

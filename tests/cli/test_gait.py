@@ -1,4 +1,4 @@
-"""``osimlite gait``: what it says before it walks."""
+"""Tests of ``gait``: options, exit codes and messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands say of themselves: it fits a terminal, and one option is the same everywhere."""
+"""Tests of the help of commands: it fits a terminal, and an option means the same in every command."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ MEANINGS = {
     "--samples": "of a sweep, or walkers",
     "--report-interval": "of the result files, or of what a measure looks at",
 }
-"""Options whose help differs between commands, and why."""
+"""Options whose meaning differs between commands, with the meanings."""
 
 
 SCREEN_LINES = 45
-"""Lines of a terminal that fills a laptop's screen."""
+"""Lines of a terminal that fills the screen of a laptop; no help is longer than two screens."""
 SMALL_SCREEN_LINES = 38
-"""Lines of a smaller terminal, on two of which the searches and sweeps fit."""
+"""Lines of a smaller terminal; the help of `optimize`, `sweep` and `simulate` fits on two screens of it."""
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""osimlite info and osimlite format, as a user calls them."""
+"""Tests of ``info``, ``diff`` and ``format`` on the command line."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path,
     file.write_text(text.replace("CoordinateLimitForce", "CoordinateLimitForse"))
     assert said().startswith("possible only without unsupported forces")
     assert len(answers()) == 1
-    # What stands in other files is looked at every time.
+    # The cache of `info` does not cover included files: they are read every time.
     start, end = text.index("<ForceSet"), text.index("</ForceSet>") + len("</ForceSet>")
     forces = f'<OpenSimDocument Version="40500">{text[start:end]}</OpenSimDocument>'
     file.write_text(f'{text[:start]}<ForceSet file="forces.xml"/>{text[end:]}')
@@ -152,7 +152,7 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     assert facts["wrap surfaces"].strip() == "1, used by 1 path wrap"
     assert facts["simulation"].strip() == "possible, every force is supported"
     assert facts["other forces"].strip() == "0"
-    # Since OpenSim 4, forces may stand in <components>, outside of the ForceSet.
+    # Since OpenSim 4, forces may also be in <components>, outside the ForceSet.
     model.subcomponents.append(model.force_set.objects.pop())
     osimlite.write(model, tmp_path / "m.osim")
     facts = dict(

@@ -1,4 +1,4 @@
-"""Ctrl-C ends every command with a word and with 130, wherever it meets it."""
+"""Tests of Ctrl-C: every command ends with a message and exit code 130, wherever the interruption occurs."""
 
 from __future__ import annotations
 

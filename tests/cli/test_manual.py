@@ -1,4 +1,4 @@
-"""Every error that a command ends with names a page of the manual, and every page that is named is there."""
+"""Tests of links from errors to the manual: every error names a page, and every named page exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``osimlite muscles``: what it prints, writes and refuses."""
+"""Tests of ``muscles``: output, files and error messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.simulation.elements.muscle_rows import hung, muscle
 
 @pytest.fixture
 def file(tmp_path, monkeypatch):
-    """A model of a muscle between ground and a block on a slider; its path is as long as the slider says."""
+    """Write a model of a muscle between ground and a block on a slider; the path length equals the coordinate."""
     monkeypatch.chdir(tmp_path)
     model: Model = hung(muscle("thelen_default"))
     model.find("/jointset/slide/x").range = (0.3, 0.36)
@@ -132,7 +132,7 @@ def test_a_muscle_without_equilibrium_hides_no_other(file):
 
 
 def test_a_folder_that_cannot_be_made_is_told_before_the_work(file, tmp_path):
-    # The model is not even read: there is none.
+    # The model does not exist: the output folder is checked before it is read.
     (tmp_path / "taken").touch()
     done = run("muscles", tmp_path / "none.osim", "-o", tmp_path / "taken" / "m.csv")
     assert done.code == 2

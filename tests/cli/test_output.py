@@ -1,4 +1,4 @@
-"""Names of models and files that terminals and logs of CI jobs would obey; output that is not UTF-8."""
+"""Tests of output with hostile names of models and files, and of output in encodings other than UTF-8."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from osimlite.cli import main
 from osimlite.cli._console import EscapingStream, FactTable, escape_output
 
 HOSTILE = "::error::##[add-mask]v1\x7f\x85\x9b31m\u202e\u2066\u2028\u00e9\u4e16"
-"""What may stand in an XML attribute and still be obeyed by something."""
+"""Characters that XML allows in an attribute and that terminals or CI logs interpret."""
 
 FILE = "::error::\x1b[2J\x07\n::error::caf\udce9\u202e.osim"
 OBEYED = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
@@ -24,7 +24,7 @@ OBEYED = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\
 
 @pytest.fixture(scope="module")
 def folder(fixtures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a walker whose names, and whose file's name, are as bad as they can be."""
+    """Return a folder with a walker whose names, and whose file's name, contain hostile characters."""
     place = tmp_path_factory.mktemp("hostile")
     text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text(encoding="utf-8")
     written = "".join(f"&#{ord(character)};" for character in HOSTILE)
@@ -127,7 +127,7 @@ def test_output_of_any_encoding(folder: Path, encoding: str) -> None:
         assert "世" in out.decode(encoding) + err.decode(encoding) or r"\u4e16" in (
             out + err
         ).decode(encoding)
-    # A model is no text of the terminal: it says itself that it is UTF-8.
+    # XML on standard output is UTF-8, whatever the encoding of the terminal.
     code, out, _ = call(folder, "build", "dynamic-walker", "-o", "-", encoding=encoding)
     assert (
         code == 0
@@ -160,7 +160,7 @@ def test_many_files_of_one_folder_are_listed_below_it(
     assert lines[2] == "files  " + os.path.join("a_rather_long_folder_name_for_results", "so", "")
     assert all(len(line) <= columns for line in lines)
     assert all(any(name in line for line in lines) for name in names)
-    # Few files keep their paths, which can be copied.
+    # A short list of files shows complete paths, which can be copied.
     facts = FactTable()
     facts.add_files(["results/states.sto", "results/forces.sto"])
     facts.show()
@@ -214,7 +214,7 @@ def test_tables_and_sentences_are_never_broken_inside_a_word(monkeypatch, capsys
     assert capsys.readouterr().out == (
         "setup\na.xml  one two three four five six seven eight nine ten\n       eleven\n"
     )
-    # In a pipe a message is one line; a terminal shows it in several.
+    # A message is one line in a pipe; a terminal wraps it.
     message = f"75 times from 0 to 1 s; wrote {path} and other files"
     say(message)
     assert capsys.readouterr().out == f"{message}\n"
@@ -241,7 +241,7 @@ def test_tables_of_several_texts_are_never_broken_inside_a_word(monkeypatch, cap
     for words in ("missing", "translation", "glut_max_r", "drawn"):
         assert words in out
     assert all(len(line) <= max(columns, len(path) + 1) for line in out.splitlines())
-    # Where the words do not fit beside each other, each row is a block.
+    # Rows that are too wide for the terminal are printed as blocks.
     assert ("    components: glut_max_r" in out) is (columns == 40)
 
 

@@ -1,4 +1,4 @@
-"""``--plot`` of the commands that compute."""
+"""Tests of ``--plot`` of the commands that compute."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
 
 @pytest.fixture
 def walk(tmp_path):
-    """The walker, and a motion of it."""
+    """Write the walker and a motion of it, and return the folder."""
     osimlite.write(dynamic_walker(), tmp_path / "walker.osim")
     times = np.linspace(0.0, 0.5, 26)
     rows = np.column_stack([times, 20.0 * np.sin(9.0 * times), -20.0 * np.sin(9.0 * times)])
@@ -38,7 +38,7 @@ def test_recorded_motions_are_drawn(walk):
     done = run("kinematics", "walker.osim", "walk.mot", "-o", "k", "--plot", folder=walk)
     assert (done.code, done.err) == (0, "")
     assert done.out.endswith(f"drew {Path('k', 'bodies.png')}\n")
-    # The walker has no markers.
+    # The walker has no markers, so there is no picture of markers.
     assert pictures(walk / "k") == {"bodies.png"}
     done = run("inverse-dynamics", "walker.osim", "walk.mot", "-o", "i", "--plot", folder=walk)
     assert (done.code, done.err) == (0, "")
@@ -66,7 +66,7 @@ def test_muscle_forces_are_drawn(tmp_path):
 
 
 def copy_kinematics(folder: Path) -> None:
-    """Copy the setup of an analysis of one body, whose results fill few pages."""
+    """Copy the setup of a body kinematics analysis and restrict it to the mass centre, so that results fill few pages."""
     copy_lab("unbalanced", folder)
     change(folder / "kin.xml", ("all center_of_mass", "center_of_mass"))
 
@@ -102,7 +102,7 @@ def test_sweeps_are_drawn(walk):
 
 def test_pages_of_an_earlier_simulation_are_removed(walk):
     words = ("simulate", "walker.osim", "--to", "0.05", "-o", "r")
-    # Drawn or not, the folder is that of a simulation, whose pages are replaced.
+    # Later simulations remove pages of earlier ones from the folder, whether or not they draw.
     assert run(*words, folder=walk).code == 0
     for page in (2, 3):
         (walk / "r" / f"states-{page}.png").write_bytes(b"\x89PNG")

@@ -1,4 +1,4 @@
-"""What long work tells on a terminal, and nowhere else."""
+"""Tests of the progress line of long work: it appears on a terminal only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Terminal(io.StringIO):
 
 
 class Clock:
-    """Seconds that a test sets."""
+    """Clock whose time a test sets."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -46,7 +46,7 @@ def clock(monkeypatch):
 
 
 def shown(stream: io.StringIO) -> str:
-    """The last state of the line."""
+    """Return the text of the line after its last update."""
     return stream.getvalue().split("\r")[-1].rstrip()
 
 
@@ -60,7 +60,7 @@ def test_the_line_appears_after_half_a_second(monkeypatch, clock, second, shows)
         clock.now = second + 0.05
         progress(3.0)
         assert "75 %" not in sys.stderr.getvalue()
-    # Nothing is left of it.
+    # The line has been erased.
     assert shown(sys.stderr) == ""
 
 
@@ -99,7 +99,7 @@ def test_the_line_is_removed_with_what_the_terminal_writes_behind_it(monkeypatch
             clock.now += 1.0
             progress(0.0, None, words)
         longest = max(map(len, sys.stderr.getvalue().split("\r")))
-        # The terminal wrote ^C behind the blanks that cover the longer line.
+        # The blanks are longer than the line: the terminal may have written ^C behind it.
         _progress._line.erase()
         assert sys.stderr.getvalue().endswith(f"\r{'':{longest + 2}}\r")
 
@@ -113,7 +113,7 @@ def test_output_removes_the_line_first(monkeypatch, clock):
     out = _console.EscapingStream(io.StringIO())
     out.write("done\n")
     assert shown(sys.stderr) == ""
-    # It comes back only after another half a second.
+    # The line reappears only after another half second.
     clock.now = 2.3
     _progress._line.draw()
     assert shown(sys.stderr) == ""
@@ -138,7 +138,7 @@ def test_parts_of_a_task_have_their_own_progress(monkeypatch, clock):
         report_progress("computing moments", 20.0, 40.0, " frames")
         words = "computing moments: 50 % (20 of 40 frames), 3 s left"
         assert shown(sys.stderr) == f"running, 1 of 3 done; {words}"
-        # A finished part says nothing about what follows.
+        # The time of a finished part does not predict the time of the next part.
         clock.now = 7.0
         report_progress("computing moments", 40.0, 40.0, " frames")
         assert shown(sys.stderr) == "running, 1 of 3 done; writing results: 7 s"

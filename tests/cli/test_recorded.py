@@ -1,4 +1,4 @@
-"""``kinematics`` and ``inverse-dynamics`` from the command line."""
+"""Tests of ``kinematics``, ``inverse-dynamics`` and other commands on recorded motions."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_measured_forces(fixtures: Path, tmp_path: Path) -> None:
         done = run("inverse-dynamics", walker, "still.mot", "-o", "out", *words, folder=tmp_path)
         assert (done.code, done.err) == (0, "")
         lifted.append(read_sto(tmp_path / "out" / "inverse_dynamics.sto")["Pelvis_ty_force"])
-    # The platform is tilted by 10 degrees.
+    # The platform is tilted by 10 degrees, and cos(10°) = 0.984807753.
     assert lifted[0] - lifted[1] == pytest.approx(7.0 * 0.984807753, rel=1e-6)
     done = run(
         "simulate",
@@ -162,7 +162,7 @@ def test_markers_as_trc(fixtures: Path, tmp_path: Path) -> None:
 
 
 def test_loads_without_a_document(fixtures: Path, tmp_path: Path) -> None:
-    """What its columns push is said beside the table; a part of the motion is enough."""
+    """Options of the command replace a document of external loads; --from and --until select a part of the motion."""
     walker = str(fixtures / "walker" / "DynamicWalkerModel.osim")
     times = [0.01 * k for k in range(20)]
     write_sto(tmp_path / "still.mot", "still", times, ("Pelvis_tx",), [[0.1] for _ in times])

@@ -1,4 +1,4 @@
-"""``osimlite simulate`` from the command line."""
+"""Tests of ``simulate`` on the command line."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_files_and_table(walker, tmp_path):
 
 @pytest.fixture
 def stiff(tmp_path: Path) -> Path:
-    """A bob between stops, which swings some ten thousand times in a second."""
+    """Write a model of a bob between stiff stops, against which it oscillates some 10,000 times per second."""
     stops = {
         "lower_limit": -0.01,
         "upper_limit": 0.0,
@@ -128,7 +128,7 @@ def test_fixed_step(walker, tmp_path):
         folder=tmp_path,
     )
     assert code == 0 and "100 accepted, 0 rejected" in out
-    # Without a folder to write into, one that is named after the model's file.
+    # The default output folder has the name of the model file.
     assert len(read_sto(tmp_path / "DynamicWalkerModel" / "states.sto").times) == 3
     assert [path.name for path in tmp_path.iterdir()] == ["DynamicWalkerModel"]
 
@@ -173,7 +173,7 @@ def test_failure_on_the_way_keeps_what_was_recorded(walker, tmp_path):
 
 
 def test_contacts_without_stiffness_are_named(walker, tmp_path):
-    """OpenSim computes NaN with them; here they are left without a force, which nobody may overlook."""
+    """OpenSim computes NaN for such contacts. osimlite leaves out their force and must report it."""
     text = (
         Path(walker)
         .read_text()
@@ -230,7 +230,7 @@ def test_degrees_taken_for_radians_are_refused(walker, tmp_path):
 
 
 def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
-    """All states are those at its end; what is set besides counts more."""
+    """All states start from the last row of the file; --set overrides single states."""
     osimlite.write(damped(), tmp_path / "damped.osim")
     words = ["simulate", str(tmp_path / "damped.osim"), "--to", "0.05"]
     spent = "/forceset/stop/dissipatedEnergy"
@@ -275,7 +275,7 @@ def test_what_a_motion_goes_on_from_is_not_replaced(tmp_path):
 
 @pytest.fixture(scope="module")
 def without_pybullet(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
-    """An environment with the extra `sim` alone, in which PyBullet is not installed."""
+    """Return an environment with the extra `sim` alone, in which PyBullet is not installed."""
     return BareEnvironment(tmp_path_factory.mktemp("sim") / "environment", ("sim",))
 
 
@@ -312,7 +312,7 @@ def test_auto_is_a_deprecated_name_of_the_default():
 
 @pytest.fixture
 def driven(tmp_path: Path) -> Path:
-    """A bob on a rail with a motor, and a table of controls."""
+    """Write a model of a bob on a rail with two motors, and a table of controls for one of them."""
     model = make_slide(*(CoordinateActuator(name=name, coordinate="x") for name in "ab"))
     osimlite.write(model, tmp_path / "driven.osim")
     write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2], ["/forceset/a"], [[1.0], [3.0]])

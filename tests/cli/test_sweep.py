@@ -1,4 +1,4 @@
-"""The commands that sweep and search."""
+"""Tests of ``sweep``, ``optimize`` and other commands that vary parameters."""
 
 from __future__ import annotations
 

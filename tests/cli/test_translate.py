@@ -1,4 +1,4 @@
-"""``translate`` from the command line."""
+"""Tests of ``translate`` on the command line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.simulation.elements.muscle_rows import hung, muscle
 
 
 def urdf_records(folder: Path) -> str:
-    """What was done about what the URDF cannot say, in one string."""
+    """Return, in one string, how the translation treats each feature that URDF cannot represent."""
     records = json.loads((folder / "fidelity.json").read_text())["records"]
     return "\n".join(record["done"] for record in records)
 
@@ -141,7 +141,7 @@ def test_paths_are_called_by_the_names_of_their_muscles() -> None:
 
 
 FORMATS = " or ".join(repr(name) for name in (*list_exporters("translate"), "osim"))
-"""What `--to` accepts, as messages say it."""
+"""Values of `--to` as messages list them."""
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""``upgrade`` from the command line."""
+"""Tests of ``upgrade`` on the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""osimlite validate and osimlite rule, as a user calls them."""
+"""Tests of ``validate`` and ``rule`` on the command line."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_standard_input_may_be_a_setup_or_a_table_of_a_project(fixtures, tmp_pat
     wrong = motion.replace("=yes", "=true")
     done = run("validate", "-", "--stdin-filename", "a.mot", text=wrong, folder=tmp_path)
     assert done.out.startswith("a.mot:5:11: error OSIM803")
-    # Without a name it is in no folder, and still no model.
+    # Without a file name the text belongs to no project; it still must not be taken for a model.
     assert run("validate", "-", "--select", "OSIM003", text=ik).code == 0
     done = run("validate", "-", "--fix", "--stdin-filename", tmp_path / "ik.xml", text=text)
     assert done.code == 2 and (tmp_path / "ik.xml").read_text() == ik

@@ -1,4 +1,4 @@
-"""``view`` from the command line."""
+"""Tests of ``view`` on the command line."""
 
 from __future__ import annotations
 

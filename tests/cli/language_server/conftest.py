@@ -1,4 +1,4 @@
-"""An editor that talks to the language server over standard input and output."""
+"""Fixtures of an editor that talks to the language server over standard input and output."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ import pytest_lsp
 from lsprotocol import types
 
 OPENED: set[str] = set()
-"""Files that the present test has opened."""
+"""URIs of the files that the current test has opened."""
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def server(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> AsyncIterator[pytest_lsp.LanguageClient]:
-    """A client of a server that the tests of a module share: a process takes longer to start than to answer."""
+    """Yield a client of a server that the tests of a module share, because starting the process dominates their time."""
     cache = str(tmp_path_factory.mktemp("server-cache"))
     client = pytest_lsp.make_test_lsp_client()
     await client.start_io(
@@ -40,13 +40,13 @@ async def server(
 
 @pytest_asyncio.fixture(loop_scope="module")
 async def client(server: pytest_lsp.LanguageClient) -> AsyncIterator[pytest_lsp.LanguageClient]:
-    """The client, whose files are closed after each test."""
+    """Yield the client, and close the files that the test has opened."""
     OPENED.clear()
     yield server
     for uri in OPENED:
         document = types.TextDocumentIdentifier(uri)
         server.text_document_did_close(types.DidCloseTextDocumentParams(document))
-    # The answer follows whatever the server has to say of these files, so none of it reaches the next test.
+    # Messages arrive in order: all diagnostics of these files come before this answer, none during the next test.
     question = types.HoverParams(types.TextDocumentIdentifier("file:///none"), types.Position(0, 0))
     with pytest.raises(Exception, match="is not open"):
         await server.text_document_hover_async(question)
@@ -55,12 +55,12 @@ async def client(server: pytest_lsp.LanguageClient) -> AsyncIterator[pytest_lsp.
 
 @pytest.fixture
 def editor(client):
-    """Makes a file, of a path and perhaps a text, in an editor that talks to the server."""
+    """Return a function that opens a file in an editor, given its path and optionally its text."""
     return functools.partial(File, client)
 
 
 class File:
-    """A file in an editor, and the changes that its user makes."""
+    """File that is open in an editor, and the changes that a user makes to it."""
 
     def __init__(self, client, path: Path, text: str | None = None) -> None:
         self.client, self.uri, self.version = client, path.as_uri(), 1
@@ -86,12 +86,12 @@ class File:
         return await self.checked()
 
     async def type(self, old: str, new: str) -> list[types.Diagnostic]:
-        """Replace the first `old` by `new`, and wait for the findings."""
+        """Replace the first `old` by `new`, wait for the diagnostics and return them."""
         self.replace(old, new)
         return await self.checked()
 
     def replace(self, old: str, new: str) -> None:
-        """Replace the first `old` by `new`, as an editor tells it."""
+        """Replace the first `old` by `new`, and notify the server as an editor does."""
         start, end = self.place(old), self.place(old, len(old))
         change = types.TextDocumentContentChangePartial(types.Range(start, end), new)
         self.text = self.text.replace(old, new, 1)

@@ -1,4 +1,4 @@
-"""What stands at a place of a text that may be broken."""
+"""Tests of finding the element, property or value at a cursor, also in damaged texts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TEXT = WALKER.read_text()
 
 
 def test_every_object_is_known_from_the_tags_before_it() -> None:
-    """The classes that the schema gives to tags are those that the reader makes of them."""
+    """Compare the class at each tag with the class of the object that the reader creates from the tag."""
     document = read_document(Source.from_text(TEXT))
     for item in document.model.walk():
         number = item.source_index

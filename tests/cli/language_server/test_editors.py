@@ -1,4 +1,4 @@
-"""Neovim and Emacs as they come from packages, with the files in editors/: findings, highlighting, formatting."""
+"""Tests of Neovim and Emacs, as packaged, with the files in editors/: findings, highlighting, formatting."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ EMACS = """
 
 @pytest.fixture
 def edited(tmp_path: Path):
-    """What an editor says of a file, and the file afterwards."""
+    """Return a function that opens a file in an editor; it returns the editor's output and the file's text afterwards."""
     if os.name == "nt":
         pytest.skip("the program that editors start here is a shell's")
     for name, text in {"m.osim": TEXT, **OTHERS}.items():
         (tmp_path / name).write_text(text)
-    # The program that editors start is the one of this environment.
+    # The editors start `osimlite` from the PATH: let that be the one of this environment.
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "osimlite").write_text(
         f'#!/bin/sh\nexec "{sys.executable}" -m osimlite "$@"\n'

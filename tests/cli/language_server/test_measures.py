@@ -1,4 +1,4 @@
-"""Paths and muscles are measured when nobody types, and stay measured where they have not changed."""
+"""Tests of slow rules in the language server: they run while nobody types, and keep results that are still valid."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ async def test_after_a_pause(editor, fixtures, tmp_path) -> None:
     assert not of_paths(await file.open())
     found = of_paths(await file.checked())
     assert len(found) == 2
-    # No path depends on the size of a foot: what is known of them is told at once.
+    # No path depends on the radius of a foot: the known findings are reported at once.
     assert of_paths(await file.type("<radius>0.05</radius>", "<radius>0.06</radius>")) == found
     assert not of_paths(await file.type("<range>-2.1 0</range>", "<range>-2.1 0.1</range>"))
     assert len(of_paths(await file.checked())) == 2

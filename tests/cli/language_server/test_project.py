@@ -1,4 +1,4 @@
-"""The language server on setups and tables: names lead into the model that a tool works on, and into its data."""
+"""Tests of the language server on setup files and tables: names refer to the model of a tool and to its data."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def folder(fixtures: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def ask(client):
-    """Asks where the word at a place leads, what it is, what may stand there, and who names the same."""
+    """Return an object that requests definition, hover text, completions and references at a position."""
 
     class Ask:
         async def definition(self, file, *place):
@@ -113,7 +113,7 @@ async def test_what_an_open_model_says_counts_before_it_is_written(
     await model.type('<Marker name="R.ASIS"', '<Marker name="RASI"')
     found = [d for d in await ik.checked() if d.code == "OSIM831"]
     assert [ik.words(d.range) for d in found] == ["R.ASIS"]
-    # Broken for a moment, it still is the model that it was.
+    # While its text is not well-formed, the last valid version of the model counts.
     await model.type('<Marker name="RASI"', '<Marker name="RASI')
     await model.type('<Marker name="RASI', '<Marker name="R.ASIS"')
     assert not [d for d in await ik.checked() if d.code == "OSIM831"]
@@ -265,7 +265,7 @@ async def test_a_table_is_checked_when_it_is_written(client, editor, folder: Pat
     motion = editor(folder / "coords.mot")
     assert not await motion.open()
     motion.replace("inDegrees=yes", "inDegrees=true")
-    # What is asked meanwhile has an answer, and nothing is checked before the answer.
+    # Requests are answered during the delay before a check, and the check comes after the answer.
     edits = await client.text_document_formatting_async(
         types.DocumentFormattingParams(motion.document, types.FormattingOptions(4, False))
     )

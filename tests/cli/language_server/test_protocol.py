@@ -1,4 +1,4 @@
-"""The language server under an editor that does not keep to the protocol: every question is answered."""
+"""Tests of the language server with messages that violate the protocol: every request gets an answer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PARAMETERS, REQUEST, JSON, METHOD = -32602, -32600, -32700, -32601
 
 
 class Editor:
-    """One end of the line; what the server says besides answers is kept."""
+    """Client of the protocol; it collects the notifications of the server in `remarks`."""
 
     def __init__(self, server):
         self.server = server
@@ -30,7 +30,7 @@ class Editor:
         self.server.stdin.flush()
 
     def answer(self):
-        """The next answer, of whatever question."""
+        """Return the next answer to any request, and collect the notifications before it."""
         while True:
             length = 0
             while line := self.server.stdout.readline().strip():
@@ -67,7 +67,7 @@ def editor(fixtures, tmp_path_factory):
             }
         )
         yield result
-        # After all that, it still does its work.
+        # The server still works after all invalid messages.
         assert "result" in result.ask(
             "textDocument/hover", {"textDocument": FILE, "position": START}
         )

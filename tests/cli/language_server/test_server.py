@@ -1,4 +1,4 @@
-"""The language server as a client sees it, over standard input and output."""
+"""Tests of the language server as a client uses it, over standard input and output."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker) 
     actions = await client.text_document_code_action_async(asked)
     mend = next(action for action in actions if "RFootContact" in action.title)
     assert "RFootContact Platform" in walker.after(mend.edit.changes[walker.uri])
-    # The cursor may stand anywhere in the line.
+    # Actions are offered for every cursor position in the line.
     for column in (0, found[0].range.end.character + 3):
         place = types.Position(found[0].range.start.line, column)
         asked = types.CodeActionParams(walker.document, types.Range(place, place), context)
@@ -47,7 +47,7 @@ def test_ctrl_c_ends_the_server_at_once_with_a_sentence() -> None:
     command = [sys.executable, "-m", "osimlite", "lsp"]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as server:
-        # The server reads from the editor when it is ready.
+        # The signal must arrive when the server has started and reads from the editor.
         time.sleep(2.0)
         server.send_signal(signal.SIGINT)
         assert server.wait(5.0) in (130, -signal.SIGINT)

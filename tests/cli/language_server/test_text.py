@@ -1,4 +1,4 @@
-"""Places in a text as editors count them."""
+"""Tests of positions in a text as editors count them: lines, UTF-16 units, line ends."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_a_place_leads_back_to_its_offset(
     text = Text(content, unit)
     offset = data.draw(st.integers(0, len(content)))
     result = text.offset(text.position(offset))
-    # Between the two characters of a line end there is no place.
+    # There is no position between the two characters of CR LF.
     assert result == offset or content[offset - 1 : offset + 1] == "\r\n"
 
 
