@@ -1,4 +1,4 @@
-"""Progress of the library, and the division of work into calls of kernels."""
+"""Tests of progress reports of the library, and of the division of work into calls of kernels."""
 
 from __future__ import annotations
 

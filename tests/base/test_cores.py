@@ -1,4 +1,4 @@
-"""How much may run at once."""
+"""Tests of `count_cores`, the number of cores that this process may use."""
 
 from __future__ import annotations
 

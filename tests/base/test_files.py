@@ -1,4 +1,4 @@
-"""Reading files: only ordinary ones, and only so much of them."""
+"""Tests of reading and replacing files: only regular files up to the size limit are read."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ KINDS = (
 
 @pytest.fixture(params=KINDS)
 def special(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
-    """Something under the name of a model that is no file."""
+    """Return a path with the name of a model that is not a regular file, one for each of KINDS."""
     place = tmp_path / "special.osim"
     match request.param:
         case "pipe":
@@ -89,7 +89,7 @@ def test_what_is_no_file_is_not_included(special: Path, tmp_path: Path) -> None:
 
 
 def test_what_is_no_file_is_not_included_in_an_editor(special: Path, tmp_path: Path) -> None:
-    """The text may be that of a file that is not written yet."""
+    """The text in an editor may belong to a file that does not exist yet."""
     source = Source.from_text(INCLUDING.format(special), str(tmp_path / "new.osim"))
     (result,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
     assert "which is not read: this is a " in result.message and result.message.endswith(
@@ -177,7 +177,7 @@ def test_a_large_file_is_not_read(
         read_file(place)
     (tmp_path / "osimlite.toml").write_text("largest-file = 2\n")
     assert len(read_file(place)) == 2_000_000
-    # As many are read of a file that grows meanwhile, or whose size is not known.
+    # A file that grows while it is read, or whose size is unknown, has the same limit.
     unknown = os.stat_result((0o100644, 0, 0, 1, 0, 0, 0, 0, 0, 0))
     monkeypatch.setattr("osimlite.base.files.os.fstat", lambda handle: unknown)
     assert len(read_file(place)) == 2_000_000
@@ -212,7 +212,7 @@ def test_an_endless_standard_input_is_not_read_to_the_end(
 def test_a_few_files_that_name_each_other_are_not_read_without_end(
     tmp_path: Path, small: None
 ) -> None:
-    """Each names the next one twice: thirty files would be read a milliard times."""
+    """Each file names the next one twice: without a limit the last of 30 files would be read 2**29 times."""
     import osimlite
 
     body = '<Body name="{}" file="{}.xml" />'
@@ -249,12 +249,12 @@ WRITING = (["format"], ["validate", "--fix", "--no-cache"])
 
 @pytest.fixture(params=WRITING, ids=["format", "fix"])
 def rewrite(request: pytest.FixtureRequest) -> Callable[..., Done]:
-    """Have a file written again; it must be another text then."""
+    """Return a function that runs the command on files; the command rewrites files whose text it changes."""
     return lambda *paths: run(*request.param, *paths)
 
 
 def test_a_read_only_file_is_not_replaced(tmp_path: Path, rewrite: Callable[..., Done]) -> None:
-    """The superuser could, but was not asked to; the other files are written all the same."""
+    """Permissions do not stop the superuser, so osimlite checks them itself; other files are written all the same."""
     fixed, other = tmp_path / "a.osim", tmp_path / "b.osim"
     for place in (fixed, other):
         place.write_text(MESSY)

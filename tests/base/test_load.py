@@ -1,4 +1,4 @@
-"""Running Python that a user names: what stands in the files counts, and nothing is left beside them."""
+"""Tests of running Python files that a user names: the current text is run, and no compiled files are left behind."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECOND = 1_700_000_000
 
 @pytest.fixture(autouse=True)
 def as_users_have_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Python keeps what it compiles, unless the machine that tests are run on forbids it."""
+    """Let Python write compiled files, as it does by default, even where the environment of the tests forbids it."""
     monkeypatch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     for name in ("path", "meta_path"):
@@ -31,7 +31,7 @@ def as_users_have_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterato
 
 
 def write(place: Path, text: str) -> None:
-    """Write a file that Python cannot tell by its time and size from another."""
+    """Write a file with a fixed modification time, so that Python cannot tell two versions of equal size apart."""
     place.parent.mkdir(parents=True, exist_ok=True)
     place.write_text(text)
     os.utime(place, (SECOND, SECOND))

@@ -1,4 +1,4 @@
-"""Named tuples equal those of `typing`, although their constructors are compiled late."""
+"""Tests of osimlite's named tuples: they equal those of `typing`, although their constructors are compiled late."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Station(NamedTuple):
     marks: tuple[Missing, ...] = ()  # type: ignore[name-defined]  # noqa: F821
 
     def describe(self) -> str:
-        """Return a text."""
+        """Return the body and the depth."""
         return f"{self.body} {self.depth}"
 
     @property
     def is_deep(self) -> bool:
-        """Whether it is deep."""
+        """Whether the depth is above 1."""
         return self.depth > 1.0
 
 

@@ -1,4 +1,4 @@
-"""Patterns that are compiled late do what compiled ones do."""
+"""Tests of regular expressions that are compiled when first used: they behave as those of `re`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What becomes of work whose process ends."""
+"""Tests of the error that a process pool raises when one of its processes ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Records are dataclasses whose methods are made late."""
+"""Tests of records: they behave as dataclasses, although their methods are generated late."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_nothing_is_compiled_before_several_objects_are_made() -> None:
 
 
 def make_fresh():
-    """Return a record of which there are no objects yet, and the same as a dataclass."""
+    """Return a function that declares a class anew: as a record without instances, and as a dataclass."""
 
     def declare(make, attribute):
         class Item:
@@ -168,7 +168,7 @@ def test_the_first_objects_are_like_later_ones(values, named) -> None:
 
 
 def test_a_record_can_be_printed_by_pprint():
-    # Only what is longer than the width is looked at as a dataclass.
+    # The text is wider than `width`: otherwise pprint does not treat the record as a dataclass.
     assert pprint.pformat(Place("a"), width=10) == repr(Place("a"))
 
 

@@ -1,4 +1,4 @@
-"""What a user is told about an optional package."""
+"""Tests of the messages about an optional package that is absent or broken."""
 
 import math
 

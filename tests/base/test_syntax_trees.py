@@ -1,4 +1,4 @@
-"""Syntax trees in processes with finalizers and threads that parse as well."""
+"""Tests of parsing Python while finalizers and other threads parse as well."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONG = "\n".join(f"x{k} = (a + b) * [c for c in d if c]" for k in range(2000))
 
 
 class Cycle:
-    """Garbage whose finalizer parses."""
+    """Reference cycle whose finalizer parses Python when the garbage collector runs."""
 
     def __init__(self) -> None:
         self.itself = self

@@ -1,4 +1,4 @@
-"""What a terminal or the log of a CI job would obey is written out."""
+"""Tests of escaping: control characters that a terminal or the log of a CI job obeys are written out."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_nothing_is_obeyed(text: str) -> None:
 @given(anything)
 def test_json_for_programs_keeps_everything_and_passes_everywhere(text: str) -> None:
     written = format_json({text: [text]})
-    # Halves of characters are in no text that is exchanged: RFC 8259, 8.2.
+    # JSON for exchange contains no lone surrogates (RFC 8259, 8.2); `format_json` escapes them visibly.
     whole = text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
     whole = "".join(escape_unprintable(c) if "\ud800" <= c <= "\udfff" else c for c in whole)
     assert written.isascii() and json.loads(written) == {whole: [whole]}

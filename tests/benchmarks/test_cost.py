@@ -1,4 +1,4 @@
-"""What everyday actions cost: the numbers are those that stand in benchmarks/cost.json, within 3 %."""
+"""Tests of the cost counter: costs of everyday actions equal those in benchmarks/cost.json within 3 %."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.cost import KINDS, Cost, describe_changes
 
 
 def costs(**numbers: int) -> dict[str, Cost]:
-    """An action whose calls are these, by function."""
+    """Return the cost of one action `walk` with these numbers of calls; `__` in a name stands for `.py: `."""
     calls = {name.replace("__", ".py: "): number for name, number in numbers.items()}
     return {"walk": Cost({kind: calls if kind == "calls" else {} for kind in KINDS})}
 
@@ -96,7 +96,10 @@ def test_the_file_holds_what_was_accepted(tmp_path: Path, monkeypatch: pytest.Mo
 @pytest.mark.skipif(sys.platform != "linux", reason="counted on Linux")
 @pytest.mark.skipif(not cost.ACCEPTED_FILE.exists(), reason="no costs are accepted yet")
 def test_no_action_became_dearer() -> None:
-    """To accept other costs: python benchmarks/cost.py --accept, and say in the commit why."""
+    """Compare the measured costs with benchmarks/cost.json.
+
+    To accept other costs, run `python benchmarks/cost.py --accept` and give the reason in the commit message.
+    """
     for package in ("mujoco",):
         pytest.importorskip(package)
     versions, old = cost.read_accepted()

@@ -1,4 +1,4 @@
-"""Mutants of a text, and what becomes of one that tests see, and of one that they do not."""
+"""Tests of mutation testing: mutants of a text, and the verdicts "killed" and "survived"."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_tests_are_called_with_the_mutant_in_place(tmp_path: Path, repo: Path) -
     )
     trials = Trials(tmp_path, full=False, seconds=60)
     wrong, right = "test_it.py::test_wrong", "test_it.py::test_it"
-    # What fails without the mutant too says nothing about it.
+    # A test that also fails without the mutant says nothing about the mutant.
     assert trials.try_mutant(mutant, [wrong, right]) == ("killed", right)
     harmless = Mutant("clipping.py", 2, mutant.start, mutant.end, "*", " * ")
     assert trials.try_mutant(harmless, [wrong, right]) == ("survived", "")

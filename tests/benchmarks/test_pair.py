@@ -1,4 +1,4 @@
-"""The timing harness: order of the runs, warm-up, ratios. A fake clock stands in for time."""
+"""Tests of the timing harness with a fake clock: order of the runs, warm-up, ratios."""
 
 import io
 import sys
@@ -10,7 +10,7 @@ from benchmarks._pair import Pair, print_pairs, time_command_pair, time_pair
 
 
 class FakeClock:
-    """Seconds that pass only when work says so."""
+    """Clock that advances only by the durations of `work`."""
 
     def __init__(self):
         self.now = 100.0
@@ -50,7 +50,7 @@ def test_refuses_to_measure_nothing():
 
 def test_the_table_says_time_in_milliseconds_and_the_median_of_ratios_not_the_ratio_of_medians():
     out = io.StringIO()
-    # Medians are 2 ms and 2 ms (their ratio would be 1); the median of the ratios is 0.5.
+    # The medians are 2 ms and 2 ms, so their ratio would be 1; the median of the ratios is 0.5.
     print_pairs(
         "Title",
         [Pair("walk", ours=(0.001, 0.002, 0.004), theirs=(0.002, 0.008, 0.002))],

@@ -1,4 +1,4 @@
-"""Installing with a C++ compiler and without: each in an environment of its own, which takes a minute."""
+"""Tests of installing with and without a C++ compiler, each in a separate environment; they take a minute."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WALK = (
 
 
 def build(repo, folder, environment):
-    """Build a wheel of the source tree with the build's own environment, and return it."""
+    """Build a wheel of the source tree in the build's isolated environment, and return its path."""
     command = [
         sys.executable,
         "-m",
@@ -40,7 +40,7 @@ def build(repo, folder, environment):
 
 
 def install(wheel, folder):
-    """Unpack a wheel, and return the environment in which Python imports it before anything else."""
+    """Unpack a wheel, and return environment variables with which Python imports it before other packages."""
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder)
     return {**os.environ, "PYTHONPATH": str(folder)}
@@ -68,7 +68,7 @@ def version(environment, folder):
 
 @pytest.fixture
 def without_compiler(tmp_path):
-    """The environment variables of a machine that has no compiler."""
+    """Return the environment variables of a machine without a compiler."""
     bare = {name: value for name, value in os.environ.items() if name not in ("CXX", "PYTHONPATH")}
     return {**bare, "PATH": str(tmp_path / "nothing"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
 

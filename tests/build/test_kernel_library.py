@@ -1,4 +1,4 @@
-"""The script that builds the library of kernels, and when it builds it again."""
+"""Tests of packaging/kernel_library.py, which builds the library of kernels and decides when to build it again."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture
 def script(repo):
-    """The script as a module."""
+    """Import packaging/kernel_library.py as a module."""
     path = repo / "packaging" / "kernel_library.py"
     if not path.exists():
         pytest.skip("packaging/kernel_library.py is not here: this is not a source tree")

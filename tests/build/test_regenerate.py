@@ -1,4 +1,4 @@
-"""Generated files are current, and the command that writes them finds one that is not."""
+"""Tests of packaging/regenerate.py: generated files are current, and the script finds outdated ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ pytest.importorskip("grimp", reason="needs import-linter (extra 'dev')")
 
 @pytest.fixture(scope="module")
 def regenerate() -> ModuleType:
-    """The script."""
+    """Import packaging/regenerate.py as a module."""
     path = Path(__file__).resolve().parents[2] / "packaging" / "regenerate.py"
     spec = importlib.util.spec_from_file_location("regenerate", path)
     assert spec is not None and spec.loader is not None

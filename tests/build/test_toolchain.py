@@ -1,4 +1,4 @@
-"""The C++ compiler that is found, and what it is asked for."""
+"""Tests of the search for a C++ compiler and of the options that it gets."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CLANG = Compiler(("clang++",), "clang version 14", is_gcc=False, system="linux",
 
 @pytest.fixture
 def programs(tmp_path, monkeypatch):
-    """A search path that has only the compilers that a test puts there."""
+    """Yield a function that adds a fake compiler to a search path without other programs."""
     if sys.platform == "win32":
         pytest.skip("the programs are scripts of a shell")
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -88,11 +88,11 @@ def test_targets():
     assert "-march=native" in GCC.flags(NATIVE) and "-march=x86-64-v3" in CLANG.flags(X86_64_V3)
     assert not any(flag.startswith("-march") for flag in GCC.flags(BASELINE))
     assert "-mcpu=native" in GCC._replace(machine="aarch64").flags(NATIVE)
-    # Only g++ chooses vectors by the name of the processor.
+    # Only g++ selects the vector width by the processor, on x86 but not on aarch64.
     assert "-mprefer-vector-width=256" in GCC.flags(NATIVE)
     assert "-mprefer-vector-width=256" not in CLANG.flags(NATIVE)
     assert "-mprefer-vector-width=256" not in GCC._replace(machine="aarch64").flags(NATIVE)
-    # Only g++ has limits of inlining that are too low.
+    # The default inlining limits are too low for kernels; g++ and clang have different options for them.
     assert any(flag.startswith("--param") for flag in GCC.flags(NATIVE))
     assert not any(flag.startswith("--param") for flag in CLANG.flags(NATIVE))
     assert "-inline-threshold=500" in CLANG.flags(

@@ -1,4 +1,4 @@
-"""The check of a release's wheels: what is wrong with a library is found and named."""
+"""Tests of packaging/wheels.py, which checks the wheels of a release and names what is wrong with a library."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NAMES = b"\0evaluate\0merson_along_16\0"
 
 @pytest.fixture
 def wheels(repo):
-    """The script."""
+    """Import packaging/wheels.py as a module."""
     path = repo / "packaging" / "wheels.py"
     if not path.exists():
         pytest.skip("wheels.py is in the repository only")

@@ -1,4 +1,4 @@
-"""The extension for VS Code: its own tests."""
+"""Run the tests of the VS Code extension."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The walker in the library's own words."""
+"""Tests of the built-in dynamic walker."""
 
 from __future__ import annotations
 

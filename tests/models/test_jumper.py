@@ -1,4 +1,4 @@
-"""The jumper of the library: it stands in its squat, and jumps as high as it is said to."""
+"""Tests of the built-in jumper: it squats in balance, and jumps to the height that the documentation states."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from osimlite.models.jumper import MUSCLES, jumper
 from osimlite.simulation import Simulation
 
 HEIGHT, AT = 1.2796091, 0.48
-"""Of the mass center where it is highest (m), and when (s), to a hundredth of a second."""
+"""Largest height of the mass centre (m) and its time (s), which is rounded to 0.01 s."""
 
 
 @pytest.fixture(scope="module")
 def jump():
-    """Simulation, and its motion until after the landing."""
+    """Yield the simulation of the jumper and a trajectory that ends after the landing."""
     with Simulation(jumper(), "compiled") as simulation:
         yield simulation, simulation.run(0.8, accuracy=1e-7)
 
 
 def test_nothing_is_said_of_it():
-    # In the squat some of its muscles are slack.
+    # OSIM636 reports slack muscles, and some are slack in the squat.
     assert validate(jumper(), ignore="OSIM636").findings == []
 
 
@@ -30,7 +30,7 @@ def test_it_squats_in_balance():
         start, count = simulation.initial_state({}, {}), len(simulation.engine.order)
         rates = simulation.engine.compute_derivative(0.0, start)
         rest = simulation.engine.equilibrate_muscles(0.0, start)
-    # Feet of 1 kg are as quick as the digits of the fiber lengths let them be.
+    # Accelerations are not exactly zero: rounded fiber lengths leave forces that accelerate the feet of 1 kg.
     assert np.abs(rates[count : 2 * count]).max() < 0.5
     assert start == pytest.approx(rest, abs=1e-6)
 

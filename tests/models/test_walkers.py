@@ -1,4 +1,4 @@
-"""The walkers of the library, and the files of them."""
+"""Tests of the other built-in walkers and of their model files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A muscle that OpenSim has not, all of it in one file: its class, its facts, its law, its kind."""
+"""Example of a muscle class that OpenSim does not have, in one file: class, facts, law and force type."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from osimlite.simulation.elements.registry import register_force_type
 
 
 class StraightMuscle(Muscle):
-    """A muscle with a rigid tendon in line with fibers whose force falls in straight lines from their best length."""
+    """Muscle with a rigid tendon in line with the fibers and a piecewise linear force-length relation."""
 
     facts = Facts(
         states="activation",
@@ -37,10 +37,10 @@ class StraightMuscle(Muscle):
     fastest: Annotated[float, real("fiber_length/s", "> 0")] = 10.0
     """Shortening velocity without force."""
     grip: Annotated[float, real(domain=">= 1")] = 1.5
-    """Most force of lengthening fibers, of the isometric one."""
+    """Largest force of lengthening fibers, relative to the isometric force."""
 
     def find_contradictions(self) -> Iterator[Contradiction]:
-        """It lengthens by friction only."""
+        """Yield a contradiction if `grip` exceeds 1 + `width`."""
         if self.grip > 1.0 + self.width:
             yield "grip", "its grip is above 1 + width"
 
@@ -55,7 +55,12 @@ def straight(
     grip: float,
     rise: float,
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Tension (N), what else is recorded of muscles, rate of the activation (1/s), fiber velocity (m/s)."""
+    """Compute the tension of a muscle with a rigid tendon and linear force-length and force-velocity relations.
+
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, active force-length multiplier, force-velocity
+        multiplier, active force (N), passive force (N), activation rate (1/s), fiber velocity (m/s).
+    """
     fibers = now.length - slack
     active = max(1.0 - abs(fibers / optimal - 1.0) / width, 0.0)
     factor = min(max(1.0 + now.rate / (optimal * fastest), 0.0), grip)
