@@ -1,4 +1,4 @@
-"""The kits for public projects: patches that git reads, workflows that fit the action, pages that name them."""
+"""Tests of the kits for public projects: git reads the patches, workflows fit the action, pages name the kits."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_patches_are_sound_and_say_what_opensim_reads(kit):
 
 @pytest.mark.parametrize("patch", CLIENTS, ids=lambda patch: patch.parents[1].name)
 def test_clients_call_what_there_is(patch):
-    """Patches that replace OpenSim in a program: the kit names them, git reads them, and they use names of ours."""
+    """The kit names each patch of a client program, git reads it, and the names of osimlite that it uses exist."""
     git = shutil.which("git")
     if git is None:
         pytest.skip("needs git")
@@ -60,7 +60,7 @@ def test_clients_call_what_there_is(patch):
     ]
     names = set(re.findall(r"osimlite\.(\w+)", "\n".join(added)))
     assert {"read", "read_document", "write", "run"} <= names <= set(dir(osimlite))
-    # What the setups are given is theirs.
+    # Every property that the patched program sets exists in the class of the setup.
     given = set(
         re.findall(
             r"(?:IKTool|scaleTool|modelScaler|markerPlacer)\.(\w+)(?:\.\w+)* = ", "\n".join(added)

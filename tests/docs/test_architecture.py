@@ -1,4 +1,4 @@
-"""The page on the architecture names files and classes that exist, and its picture shows the imports of today."""
+"""Tests of the pages on the architecture: their files and classes exist, and the diagram shows the current imports."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def read_text(name: str) -> str:
 
 
 def list_rooms() -> set[str]:
-    """Return the names of the packages at the top level."""
+    """Return the names of the packages at the top level of osimlite."""
     return {path.parent.name for path in (ROOT / "osimlite").glob("*/__init__.py")}
 
 
 @pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md", "README.md"])
 def test_every_path_of_a_page_exists(page: str) -> None:
-    # A guide writes NAME and CODE for what its reader chooses.
+    # A guide writes NAME and CODE as placeholders.
     paths = [path for path in PATH.findall(read_text(page)) if not re.search("NAME|CODE", path)]
     assert paths
     assert not [path for path in paths if not (ROOT / path).exists()]
@@ -50,7 +50,7 @@ def test_the_tables_of_forms_name_classes_of_these_files() -> None:
 
 @pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
 def test_classes_of_a_section_are_defined_beside_the_files_that_it_names(page: str) -> None:
-    """A class of the same name elsewhere in the package must not hide that a page is outdated."""
+    """Search only files that the section names: a class of the same name elsewhere must not hide an outdated page."""
     missing = []
     on_page = [ROOT / path for path in PATH.findall(read_text(page)) if path.endswith(".py")]
     known = {*dir(builtins), *dir(osimlite), *dir(errors)}.union(*map(list_definitions, on_page))
@@ -68,7 +68,7 @@ def test_classes_of_a_section_are_defined_beside_the_files_that_it_names(page: s
 @cache
 def list_definitions(path: Path) -> set[str]:
     """Return the names of the classes and of the types in variables of a module."""
-    # Parsing all files of the package would take seconds.
+    # Regular expressions suffice here; parsing all files of the package would take seconds.
     return {*re.findall(r"^(?:class )?(\w+)(?: =|[:(])", path.read_text(encoding="utf-8"), re.M)}
 
 

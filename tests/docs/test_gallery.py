@@ -1,4 +1,4 @@
-"""Every part of the gallery has a small picture in the repository and what makes it; this makes one."""
+"""Tests of the gallery: every part has a small picture and a recipe in the repository; one picture is made here."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_every_comparison_has_a_picture_of_before_and_one_of_after() -> None:
     shown = re.findall(
         r"\]\(gallery/(before|after)/([\w-]+)\.webp\)", gallery.PAGE.read_text("utf-8")
     )
-    # Each picture of before stands above that of after.
+    # On the page, each picture of `before` stands above that of `after`.
     assert shown == [(when, name) for name in compare.DRAW for when in ("before", "after")]
     files = {path.relative_to(gallery.FOLDER) for path in gallery.FOLDER.rglob("*.webp")}
     assert files == {Path(when, f"{name}.webp") for when, name in shown}

@@ -1,4 +1,4 @@
-"""Every link and picture of the manual leads to a file of a clone or to a page that the site generates."""
+"""Tests of links and pictures of the manual: each leads to a file of the repository or to a page of the site."""
 
 from __future__ import annotations
 

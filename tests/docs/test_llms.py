@@ -1,4 +1,4 @@
-"""The list of pages for language models has the form of llmstxt.org, and every page of the navigation."""
+"""Tests of llms.txt: it has the form of llmstxt.org and lists every page of the navigation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_every_page_is_listed_with_its_first_sentence() -> None:
     config = load_config(str(ROOT / "mkdocs.yml"), hooks=[])
-    # The pages that the build makes are not there.
+    # Without hooks, the pages that the build generates are missing from the navigation.
     nav = get_navigation(get_files(config), config)
     for page in nav.pages:
         page.read_source(config)
@@ -39,7 +39,7 @@ def test_every_page_is_listed_with_its_first_sentence() -> None:
     assert {match[2] for match in result} == {page.file.src_uri for page in nav.pages}
     assert "- [Rules](rules.md): The rules of `osimlite validate`.\n" in text
     assert not [match[0] for match in result if len(match[3]) > 400 or "](" in match[3]]
-    # A page begins with a sentence about itself, and not with what follows an example or a table.
+    # The summary of a page is its first sentence, not the continuation of an example or a table.
     assert not [
         match[0] for match in result if not re.fullmatch(r"([A-Z`]|osimlite ).*[.?]", match[3])
     ]

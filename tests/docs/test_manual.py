@@ -1,9 +1,9 @@
-"""Every block of code in the manual is run, page by page, in a folder of its own, in the order of the page.
+"""Run every block of code in the manual, page by page, in the order of the page, each page in a new folder.
 
-Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are
-read. A comment ``<!-- prepared: commands -->`` makes what a page takes for granted, ``<!-- not run:
-reason -->`` before a block says why it cannot be run here. After ``<!-- tried: what -->`` comes a
-table: the commands and the Python in all but its first column are run.
+Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are parsed. A comment
+``<!-- prepared: commands -->`` creates files that a page assumes; ``<!-- not run: reason -->`` before a block says why
+it cannot be run here. After ``<!-- tried: what -->`` comes a table: the commands and the Python in all but its first
+column are run.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import osimlite
 from osimlite.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
-# What makes the pictures of the gallery is run when the site is built.
+# The blocks of the gallery are run when the site is built.
 PAGES = sorted(
     {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")}
     - {"docs/gallery.md"}
@@ -35,10 +35,12 @@ QUICK = (
     "format-and-diff", "from-mujoco", "from-urdf", "integrators", "lint-in-ci", "modifying", "plugin-classes", "rules",
     "urdf", "yaml",
 )  # fmt: skip
-"""Pages whose blocks take a second or two at most: the quick suite runs these, and reads all others
-(tests/docs/test_names_used.py)."""
+"""Pages whose blocks take at most two seconds.
+
+The quick suite runs these; tests/docs/test_names_used.py reads all pages.
+"""
 READ_ONLY = ("", "text", "lua", "elisp", "console", "diff", "matlab")
-"""Languages of blocks that show what others print, or that nothing here reads."""
+"""Languages of blocks that show output of programs, or that these tests cannot check."""
 
 _BLOCK = re.compile(
     r"(?:<!-- not run: (?P<why>[^>]+) -->\s*)?^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)"
@@ -49,7 +51,11 @@ _PREPARED = re.compile(r"<!-- prepared: (.*?) -->", re.S)
 
 
 class Block(NamedTuple):
-    """One block of code, or a table with code in it; `why` says why it is not run, if it is not."""
+    """Block of code, or a table with code in it.
+
+    Attributes:
+        why: reason why the block is not run; None if it is run.
+    """
 
     language: str
     code: str
@@ -70,9 +76,8 @@ def blocks(text: str) -> list[Block]:
 
 @pytest.fixture
 def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """An environment in which `osimlite` and `python` are those under test."""
-    # Where it is not known, Matplotlib lists the fonts of the machine anew in each folder, which
-    # takes seconds.
+    """Return environment variables with which `osimlite` and `python` are those under test."""
+    # Share the folder of Matplotlib: with a new one it lists the fonts of the machine, which takes seconds.
     fonts = os.environ.get("MPLCONFIGDIR") or str(tmp_path_factory.getbasetemp() / "matplotlib")
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
     home = {
@@ -85,7 +90,7 @@ def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
         "MPLBACKEND": "Agg",
         "MPLCONFIGDIR": fonts,
         "COLUMNS": "100",
-        # For what pages take for granted and tests can make.
+        # `prepared` comments use these variables.
         "OSIMLITE_REPOSITORY": str(ROOT),
         **home,
     }
@@ -129,13 +134,13 @@ def test_every_block_runs(
 
 
 def tried(table: str) -> list[str]:
-    """What stands as code in all columns but the first, everything once."""
+    """Return the distinct code spans in all columns of a table but the first."""
     rows = (row.partition("|")[2].partition("|")[2] for row in table.splitlines())
     return list(dict.fromkeys(words for cells in rows for words in re.findall(r"`([^`]+)`", cells)))
 
 
 def try_(words: str, names: dict[str, object]) -> None:
-    """Run a command, in this process, or Python that begins with a name known by then; what else is code is a word."""
+    """Run a command in this process, or evaluate Python that begins with a known name; ignore other code spans."""
     first = re.match(r"\w*", words)
     assert first is not None
     if words.startswith("osimlite "):
@@ -147,7 +152,7 @@ def try_(words: str, names: dict[str, object]) -> None:
 
 
 def run(commands: str, place: str, shell: dict[str, str]) -> None:
-    """Run commands; fails if one does."""
+    """Run commands by bash, and fail if one of them fails."""
     done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", commands], env=shell, capture_output=True, text=True,
         stdin=subprocess.DEVNULL, check=False,
@@ -156,7 +161,7 @@ def run(commands: str, place: str, shell: dict[str, str]) -> None:
 
 
 def read(block: Block, place: str) -> None:
-    """Read what is no program; fails if it cannot be read."""
+    """Parse a block of TOML, JSON, YAML or XML, and fail if that is not possible."""
     if block.language == "toml":
         tomllib.loads(block.code)
     elif block.language == "json":

@@ -1,7 +1,6 @@
-"""All that the manual calls exists: functions, their keywords, commands and their options, also in what is not run.
+"""Tests that everything the manual uses exists: functions, keywords, commands and options.
 
-The full suite executes the manual. These tests read it: they are quick, and cover blocks that are
-never executed.
+The full suite executes the manual. These tests only read it: they are quick, and cover blocks that are never executed.
 """
 
 from __future__ import annotations
@@ -116,7 +115,7 @@ def check_keywords(call: ast.Call, function: Any) -> None:
     if not inspect.isfunction(function) and not inspect.isclass(function):
         return
     if inspect.isclass(function) and issubclass(function, Object):
-        # Its signature is complete only after pydantic has built a validator, and lacks the tags.
+        # The signature of a model class is complete only after pydantic has built a validator, and lacks the tags.
         accepted = {"name", *function.model_fields, *function.field_specs()}
         assert {keyword.arg for keyword in call.keywords} - {None} <= accepted, ast.unparse(call)
         return
@@ -177,7 +176,7 @@ def test_a_page_names_what_exists(page: str) -> None:
             try:
                 check_python(code, names)
             except MissingDependency as missing:
-                # CasADi cannot be loaded where another test of this process has loaded OpenSim.
+                # CasADi cannot be loaded after another test of this process has loaded OpenSim.
                 pytest.skip(str(missing))
 
 

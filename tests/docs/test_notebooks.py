@@ -1,4 +1,4 @@
-"""The notebooks of the manual run from beginning to end, each in a folder of its own."""
+"""Run the notebooks of the manual from beginning to end, each in a new folder."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ SHOWN = {
     "mujoco": {"<iframe", "MuJoCo cannot say"},
     "whole_subject": {"<iframe", "worst_marker", "afterwards"},
 }
-"""What the outputs of each must have among them."""
+"""Texts that the outputs of each notebook must contain."""
 
-# They are loaded by the tests: every process of pytest collects all of these.
+# Only check that packages exist: every process of pytest collects this module, and importing them is slow.
 for package in ("ipykernel", "nbclient", "matplotlib", "xarray", "cma", "mujoco", "mkdocs"):
     if find_spec(package) is None:
         pytest.skip(f"needs {package} (extra 'dev')", allow_module_level=True)
