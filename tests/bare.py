@@ -1,8 +1,7 @@
-"""A real environment with the base dependencies of osimlite alone, made in a moment and without a network.
+"""Virtual environment with only the base dependencies of osimlite, created in a moment and without a network.
 
-It is a virtual environment without pip. Its packages are links to those of the environment that
-runs the tests, so that every other package is absent for Python itself: no import system is
-patched, and no function is replaced.
+It has no pip. Its packages are links to those of the environment that runs the tests. All other packages are absent for
+Python itself: no import system is patched, and no function is replaced.
 """
 
 from __future__ import annotations
@@ -23,10 +22,10 @@ CONSOLE_SCRIPT = "import sys; from osimlite.cli import main; sys.exit(main())"
 
 
 class BareEnvironment:
-    """A virtual environment that has osimlite, from this repository, and the packages of some of its extras.
+    """Virtual environment with osimlite from this repository and the packages of some of its extras.
 
     Attributes:
-        python: the interpreter of the environment.
+        python: interpreter of the environment.
     """
 
     def __init__(self, folder: Path, extras: Sequence[str] = ()) -> None:
@@ -36,7 +35,7 @@ class BareEnvironment:
         packages = Path(self._ask("import sysconfig; print(sysconfig.get_path('purelib'))"))
         for distribution in find_distributions(extras):
             _link_distribution(distribution, packages)
-        # The metadata say what `doctor` knows of the extras.
+        # `doctor` reads the extras from the metadata.
         _link_distribution(metadata.distribution("osimlite"), packages, only_metadata=True)
         (packages / "osimlite.pth").write_text(f"{ROOT}\n", encoding="utf-8")
 
@@ -53,8 +52,11 @@ class BareEnvironment:
 
         Args:
             words: arguments of the command.
-            folder: the working folder.
-            code: Python that is run instead of the command.
+            folder: working folder.
+            code: Python code that is run instead of the command.
+
+        Returns:
+            The finished process.
         """
         return subprocess.run(
             [self.python, "-c", code, *map(str, words)],
@@ -68,7 +70,7 @@ class BareEnvironment:
         )
 
     def start(self, *words: object, folder: Path) -> subprocess.Popen[bytes]:
-        """Start the command `osimlite` of the environment in a folder; its input and output are pipes."""
+        """Start the command `osimlite` of the environment in a folder, with pipes as its input and output."""
         return subprocess.Popen(
             [self.python, "-c", CONSOLE_SCRIPT, *map(str, words)],
             stdin=subprocess.PIPE,
@@ -80,7 +82,7 @@ class BareEnvironment:
 
 
 def _clean_environment() -> dict[str, str]:
-    """Return the environment variables without those that lead to packages outside of the environment."""
+    """Return the environment variables without those that lead to packages outside the environment."""
     hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
     return {name: value for name, value in os.environ.items() if name not in hidden} | {
         "COLUMNS": "200"
@@ -88,7 +90,7 @@ def _clean_environment() -> dict[str, str]:
 
 
 def find_distributions(extras: Sequence[str] = ()) -> Iterator[metadata.Distribution]:
-    """Yield the installed distributions that osimlite and some of its extras require, directly or not."""
+    """Yield the installed distributions that osimlite and some of its extras require, directly or indirectly."""
     seen: set[tuple[str, str]] = set()
     pending = [("osimlite", extra) for extra in ("", *extras)]
     yielded = {"osimlite"}
@@ -110,7 +112,7 @@ def find_distributions(extras: Sequence[str] = ()) -> Iterator[metadata.Distribu
 def _link_distribution(
     distribution: metadata.Distribution, packages: Path, *, only_metadata: bool = False
 ) -> None:
-    """Put links to the folders and modules of a distribution into a folder of packages."""
+    """Link the folders and modules of a distribution into a folder of packages."""
     names = {
         file.parts[0]
         for file in distribution.files or []
@@ -125,7 +127,7 @@ def _link_distribution(
         try:
             target.symlink_to(source, target_is_directory=source.is_dir())
         except OSError:
-            # Windows lets only some users make links.
+            # Windows lets only some users create links.
             (shutil.copytree if source.is_dir() else shutil.copy2)(source, target)
 
 

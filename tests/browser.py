@@ -1,4 +1,4 @@
-"""A browser without a window."""
+"""Fixture of a headless browser."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 FLAGS = [
     "--no-sandbox",
     "--disable-dev-shm-usage",
-    # Three dimensions drawn in software: there may be no graphics card.
+    # Render WebGL in software: there may be no graphics card.
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
 ]
 
 
-# Not for the whole session: as long as Playwright is there, an event loop runs, and tests of
-# coroutines cannot.
+# Not for the session: while Playwright exists, it runs an event loop, and tests of coroutines fail.
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """Chromium, driven by Playwright; OSIMLITE_CHROMIUM names its program if it is not on the PATH."""
+    """Yield Chromium, controlled by Playwright; OSIMLITE_CHROMIUM names its program if it is not on the PATH."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra 'dev')")
     program = os.environ.get("OSIMLITE_CHROMIUM") or next(
         filter(None, map(shutil.which, BROWSERS)), None

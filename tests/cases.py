@@ -1,4 +1,4 @@
-"""Thousands of cases of a moment each in a few tests: pytest takes longer for a test than they take."""
+"""Decorator that runs thousands of short cases in one test, because pytest adds more time per test than they take."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from typing import Any
 def of_each(
     cases: Iterable[Any], name: Callable[[Any], str] = str
 ) -> Callable[[Callable[[Any], None]], Any]:
-    """Make one test of a test of one case; whatever cases fail are told together, each with its name."""
+    """Return a decorator that makes one test of the test of one case.
+
+    Args:
+        cases: arguments of the test, one per case.
+        name: function that describes a case in the report.
+
+    Returns:
+        Decorator; its test runs all cases and then raises all failures together, each with the name of its case.
+    """
 
     def made(test: Callable[[Any], None]) -> Callable[[], None]:
         def tests() -> None:

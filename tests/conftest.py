@@ -1,4 +1,4 @@
-"""Fixtures shared by all tests: the repository, its inputs, the shared reference data and the real files."""
+"""Fixtures of all tests: the repository, its inputs, the shared reference data and the models of the corpus."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from tests.bare import BareEnvironment
 from tests.simple_models import read_walker
 from tests.suite import Suite
 
-# For the tests of tests/suite.py and tests/separate.py.
+# tests/test_suite.py and tests/test_separate.py run pytest on small projects.
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).resolve().parent.parent
-# Reference data too large to commit. It stands beside the repository; tests that need it skip
-# without it.
+# Reference data too large to commit, in a folder next to the repository; tests that need it skip without it.
 SHARED = Path(os.environ.get("OSIMLITE_SHARED") or ROOT.parent / "shared")
 NO_SHARED = "needs the shared reference folder, which is not beside this repository"
 ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
-"""How near poses of corpus models are to those on record, which are of files that hold more digits
-than OpenSim converts.
+"""Tolerances of poses for corpus models whose file has more digits than OpenSim keeps when it converts the file.
+
+All other models have a tolerance of 1e-10.
 """
 
 LIBRARY_PATHS = {
     name: os.environ.get(name)
     for name in ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "SIMBODY_HOME")
 }
-"""Variables that an import of OpenSim changes, as they are before it."""
+"""Values of the variables that an import of OpenSim changes, before that import."""
 
-# A busy machine must not fail a property, and CI must fail the same way twice.
+# No deadline: a busy machine must not fail a property. In CI, a property must fail the same way twice.
 settings.register_profile(
     "osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True
 )
@@ -46,7 +46,7 @@ settings.load_profile("osimlite")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options that choose the tests and their order."""
+    """Add the options that select the tests and their order."""
     parser.addoption(
         "--full",
         action="store_true",
@@ -61,7 +61,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
+    """Register the plugins of the suite, and make processes that tests start interruptible.
+
+    A shell that starts pytest in the background makes it ignore SIGINT, and its child processes inherit that.
+    """
     config.pluginmanager.register(
         Suite(config.getoption("--full"), config.getoption("--shuffle")), "osimlite-suite"
     )
@@ -75,28 +78,28 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 ENGINES = {"bullet": "pybullet", "compiled": "numpy"}
-"""Package of each engine."""
+"""Package that each engine needs."""
 
 
 QUICK_CORPUS = {
     "m0072", "m0093", "m0113", "m0117", "m0119", "m0123", "m0134", "m0139", "m0153", "m0166", "m0178", "m0181", "m0321",
     "m0356", "m0459", "m0466", "m0472", "m0713",
 }  # fmt: skip
-"""Real files of the quick suite: the smallest that together have three quarters of all classes in the corpus."""
+"""Corpus models of the quick suite: the smallest that together contain three quarters of all classes in the corpus."""
 
 
 class CorpusModel(NamedTuple):
-    """One real model file, with what OpenSim 4.6 makes of it."""
+    """Model file of the corpus, with reference data from OpenSim 4.6."""
 
     id: str
     path: Path  # as published
     truth: Path  # OpenSim's components, poses and energies: gzipped JSON
-    # OpenSim's own print of it, gzipped; None where OpenSim cannot load the file
+    # OpenSim's own print of the file, gzipped; None if OpenSim cannot load the file
     converted: Path | None
 
 
 def corpus_models() -> list[CorpusModel]:
-    """Every model of the shared corpus in the order of its id; empty where the folder is absent."""
+    """Return all models of the shared corpus in the order of their ids; an empty list without the folder."""
     result = []
     for path in sorted(SHARED.glob("corpus/models/*/*.osim")):
         name = path.parent.name
@@ -107,7 +110,7 @@ def corpus_models() -> list[CorpusModel]:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run a test that asks for `corpus_model` once per real file; the quick suite takes some of the files."""
+    """Run a test with the argument `corpus_model` once per model of the corpus; the quick suite runs some of them."""
     if "corpus_model" in metafunc.fixturenames:
         models: list[object] = [
             pytest.param(
@@ -121,10 +124,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup() -> None:
-    """Take OpenSim's folder out of the paths of programs and libraries, into which its import puts it.
+    """Remove OpenSim's folder from the search paths of programs and libraries, where its import adds it.
 
-    Processes that tests start would load OpenSim's CasADi in place of ours. tests/oracle/conftest.py
-    does the same while tests are collected, before workers are started with these variables.
+    Processes that tests start would otherwise load OpenSim's CasADi instead of the installed one.
+    tests/oracle/conftest.py does the same while tests are collected, before workers inherit these variables.
     """
     for name, value in LIBRARY_PATHS.items():
         if value is None:
@@ -134,7 +137,7 @@ def pytest_runtest_setup() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what reads real files for `-m "not corpus"`, and skip cases of missing engines."""
+    """Mark tests that read the corpus for `-m "not corpus"`, and skip cases of engines that are not installed."""
     missing = [engine for engine, package in ENGINES.items() if find_spec(package) is None]
     for item in items:
         cases = (
@@ -151,7 +154,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def terminal_width() -> Iterator[None]:
-    """Tables are as wide as in a terminal of 80 columns, however wide that of the tests is."""
+    """Set the width of tables to 80 columns, whatever the width of the terminal."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", "80")
         yield
@@ -159,31 +162,31 @@ def terminal_width() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def repo() -> Path:
-    """The root of the repository."""
+    """Return the root of the repository."""
     return ROOT
 
 
 @pytest.fixture(scope="session")
 def fixtures() -> Path:
-    """The small inputs that are committed with the tests."""
+    """Return the folder of the small inputs that are committed with the tests."""
     return ROOT / "fixtures"
 
 
 @pytest.fixture(scope="session")
 def bare(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
-    """An environment with the base dependencies alone."""
+    """Return an environment with only the base dependencies."""
     return BareEnvironment(tmp_path_factory.mktemp("bare") / "environment")
 
 
 @pytest.fixture
 def walker() -> Model:
-    """The dynamic walker as OpenSim wrote it; each test has its own."""
+    """Return the dynamic walker as OpenSim wrote it, a new model for each test."""
     return read_walker()
 
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The shared reference folder."""
+    """Return the shared reference folder."""
     if not SHARED.is_dir():
         pytest.skip(NO_SHARED)
     return SHARED
@@ -191,7 +194,7 @@ def shared() -> Path:
 
 @pytest.fixture(scope="session")
 def corpus(shared: Path) -> list[CorpusModel]:
-    """All real files at once; ask for `corpus_model` instead to run a test once per file."""
+    """Return all models of the corpus; use `corpus_model` instead to run a test once per model."""
     models = corpus_models()
     if not models:
         pytest.skip("needs the folder of real models (corpus) in the shared reference folder")
@@ -200,7 +203,7 @@ def corpus(shared: Path) -> list[CorpusModel]:
 
 @pytest.fixture
 def exact_names(tmp_path: Path) -> None:
-    """A file system that tells letter cases apart, as that of Linux does."""
+    """Skip the test on a file system that ignores the case of letters."""
     (tmp_path / "a").touch()
     if (tmp_path / "A").exists():
         pytest.skip("this file system finds a name in any letter case")
@@ -212,7 +215,7 @@ DESCRIPTORS = Path("/proc/self/fd")
 
 @pytest.fixture
 def windows_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file that is open is neither removed nor replaced: Windows lets others write to it, no more."""
+    """Forbid to remove or replace open files, as Windows does; writing to them stays possible."""
     if not DESCRIPTORS.exists():
         pytest.skip("only Linux tells which files are open")
 

@@ -1,11 +1,11 @@
-"""Check osimlite in an environment with its base dependencies alone: commands, hooks and action on models and projects.
+"""Check osimlite with only its base dependencies: commands, hooks and action on models and projects.
 
-Run it with the Python of an environment into which the wheel, and nothing else, is installed:
+Run it with the Python of an environment into which only the wheel is installed:
 
     ENVIRONMENT/bin/python tests/core_install.py [--models FOLDER] [--all]
 
-It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails,
-prints a traceback, or asks for a package that it should not need.
+It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails, prints a traceback,
+or asks for a package that it should not need.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ OPTIONAL_PACKAGES = (
     "pyarrow",
 )
 PROJECTS = ("pipelines/pendulum", "pipelines/walking", "setups", "documents")
-"""Folders of fixtures that are checked as whole projects."""
+"""Folders of fixtures that are checked as complete projects."""
 
 MIN_MODELS, MIN_PROJECTS = 12, 3
 NOTE = "did not run: they need osimlite[sim]"
-"""What reports say of the rules that need numbers."""
+"""Sentence in reports about rules that need numerical packages."""
 
 NAMES_AN_EXTRA = {
     ("build", "human-walks", "-o", "study"): "sim",
@@ -68,15 +68,15 @@ NAMES_AN_EXTRA = {
     ("lsp",): "lsp",
     ("build", "walker.yaml", "-o", "yaml.osim"): "yaml",
 }
-"""Commands that need more than the base dependencies, and the extra that their message has to name."""
+"""Commands that need more than the base dependencies, and the extra that their message must name."""
 
 
 class Checker:
-    """Runs commands in a working folder, counts their exit codes and collects what is wrong.
+    """Run commands in a working folder, count their exit codes and collect problems.
 
     Attributes:
-        exit_codes: of each command, how often each code came.
-        problems: sentences on what is wrong.
+        exit_codes: number of occurrences of each exit code, by command.
+        problems: sentences that describe what is wrong.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -92,14 +92,17 @@ class Checker:
     def call(
         self, label: str, *words: object, allowed: Iterable[int] = (0, 1)
     ) -> subprocess.CompletedProcess[str]:
-        """Run a command and check its exit code and what it prints.
+        """Run a command, and check its exit code and its output.
 
         Args:
-            label: the row of the table.
+            label: row of the table.
             words: arguments of `osimlite`.
-            allowed: exit codes that are right.
+            allowed: exit codes that are correct.
+
+        Returns:
+            The finished process.
         """
-        # -I as the GitHub action does: nothing is imported from the working folder.
+        # Use -I as the GitHub action does: nothing is imported from the working folder.
         done = subprocess.run(
             [sys.executable, "-I", "-m", "osimlite", *map(str, words)],
             capture_output=True,
@@ -121,7 +124,7 @@ class Checker:
         return done
 
     def check_notes(self, models: Sequence[Path]) -> None:
-        """Check that the reports say which rules were not measured, in text and in JSON, for models with muscles."""
+        """Check that reports on models with muscles name the rules that did not run, in text and in JSON."""
         measurable = [path for path in models if b"Muscle>" in path.read_bytes()]
         for path in measurable[:2]:
             notes = [
@@ -148,7 +151,7 @@ class Checker:
         shutil.copyfile(source, model)
         upgraded = folder / "upgraded.osim"
         if self.call("info", "info", model, allowed=(0, 2)).returncode == 2:
-            # The corpus has a file that nobody can read: the other commands refuse it likewise.
+            # One file of the corpus is unreadable: the other commands must refuse it too.
             for words in (("format", model), ("upgrade", model, "-o", upgraded)):
                 self.call(f"{words[0]} (unreadable)", *words, allowed=(2,))
             return
@@ -157,11 +160,11 @@ class Checker:
         self.call("diff", "diff", model, upgraded)
         self.call("format (hook)", "format", "--skip-other-xml", model)
         self.call("validate --fix", "validate", "--no-cache", "--fix", model)
-        # A file that was formatted and fixed stays as it is.
+        # Formatting and fixing is idempotent: a second run leaves the file as it is.
         self.call("format --check", "format", "--check", model)
 
     def check_project(self, source: Path) -> None:
-        """Check a folder as a user, the pre-commit hook and the GitHub action do."""
+        """Check a folder as a user does, and as the pre-commit hook and the GitHub action do."""
         folder = self.folder / f"project-{source.name}"
         shutil.copytree(source, folder)
         self.call("validate FOLDER", "validate", folder)
@@ -175,7 +178,7 @@ class Checker:
         self.call("validate (action)", "validate", *action, folder)
 
     def check_built_in_models(self) -> None:
-        """Build each built-in model, validate it, and call the commands that need no model."""
+        """Build each built-in model and validate it, and run the commands that need no model."""
         listed = self.call("build --list", "build", "--list", allowed=(0,)).stdout
         for name in (line.split()[0] for line in listed.splitlines() if line[:1].isalpha()):
             if name == "human-walks":
@@ -186,7 +189,7 @@ class Checker:
             self.call("help, rule, doctor", *words, allowed=(0,))
 
     def check_extras(self) -> None:
-        """Check that each command which needs an extra names it in one sentence."""
+        """Check that each command that needs an extra names it in one sentence."""
         self.call("build", "build", "dynamic-walker", "-o", "walker.osim", allowed=(0,))
         for name in ("setup.xml", "markers.trc", "motion.mot", "walker.yaml"):
             (self.folder / name).write_text("")
@@ -206,7 +209,7 @@ class Checker:
 
 
 def find_models(folder: Path, *, everything: bool) -> list[Path]:
-    """Return real models of the shared corpus, spread over it, or models of the fixtures where there is no corpus."""
+    """Return models spread over the shared corpus, or models of the fixtures if there is no corpus."""
     models = sorted(folder.rglob("*.osim"))
     if not models:
         with_joints = [

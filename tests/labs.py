@@ -1,4 +1,4 @@
-"""Small lab pipelines of `fixtures/labs`, copied into a folder and changed by tests."""
+"""Copies of the small lab pipelines in `fixtures/labs`, which tests change, and comparison with OpenSim's results."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ LABS = Path(__file__).parents[1] / "fixtures" / "labs"
 
 
 def copy_lab(name: str, folder: Path) -> Path:
-    """Copy one of the pipelines into a folder; return the folder."""
+    """Copy one of the pipelines into a folder, and return the folder."""
     shutil.copytree(LABS / name, folder, dirs_exist_ok=True)
     return folder
 
 
 def change(path: Path, *pairs: tuple[str, str]) -> None:
-    """Replace words of a file; each must be there."""
+    """Replace texts in a file; each old text must occur."""
     text = path.read_text()
     for old, new in pairs:
         assert old in text, old
@@ -29,14 +29,14 @@ def change(path: Path, *pairs: tuple[str, str]) -> None:
 
 
 def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
-    """Run a setup by OpenSim in a process of its own, from the folder of the setup.
+    """Run a setup file with OpenSim in a separate process, from the folder of the setup.
 
     Args:
-        setup: the file.
+        setup: setup file.
         results: folder of the results.
 
     Returns:
-        Whether OpenSim says that it worked within a minute of processor time, and what it logged.
+        Whether OpenSim reports success within a minute of processor time, and its log.
     """
     results.mkdir(exist_ok=True)
     ended = run_script(_RUN, setup.name, results, folder=setup.parent, check=False)
@@ -58,7 +58,7 @@ print("run:", tool.run())
 
 
 def difference(ours: StoTable | Path, theirs: StoTable | Path) -> float:
-    """Return the largest difference of two tables of the same columns and times, rows without NaN in the first only."""
+    """Return the largest difference between two tables with equal columns and times, where the first has no NaN."""
     one, two = (read_sto(item) if isinstance(item, Path) else item for item in (ours, theirs))
     assert one.columns == two.columns
     assert np.allclose(one.times, two.times, atol=1e-8)

@@ -1,4 +1,4 @@
-"""The end of a process without the end of its interpreter, which takes as long as many a command."""
+"""Fast end of a process that skips the finalization of the interpreter, which takes as long as many a command."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import threading
 
 
 def leave(code: object) -> None:
-    """End this process as `sys.exit` does, but leave the objects of the interpreter to the operating system.
+    """End this process as `sys.exit` does, but do not destroy the objects of the interpreter.
 
-    What is registered for the end is called, threads are waited for, and what Python and C have to
-    write is written. Destructors of what is left are not called: the full suite, and the processes
-    that tests start otherwise, end as Python does.
+    Registered exit functions run, threads are joined, and the buffers of Python and C are flushed. Destructors of
+    remaining objects do not run. The full suite does not use this function, so that there processes end as usual.
 
     Args:
-        code: that of `SystemExit`.
+        code: argument of `SystemExit`.
     """
     threading._shutdown()  # type: ignore[attr-defined]
     atexit._run_exitfuncs()

@@ -1,7 +1,7 @@
-"""nimblephysics as an oracle, in an environment of its own because it needs NumPy 1.
+"""nimblephysics as a reference, in a separate environment because it needs NumPy 1.
 
-The variable OSIMLITE_NIMBLE names the Python of that environment: ``python3.11 -m venv nimble``, then
-``nimble/bin/pip install nimblephysics 'numpy<2'``.
+The variable OSIMLITE_NIMBLE names the Python of that environment: ``python3.11 -m venv nimble``, then ``nimble/bin/pip
+install nimblephysics 'numpy<2'``.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ os.write(1, b"\\nANSWER" + json.dumps(answer).encode() + b"\\n")
 
 
 def ask_nimble(*question: Any) -> Any:
-    """Return what a function of SCRIPT returns in Nimble; skip the test without Nimble."""
+    """Run a function of SCRIPT in Nimble's environment and return its result; skip the test without Nimble."""
     python = os.environ.get(VARIABLE)
     if not python:
         pytest.skip(f"needs nimblephysics: {VARIABLE} names no Python that has it (with numpy<2)")
@@ -105,6 +105,14 @@ def ask_nimble(*question: Any) -> Any:
 
 
 def find_nimble_poses(path: Path, states: Sequence[Sequence[float]]) -> tuple[list[str], list[Any]]:
-    """Return the names of Nimble's degrees of freedom, and the poses of its bodies in ground at some states."""
+    """Compute poses of bodies in Nimble.
+
+    Args:
+        path: model file.
+        states: positions of all degrees of freedom, one list per state.
+
+    Returns:
+        Names of Nimble's degrees of freedom, and the poses of its bodies in ground at each state.
+    """
     answer = ask_nimble("poses", str(path.resolve()), [list(map(float, state)) for state in states])
     return answer["names"], answer["poses"]

@@ -1,4 +1,4 @@
-"""Distribution of tests to workers that goes on when a worker dies."""
+"""Scheduler of pytest-xdist that continues when a worker dies."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ if TYPE_CHECKING:
 
 
 class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
-    """The distribution of pytest-xdist by files, without three faults after the death of a worker.
+    """Distribution of pytest-xdist by files, without three of its faults after the death of a worker.
 
-    That of pytest-xdist 3.8 gives the test that has ended a worker to the next one, until eight have
-    died. It gives work to workers that have not collected yet, which is an internal error. And a
-    new worker gets one file: where that has one test left, the worker waits for another test before
-    it runs that one. After the last two pytest waits for ever.
+    Pytest-xdist 3.8 gives the test that killed a worker to the next worker, until eight have died. It assigns work to
+    workers that have not collected yet, which is an internal error. It also gives a new worker only one file: if one
+    test of that file is left, the worker waits for a second test before it runs the first. After the last two faults
+    pytest waits for ever.
     """
 
     def remove_node(self, node: WorkerController) -> str | None:
-        """Forget a worker, and return the test that it died in; the others of its files are run elsewhere."""
+        """Remove a dead worker and reschedule the remaining tests of its files.
+
+        Returns:
+            Test during which the worker died; None if it had no work left.
+        """
         units = self.assigned_work.pop(node)
         left = {
             file: tests
@@ -29,7 +33,7 @@ class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
         }
         if not left:
             return None
-        # In the order in which the worker has got them.
+        # The worker ran its tests in this order, so it died in the first that is not completed.
         file, test = next(
             (file, test)
             for file, tests in left.items()
@@ -53,5 +57,5 @@ class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
 
 
 def make_scheduler(config: Any, log: Any) -> FileScheduling | None:
-    """Return the distribution for the option ``--dist=loadfile``; pytest-xdist has those for others."""
+    """Return this scheduler for the option ``--dist=loadfile``; pytest-xdist has those of the other options."""
     return FileScheduling(config, log) if config.getoption("dist") == "loadfile" else None

@@ -1,13 +1,14 @@
-"""Scripts in processes of their own that start in a moment: copies of a process that has imported what they need.
+"""Scripts in separate processes that start quickly, as forks of a process that has imported what they need.
 
-OpenSim, CasADi and the commands of osimlite each take most of a second to import, and OpenSim and
-CasADi cannot be in one process. A test that needs one of them in a process of its own calls
-`run_script`. As a program, this module is the process that is copied:
+OpenSim, CasADi and the commands of osimlite each take most of a second to import, and OpenSim and CasADi cannot be in
+one process. A test that needs one of them in a separate process calls `run_script`. As a program, this module is the
+server process that forks:
 
-    python -m tests.scripts INPUT OUTPUT ERRORS MODULE...    numbers of the files that scripts read and write
+    python -m tests.scripts INPUT OUTPUT ERRORS MODULE...
 
-A line of JSON asks for a script: its text, its arguments, its folder, its environment. The answers
-are the number of its process, and its exit code.
+The first three arguments are descriptors of the files that scripts use as standard streams. Each order is a line of
+JSON with the text, the arguments, the folder and the environment of a script. The server answers with the process id of
+the script and, at its end, with the exit code.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ ROOT = Path(__file__).resolve().parent.parent
 OPENSIM = ("opensim",)
 CASADI = ("casadi", "osimlite.moco", "osimlite.optimal.program")
 QUIET = ("-W", "ignore")
-"""Options of Python for scripts that import OpenSim or CasADi, whose bindings warn."""
+"""Options of Python for scripts that import OpenSim or CasADi, whose bindings issue warnings."""
 
 
 def run_script(
@@ -50,26 +51,26 @@ def run_script(
     modules: tuple[str, ...] = OPENSIM,
     options: tuple[str, ...] = QUIET,
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python code in a process of its own.
+    """Run Python code in a separate process.
 
     Args:
         script: the code.
-        words: its arguments.
-        program: its name, which is the first of `sys.argv`.
-        text: its standard input.
-        folder: its working folder; by default the present one.
-        settings: variables of its environment, besides those of this process.
-        timeout: time by the clock after which it is killed, s.
+        words: arguments of the script.
+        program: name of the script, `sys.argv[0]`.
+        text: standard input.
+        folder: working folder; by default the current one.
+        settings: environment variables that are added to those of this process.
+        timeout: wall-clock time after which the script is killed (s).
         check: whether a script that fails is an error.
-        modules: what is imported already when it starts.
+        modules: modules that are already imported when the script starts.
         options: options of Python.
 
     Returns:
-        Its exit code, output and errors.
+        Exit code, output and errors of the script.
 
     Raises:
-        TimeoutExpired: it takes longer than `timeout`.
-        CalledProcessError: it fails, and `check` is true.
+        TimeoutExpired: the script takes longer than `timeout`.
+        CalledProcessError: the script fails, and `check` is true.
     """
     arguments = [str(word) for word in words]
     where = str(folder or Path.cwd())
@@ -97,7 +98,7 @@ def run_script(
         "arguments": [program, *arguments],
         "folder": where,
         "environment": environment,
-        # The full suite sees what Python and libraries say as they end.
+        # In the full suite, scripts run the finalization of Python, so that messages of libraries at the end are seen.
         "ends": is_full(),
     }
     server.stdin.write(json.dumps(order) + "\n")
@@ -125,7 +126,7 @@ def _kill(process: int) -> None:
 
 @cache
 def _start_server(modules: tuple[str, ...], options: tuple[str, ...]) -> tuple[Any, list[Any]]:
-    """Start the process that is copied, and return it with the files that its copies read and write."""
+    """Start the server process, and return it with the files that its forks use as standard streams."""
     # These files stay open until this process ends.
     files = [tempfile.TemporaryFile(buffering=0) for _ in range(3)]  # noqa: SIM115
     numbers = [file.fileno() for file in files]
@@ -144,7 +145,7 @@ def _start_server(modules: tuple[str, ...], options: tuple[str, ...]) -> tuple[A
 
 
 def _stop(server: Any, files: list[Any]) -> None:
-    """End the process, and close what this one has open for it."""
+    """End the server process and close its files."""
     with server:
         server.stdin.close()
     for file in files:
@@ -152,13 +153,13 @@ def _stop(server: Any, files: list[Any]) -> None:
 
 
 def copy_for_orders() -> dict[str, Any]:
-    """Copy this process for each order, and return the order in the copy that is to run it.
+    """Fork this process for each order, and return the order in the child that is to run it.
 
     Raises:
-        SystemExit: no more orders come.
+        SystemExit: there are no more orders.
     """
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    # Collections of garbage would copy the pages of all that is imported.
+    # Garbage collection in the children would copy the memory pages of all imported modules.
     gc.freeze()
     for line in sys.stdin:
         order: dict[str, Any] = json.loads(line)
@@ -179,8 +180,8 @@ def copy_for_orders() -> dict[str, Any]:
 
 
 def main() -> None:
-    """Import the modules, and run a script in each copy of this process."""
-    # Some imports change the paths of programs and libraries; a script has those of its order.
+    """Import the modules, and run one script in each fork of this process."""
+    # Imports may change environment variables and search paths; `copy_for_orders` sets those of the order.
     for name in sys.argv[4:]:
         import_module(name)
     order = copy_for_orders()

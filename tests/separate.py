@@ -1,10 +1,9 @@
-"""Collection of ``check_*.py``: tests that run in a second process beside the one that collects them.
+"""Collection of ``check_*.py``: tests that run in a second process, next to the process that collects them.
 
-OpenSim brings a library of the same name as CasADi's, and one process cannot load both. Tests of
-functions that need CasADi are therefore in files ``check_*.py``. The process that collects such
-files starts a server (``python -m tests.separate``), asks it for the tests in them, and lets it run
-them; each is a test with its own name, marks and duration. A server keeps what it has imported, so
-that its imports are paid once.
+OpenSim contains a library of the same name as CasADi's, and one process cannot load both. Tests of functions that need
+CasADi are therefore in files ``check_*.py``. The process that collects such files starts a server (``python -m
+tests.separate``), which collects and runs their tests. Each of them is a test with its own name, marks and duration.
+The server keeps running, so that it imports modules once.
 """
 
 from __future__ import annotations
@@ -33,12 +32,12 @@ class ServerDiedError(Exception):
 
 
 class CheckServer:
-    """A process that collects and runs tests of ``check_*.py``."""
+    """Process that collects and runs the tests of ``check_*.py``."""
 
     def __init__(self, folder: Path) -> None:
         self.log = tempfile.TemporaryFile()  # noqa: SIM115
         paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-        # Variables of pytest-xdist make pytest believe that it is a worker.
+        # With the variables of pytest-xdist, pytest in the server would act as a worker.
         variables = {
             name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")
         }
@@ -55,7 +54,7 @@ class CheckServer:
         atexit.register(self.close)
 
     def ask(self, *words: str) -> Iterator[Any]:
-        """Call pytest in the server, and return what it reports as it comes."""
+        """Run pytest with these arguments in the server, and yield its reports as they arrive."""
         assert self.process.stdin is not None and self.process.stdout is not None
         with contextlib.suppress(OSError):
             self.process.stdin.write(json.dumps(words) + "\n")
@@ -81,7 +80,7 @@ class CheckServer:
 
 
 class Checks:
-    """Pytest plugin that collects ``check_*.py`` and runs them in a server."""
+    """Pytest plugin that collects ``check_*.py`` and runs their tests in a server."""
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
@@ -93,21 +92,21 @@ class Checks:
 
     @property
     def server(self) -> CheckServer:
-        """The server, started by the first that needs it."""
+        """Server, which is started at the first access."""
         if self._server is None:
             self._server = CheckServer(self.config.rootpath)
         return self._server
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
-        """Tell a worker of pytest-xdist how tests are distributed: its own option says that they are not."""
+        """Send the distribution mode to a worker of pytest-xdist, whose own option always says `no`."""
         node.workerinput[_DIST] = self.config.getoption("dist")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_collect_file(
         self, file_path: Path, parent: pytest.Collector
     ) -> Generator[None, Any, Any]:
-        """Collect a file of checks by the server, and not also as an ordinary module when it is named explicitly."""
+        """Let the server collect a file of checks; pytest must not collect it as well if it is named explicitly."""
         collectors = yield
         if not file_path.match("check_*.py"):
             return collectors
@@ -117,10 +116,10 @@ class Checks:
         """Return name, line and marks of each test in a file.
 
         Raises:
-            CollectError: the file cannot be imported, for example.
+            CollectError: the server reports an error, for example because the file cannot be imported.
         """
         if path not in self._collected:
-            # All files of a folder at once: each call of pytest takes half a second.
+            # Collect all files of a folder at once: each call of pytest takes half a second.
             files = sorted(path.parent.glob("check_*.py"))
             self._collected.update({file: [] for file in files})
             try:
@@ -135,7 +134,7 @@ class Checks:
         return self._collected[path]
 
     def reports(self, item: CheckItem) -> list[Any]:
-        """Return pytest's reports of one test: run it, or wait for it where its file is being run."""
+        """Return pytest's reports of one test: start its file in the server, or wait for it if the file is running."""
         name = item.name
         key = item.nodeid
         try:
@@ -154,12 +153,12 @@ class Checks:
         return self._reports[key]
 
     def _with(self, item: CheckItem) -> list[pytest.Item]:
-        """Return a test and all others that this process will run of its file."""
+        """Return the tests of the same file that this process will run, including this test."""
         if getattr(self.config, "workerinput", {_DIST: "loadfile"})[_DIST] not in (
             "loadfile",
             "loadscope",
         ):
-            # Other workers run some of the others.
+            # Without distribution by files, other workers run some of these tests.
             return [item]
         return [
             other
@@ -169,14 +168,14 @@ class Checks:
 
     def _run(self, items: Sequence[pytest.Item]) -> None:
         for report in self._running:
-            # Tests of another file that nobody has waited for.
+            # The remaining tests of the previous file finish first; their reports are saved.
             self._reports.setdefault(report["nodeid"], []).append(report)
         self._requested.update(item.nodeid for item in items)
         options = ["--full"] if self.config.getoption("--full", False) else []
         self._running = self.server.ask(*options, *(item.nodeid for item in items))
 
     def drop_server(self) -> None:
-        """Forget a server that has died: the next test starts another."""
+        """Remove a server that has died; the next test starts another one."""
         self._running = iter(())
         self._requested = set(self._reports)
         if self._server is not None:
@@ -189,14 +188,14 @@ class Checks:
 
 
 class CheckFile(pytest.File):
-    """A file of tests that run in the server."""
+    """File of tests that run in the server."""
 
     def __init__(self, *, checks: Checks, **words: Any) -> None:
         super().__init__(**words)
         self.checks = checks
 
     def collect(self) -> Iterator[pytest.Item]:
-        """Yield its tests.
+        """Yield the tests of this file.
 
         Raises:
             Skipped: CasADi is not installed.
@@ -211,25 +210,25 @@ class CheckFile(pytest.File):
 
 
 class CheckItem(pytest.Item):
-    """A test that runs in the server."""
+    """Test that runs in the server."""
 
     parent: CheckFile
 
     def __init__(self, *, line: int, **words: Any) -> None:
         super().__init__(**words)
         self.line = line
-        # The server has the limits: this process may wait for what else runs there.
+        # The server applies the time limit; this process may also wait for other tests there.
         self.add_marker(pytest.mark.timeout(0))
 
     def runtest(self) -> None:
-        """Do nothing: the reports are those of the server."""
+        """Do nothing: the reports come from the server."""
 
     def reportinfo(self) -> tuple[Path, int, str]:
-        """Say where the test is."""
+        """Return file, line and name of the test."""
         return self.path, self.line, self.name
 
     def run(self) -> list[pytest.TestReport]:
-        """Let the server run the test, and return its reports."""
+        """Run the test in the server, and return its reports."""
         try:
             reports = self.parent.checks.reports(self)
         except ServerDiedError as error:
@@ -239,7 +238,7 @@ class CheckItem(pytest.Item):
             ]
         for data in reports:
             if data["outcome"] == "skipped" and isinstance(data["longrepr"], list):
-                # JSON has no tuples, and pytest asks for one here.
+                # JSON has no tuples, but pytest requires one here.
                 data["longrepr"] = tuple(data["longrepr"])
         return [
             self.config.hook.pytest_report_from_serializable(config=self.config, data=data)
@@ -249,7 +248,7 @@ class CheckItem(pytest.Item):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
-    """Report what the server reports of a check; nothing of it is set up in this process."""
+    """Forward the server's reports of a check; this process does no setup for it."""
     if not isinstance(item, CheckItem):
         return None
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
@@ -260,18 +259,18 @@ def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
 
 
 class Answers:
-    """Pytest plugin of the server: it writes tests and reports as lines of JSON."""
+    """Pytest plugin of the server that writes collected tests and reports as lines of JSON."""
 
     def __init__(self, stream: Any) -> None:
         self.stream = stream
         self.config: pytest.Config | None = None
 
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Keep what serialises reports."""
+        """Save the configuration, whose hooks serialize reports."""
         self.config = config
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Write what has been collected, where no more is asked."""
+        """Write the collected tests if only collection was requested."""
         if session.config.option.collectonly:
             for item in session.items:
                 marks = sorted(
@@ -301,26 +300,26 @@ class Answers:
         )
 
     def write(self, answer: Any) -> None:
-        """Write one line."""
+        """Write an object as one line."""
         self.stream.write(json.dumps(answer, default=str) + "\n")
         self.stream.flush()
 
 
 def is_server(config: pytest.Config) -> bool:
-    """Say whether this is pytest in the server."""
+    """Return whether this pytest runs in the server."""
     return config.pluginmanager.has_plugin(_SERVER)
 
 
 def serve() -> None:
-    """Call pytest for each line of JSON on standard input; a line ``null`` ends what it reports."""
+    """Run pytest for each line of JSON on standard input; a line ``null`` ends its reports."""
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    # What pytest prints is in its reports; and libraries print to the file descriptor.
+    # The reports contain what pytest prints. Libraries print to the file descriptor, so it is redirected.
     with open(os.devnull, "w") as nothing:
         os.dup2(nothing.fileno(), 1)
     answers = Answers(stream)
 
     class Server:
-        """Pytest plugin that registers the other under the name that `is_server` asks for."""
+        """Pytest plugin that registers `answers` under the name that `is_server` looks for."""
 
         def pytest_addoption(self, pluginmanager: pytest.PytestPluginManager) -> None:
             pluginmanager.register(answers, _SERVER)

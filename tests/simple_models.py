@@ -1,4 +1,4 @@
-"""Small models that tests of several packages start from. Each call returns a new one."""
+"""Small models that tests of several packages start from; each call returns a new model."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ def make_single_body(
     turned: Vector = (0.0, 0.0, 0.0),
     **properties: Any,
 ) -> osimlite.Model:
-    """Return a model of one body on a joint to ground.
+    """Return a model with one body that a joint connects to ground.
 
     Args:
-        joint: a joint without frames.
-        components: what is added besides, such as forces.
-        name: the name of the model.
-        body: the name of the body.
-        gravity: in m/s²; the default of OpenSim without it.
-        at: where the joint is in ground, in m.
-        child_at: where it is on the body.
-        turned: how the joint is turned in ground, in rad about the axes of the body in turn.
-        properties: those of the body; a mass of 1 kg and moments of inertia of 1 kg m² without them.
+        joint: joint without frames.
+        components: components that are added to the model, such as forces.
+        name: name of the model.
+        body: name of the body.
+        gravity: gravity (m/s²); None for OpenSim's default.
+        at: position of the joint in ground (m).
+        child_at: position of the joint on the body (m).
+        turned: orientation of the joint frame in ground, as body-fixed X-Y-Z angles (rad).
+        properties: properties of the body; the default is a mass of 1 kg and principal moments of inertia of 1 kg m².
     """
     model = osimlite.Model(name=name)
     if gravity is not None:
@@ -55,21 +55,21 @@ def make_single_body(
 
 
 def make_pendulum(body: str = "bob", **properties: Any) -> osimlite.Model:
-    """Return a body on a pin."""
+    """Return a model of a body on a pin joint."""
     return make_single_body(osimlite.PinJoint(name="pin"), name="pendulum", body=body, **properties)
 
 
 def make_slide(
     *forces: Any, coordinate: str = "x", default_value: float = 0.0, **properties: Any
 ) -> osimlite.Model:
-    """Return a body on a slider joint `slide` along x, with forces."""
+    """Return a model of a body on a slider joint `slide` along x, with forces."""
     moved = osimlite.Coordinate(name=coordinate, default_value=default_value)
     joint = osimlite.SliderJoint(name="slide", coordinates=[moved])
     return make_single_body(joint, *forces, **{"name": "slide", **properties})
 
 
 def make_marked_body(points: Mapping[str, Sequence[float]], name: str = "one") -> osimlite.Model:
-    """Return a free body `b` on the joint `j`, with markers at these places (m)."""
+    """Return a model of a free body `b` on the joint `j`, with markers at these positions (m)."""
     model = make_single_body(osimlite.FreeJoint(name="j"), name=name, body="b")
     for marker, point in points.items():
         location = (float(point[0]), float(point[1]), float(point[2]))

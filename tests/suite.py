@@ -1,6 +1,6 @@
-"""The quick and the full suite: the option ``--full``, how tests ask which of the two runs, and their order.
+"""Pytest plugin for the quick and the full suite: the options ``--full`` and ``--shuffle``.
 
-It also ends a process in which a test hangs, and tells pytest-xdist to go on when one has ended.
+It also ends a process in which a test hangs, and makes pytest-xdist continue after the end of a worker.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ from tests.quick_cases import QUICK_CASES, QUICK_STRIDES
 
 HOW = "`pytest --full` runs them"
 SECONDS_TO_END = 60.0
-"""What tearing down a test that has timed out may take, besides a fifth of its limit."""
+"""Time (s) that a test may take to end after its timeout, in addition to a fifth of its limit."""
 _ANSWER = "tests_of_the_full_suite"
 _state = {"full": False, "deselected": 0}
 
 
 def is_full() -> bool:
-    """Say whether the full suite runs: known before test modules are imported, in workers too."""
+    """Return whether the full suite runs; this is known before test modules are imported, also in workers."""
     return _state["full"] is True
 
 
 def choose(quick: Any, full: Any) -> Any:
-    """Return the first value in the quick suite and the second in the full one: sizes, counts, spans of time."""
+    """Return `quick` in the quick suite and `full` in the full one, for example sizes, counts or durations."""
     return full if is_full() else quick
 
 
 class Suite:
-    """Pytest plugin that leaves tests marked ``full`` out unless the option ``--full`` is given."""
+    """Pytest plugin that deselects tests marked ``full`` unless the option ``--full`` is set."""
 
     def __init__(self, full: bool, seed: int | None = None) -> None:
         _state["full"] = full
         self.seed = seed
 
     def pytest_report_header(self) -> str:
-        """Name the suite. The count follows at the end: workers collect the tests, after this header."""
+        """Name the suite; the number of tests follows at the end, because workers collect them after this header."""
         order = "" if self.seed is None else f"; in random order {self.seed}"
         if is_full():
             return f"suite: full{order}"
@@ -55,7 +55,7 @@ class Suite:
     ) -> None:
         """Deselect the tests of the full suite."""
         if not separate.is_server(config):
-            # The process that asks for tests of `check_*.py` has chosen them, and their order.
+            # In the server of `check_*.py`, the process that requests tests has already selected and ordered them.
             _mark_cases(config, items)
             if self.seed is not None:
                 items[:] = shuffle_tests(items, self.seed)
@@ -69,16 +69,16 @@ class Suite:
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        """Leave all that has been imported and collected out of the searches of Python's garbage collector.
+        """Exclude imported modules and collected tests from garbage collection.
 
-        These objects live as long as the process, and are far more than those of any test.
+        These objects live as long as the process, and far outnumber those of a single test.
         """
         if not separate.is_server(session.config):
             gc.freeze()
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> Any:
-        """Distribute tests in a way that goes on when a worker dies."""
+        """Return a scheduler that continues when a worker dies."""
         from tests.scheduling import make_scheduler
 
         return make_scheduler(config, log)
@@ -89,7 +89,7 @@ class Suite:
     ) -> Generator[None, Any, Any]:
         """End the process some time after pytest-timeout should have ended the test.
 
-        Pytest-timeout raises in Python code, which never comes where a library hangs.
+        Pytest-timeout raises an exception in Python code, which never happens while a library hangs.
         """
         if settings.timeout > 0:
             faulthandler.dump_traceback_later(
@@ -101,29 +101,29 @@ class Suite:
 
     @pytest.hookimpl(optionalhook=True, wrapper=True)
     def pytest_timeout_cancel_timer(self, item: pytest.Item) -> Generator[None, Any, Any]:
-        """Let the process live: the test has ended in time."""
+        """Cancel the end of the process: the test has ended in time."""
         faulthandler.cancel_dump_traceback_later()
         return (yield)
 
     def pytest_report_collectionfinish(self) -> list[str]:
-        """Count the tests that were left out, where this process has collected them itself."""
+        """Report the number of deselected tests if this process has collected them itself."""
         return _describe(_state["deselected"])
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Send the count from a worker of pytest-xdist to the process that reports."""
+        """Send the number of deselected tests from a worker of pytest-xdist to the process that reports."""
         output = getattr(session.config, "workeroutput", None)
         if output is not None:
             output[_ANSWER] = _state["deselected"]
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
-        """Take the count from a worker; all workers collect the same tests."""
+        """Receive the number of deselected tests from a worker; all workers collect the same tests."""
         _state["deselected"] = getattr(node, "workeroutput", {}).get(_ANSWER, _state["deselected"])
 
     def pytest_terminal_summary(self, terminalreporter: Any, config: pytest.Config) -> None:
-        """Repeat the count before pytest's last line, and let that line contain it."""
+        """Print the number of deselected tests, also in pytest's last line."""
         if getattr(config.option, "numprocesses", None):
-            # Pytest counts what it deselects in its own process only.
+            # Pytest counts only tests that are deselected in its own process.
             terminalreporter.stats.setdefault(
                 "deselected", [SimpleNamespace()] * _state["deselected"]
             )
@@ -132,10 +132,10 @@ class Suite:
 
 
 def shuffle_tests(items: Sequence[pytest.Item], seed: int) -> list[pytest.Item]:
-    """Return tests in a random order: the files, and the tests of each file.
+    """Return the tests in a random order of files, with a random order in each file.
 
-    A file stays together, for what its tests share is set up once. Every worker must get the same
-    order, so it depends on the seed alone.
+    The tests of a file stay together because they share fixtures. Every worker must get the same order, so the order
+    depends on the seed alone.
     """
     draw = random.Random(seed)
     files: dict[str, list[pytest.Item]] = {}
@@ -147,10 +147,10 @@ def shuffle_tests(items: Sequence[pytest.Item], seed: int) -> list[pytest.Item]:
 
 
 def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the cases of expensive tests that the quick suite does not take.
+    """Mark the cases of expensive tests that the quick suite leaves out.
 
     Raises:
-        UsageError: a case that it should take does not exist.
+        UsageError: a case that the quick suite should run does not exist.
     """
     seen: dict[str, set[str]] = {}
     counts: dict[str, int] = {}

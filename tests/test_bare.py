@@ -1,4 +1,4 @@
-"""Commands in a real environment that has the base dependencies alone, without numpy."""
+"""Tests of commands in a real environment that has only the base dependencies, without numpy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def test_optional_packages_are_absent(bare: BareEnvironment, tmp_path: Path) -> 
 
 
 def test_a_custom_joint_is_validated(bare: BareEnvironment, fixtures: Path, tmp_path: Path) -> None:
-    """The linter evaluates functions of joints without numpy."""
+    """Joint functions are evaluated without numpy."""
     models = sorted(
         str(path) for path in fixtures.glob("lint/*/*.osim") if b"<CustomJoint" in path.read_bytes()
     )
@@ -28,7 +28,7 @@ def test_a_custom_joint_is_validated(bare: BareEnvironment, fixtures: Path, tmp_
 
 
 def test_the_language_server_needs_its_own_extra_alone(fixtures: Path, tmp_path: Path) -> None:
-    """Editors get findings of a model with a custom joint from an environment with the extra `lsp`, without numpy."""
+    """Editors get findings about a custom joint in an environment with the extra `lsp`, without numpy."""
     pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
     environment = BareEnvironment(tmp_path / "environment", ("lsp",))
     text = (fixtures / "lint" / "OSIM413" / "fail-01-example.osim").read_text(encoding="utf-8")

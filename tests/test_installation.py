@@ -1,4 +1,4 @@
-"""What pip is asked for has wheels: nobody is to compile PyBullet without having asked for it by name."""
+"""Tests of the dependencies: pip finds a wheel for each on common machines, and never has to compile PyBullet."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ARM = {**HERE, "platform_machine": "aarch64"}
 
 
 def asked(extra: str, machine: dict[str, str], python: str) -> list[Requirement]:
-    """What `pip install osimlite[extra]` wants there."""
+    """Return the requirements of `osimlite[extra]` on a machine with these environment markers."""
     there = {
         **machine,
         "python_version": python,

@@ -1,4 +1,4 @@
-"""What the README says is run."""
+"""Tests of the README: its examples run, and its commands and options exist."""
 
 from __future__ import annotations
 

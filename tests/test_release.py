@@ -1,4 +1,4 @@
-"""What a release is made of agrees with the package: its version, what it requires, and the files that others read."""
+"""Tests of the files of a release: version, dependencies and metadata agree with the package."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LINUX = {"sys_platform": "linux", "platform_machine": "x86_64", "python_version"
 
 
 def read(path: Path) -> Any:
-    """A YAML or JSON file of the repository; what a source distribution lacks is skipped."""
+    """Read a YAML or JSON file of the repository; skip the test if a source distribution lacks the file."""
     if not path.exists():
         pytest.skip(f"{path.name} is in the repository only")
     return yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -64,7 +64,7 @@ def test_workflows_can_be_read_and_run_nothing_of_a_stranger_with_rights(repo: P
     for file in files:
         workflow = read(file)
         assert workflow["jobs"] and workflow["permissions"]["contents"] == "read"
-        # YAML 1.1 takes the key `on` for true.
+        # YAML 1.1 reads the key `on` as true.
         assert "pull_request_target" not in workflow[True]
 
 

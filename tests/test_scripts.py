@@ -1,4 +1,4 @@
-"""Scripts in copies of a process that has imported what they need."""
+"""Tests of `tests.scripts`, which runs scripts in forks of a process."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_a_script_has_its_folder_words_and_streams(tmp_path: Path) -> None:
     code = "import os, sys\nprint(os.getcwd(), sys.argv[1:])\nprint('no', file=sys.stderr)\nassert not sys.stdin.read()"
     done = run_script(code, "a", 2, folder=tmp_path, modules=MODULES)
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{tmp_path} ['a', '2']\n", "no\n")
-    # Nothing is left of the one before.
+    # Output of the previous script is not repeated.
     assert run_script("", modules=MODULES).stdout == ""
 
 

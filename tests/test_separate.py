@@ -1,4 +1,4 @@
-"""Files ``check_*.py``: their tests are seen by pytest, and run in a process of their own."""
+"""Tests of `tests.separate`: pytest collects the tests of ``check_*.py`` and runs them in a separate process."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def pytest_configure(config):
 def project(
     pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPatch
 ) -> pytest.Pytester:
-    """A project with checks."""
+    """Return a project with files of checks."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     pytester.makeini(
         f"[pytest]\npythonpath = {repo}\nmarkers = full: of the full suite\naddopts = --import-mode=importlib"

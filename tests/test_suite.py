@@ -1,4 +1,4 @@
-"""The options ``--full`` and ``--shuffle`` of the tests, and what a run without them says."""
+"""Tests of `tests.suite`: the options ``--full`` and ``--shuffle``, and the messages of a run without them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WORKERS = [
 def project(
     pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPatch
 ) -> pytest.Pytester:
-    """A project with our two suites and the tests above."""
+    """Return a project that uses the plugin of the two suites and contains CASES."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     pytester.makeini(
         f"[pytest]\npythonpath = {repo}\nmarkers = full: of the full suite\naddopts = --import-mode=importlib"
@@ -83,7 +83,7 @@ def test_a_seed_gives_a_random_order_that_workers_share(project: pytest.Pytester
     assert sorted(first) == order()
     assert order("--shuffle", "1") == first
     assert order("--shuffle", "2") != first
-    # Each file stays together, though its tests change places.
+    # Each file stays together, though its tests are shuffled.
     assert [line[:9] for line in first] == [
         file for file in dict.fromkeys(line[:9] for line in first) for _ in range(6)
     ]

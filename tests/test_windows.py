@@ -1,4 +1,4 @@
-"""What Windows does otherwise, as far as another system can act it."""
+"""Tests of the behaviour on Windows, as far as another system can imitate it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from osimlite.simulation import Trajectory
 
 
 class Results:
-    """The files of a simulation that takes no time."""
+    """Simulation results that are written without a simulation."""
 
     def write(self, folder: Path) -> list[Path]:
         (folder / "states.sto").write_text("later")
@@ -75,7 +75,7 @@ def test_files_are_checked_by_processes_that_begin_from_nothing(
 ) -> None:
     files = [str(path) for path in sorted((fixtures / "lint" / "OSIM301").glob("*.osim"))]
     alone = check_files(files, Config(), cached=False, processes=1)
-    # But for Linux, processes are spawned.
+    # Only Linux forks processes; other systems spawn them.
     monkeypatch.setattr("sys.platform", "darwin")
     spawned = check_files(files, Config(), cached=False, processes=2)
     assert spawned.findings == alone.findings and alone.findings
