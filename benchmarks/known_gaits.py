@@ -169,7 +169,7 @@ def add_planar_joint(model: Model, body: Body) -> None:
     )
 
 
-# ------------------------------------------------------------------------------------------------ rimless wheel
+# ------------------------------------------------------------------------------------ rimless wheel
 def build_wheel(ground: Ground, spokes: int, slope: float, inertia: float) -> Model:
     """Return a rimless wheel of 1 kg on spokes of 1 m.
 
@@ -193,8 +193,8 @@ def build_wheel(ground: Ground, spokes: int, slope: float, inertia: float) -> Mo
 def compute_rigid_speed(spokes: int, slope: float, inertia: float) -> float:
     """Return the speed of the wheel with rigid contact just before an impact (rad/s).
 
-    An impact multiplies the speed by a factor. In the steady state, the energy that it takes is what
-    gravity adds until the next impact.
+    An impact multiplies the speed by a factor. In the steady state, the energy that it takes is
+    what gravity adds until the next impact.
 
     Args:
         spokes: number of spokes.
@@ -241,7 +241,7 @@ def measure_wheel_speed(
         return float(np.mean(speeds[-8:])), rigid
 
 
-# ---------------------------------------------------------------------------------------------- two straight legs
+# -------------------------------------------------------------------------------- two straight legs
 def build_legs(ground: Ground, parameters: LegParameters) -> Model:
     """Return a walker with two straight legs of 1 m, each with a point mass."""
     model = Model(name="TwoLegs", gravity=(0.0, -GRAVITY, 0.0))
@@ -260,7 +260,7 @@ def build_legs(ground: Ground, parameters: LegParameters) -> Model:
 
 
 class Legs:
-    """Simulation of two straight legs whose swing foot has no contact until it has passed the other.
+    """Simulation of two straight legs whose swing foot has no contact until it is ahead.
 
     Args:
         ground: parameters of the contact.
@@ -282,7 +282,7 @@ class Legs:
     def _disable_contact(self, foot: str, ground: Ground, parameters: LegParameters) -> Any:
         """Return the parameters of the engine in which one foot has no contact.
 
-        The foot has no stiffness instead of no contact, so that the layout of the engine is the same.
+        The contact remains with a stiffness of zero, so that the layout of the engine is the same.
         """
         # Each foot needs parameters of its own, since either may swing.
         model = build_legs(ground, parameters)

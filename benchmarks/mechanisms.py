@@ -3,13 +3,13 @@
     python benchmarks/mechanisms.py
 
 An evaluation is one call from Python: from the state to the accelerations, under gravity and
-constraints only. Compared are osimlite with PyBullet, osimlite's compiled kernels, and OpenSim. They
-run in turn in one process; the tables show the median of the rounds, each the mean of several calls,
-in microseconds. The ratio is that of the time with PyBullet to the time of OpenSim.
+constraints only. Compared are osimlite with PyBullet, osimlite's compiled kernels, and OpenSim.
+They run in turn in one process; the tables show the median of the rounds, each the mean of several
+calls, in microseconds. The ratio is that of the time with PyBullet to the time of OpenSim.
 
-The first table has chains of pendulums and is followed by the growth of the times with the number of
-degrees of freedom. The second has models of the shared corpus without their forces, and is omitted
-if the corpus is absent.
+The first table has chains of pendulums and is followed by the growth of the times with the number
+of degrees of freedom. The second has models of the shared corpus without their forces, and is
+omitted if the corpus is absent.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def prepare_opensim(model: Model, q: Any, u: Any) -> Call:
         coordinate.setSpeedValue(state, float(u[index]))
 
     def evaluate() -> None:
-        # Setting the time invalidates the results in the state, so that OpenSim computes them again.
+        # Setting the time invalidates the results, so that OpenSim computes them again.
         state.setTime(0.0)
         opensim_model.realizeAcceleration(state)
 
@@ -226,6 +226,7 @@ def prepare_opensim(model: Model, q: Any, u: Any) -> Call:
 def time_in_turn(calls: dict[str, Call | None]) -> Times:
     """Return the median time of each call (s); the calls take turns."""
     rounds: dict[str, list[float]] = {name: [] for name in calls}
+    # Fast calls are repeated more often, so that all rounds take about as long.
     counts: dict[str, int] = {}
     for _ in range(ROUNDS):
         for name, call in calls.items():

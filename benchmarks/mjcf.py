@@ -9,13 +9,13 @@ FOLDER contains clones of the repositories with the published models; missing on
     git clone https://github.com/MyoHub/myo_sim
     git clone https://github.com/opensim-org/opensim-models
 
-The published files are older than MuJoCo 4, which interprets side sites differently: install MuJoCo 3
-for this comparison.
+The published files are older than MuJoCo 4, which interprets side sites differently: install MuJoCo
+3 for this comparison.
 
 Each translation is compared with the OpenSim model in the same random poses. The columns are the
-processor time of the translation (s), the errors of muscle lengths (mm) and of moment arms (mm), the
-error of the muscle force as a fraction of the maximum isometric force, the number of muscles whose
-fiber length is wrong by more than 10 %, and the greatest factor by which one is wrong.
+processor time of the translation (s), the errors of muscle lengths (mm) and of moment arms (mm),
+the error of the muscle force as a fraction of the maximum isometric force, the number of muscles
+whose fiber length is wrong by more than 10 %, and the greatest factor by which one is wrong.
 """
 
 from __future__ import annotations
@@ -106,6 +106,7 @@ def write_loadable_copy(file: Path) -> Path:
 
 def print_own_translations(model: osimlite.Model, version: Version) -> None:
     """Translate a model with each fit, and print one line for each."""
+    # All translations go into one folder: the later ones overwrite the earlier.
     with TemporaryDirectory() as folder:
         for fit in FITS:
             # Processor time, because other work on the machine counts little then.

@@ -1,4 +1,4 @@
-"""Simulation speed in MuJoCo, with osimlite's plain file and with its driver, compared with OpenSim.
+"""Simulation speed in MuJoCo, with osimlite's plain file and its driver, compared with OpenSim.
 
     python benchmarks/motion_in_mujoco.py
     python benchmarks/motion_in_mujoco.py FILE.osim...

@@ -1,4 +1,4 @@
-"""Speed of `osimlite sweep` with a muscle-driven model, compared with a loop over OpenSim's Manager.
+"""Speed of `osimlite sweep` with a muscle-driven model, compared with OpenSim's Manager.
 
     python benchmarks/muscle_sweep.py
 

@@ -193,7 +193,7 @@ def time_evaluations(
     )
 
 
-# ---------------------------------------------------------------------------------------------- one evaluation
+# ----------------------------------------------------------------------------------- one evaluation
 def draw_offsets(count: int) -> np.ndarray:
     """Return small random offsets (poses, count) of coordinates, rad or m."""
     return np.random.default_rng(0).uniform(-0.02, 0.02, (POSES, count))
@@ -241,7 +241,7 @@ def prepare_opensim_poses(model: Any, evaluate: Callable[[Any], object]) -> Call
     return run
 
 
-# ----------------------------------------------------------------------------------------------------- motions
+# ------------------------------------------------------------------------------------------ motions
 def prepare_motions(simulation: Simulation) -> Callable[[], Any]:
     """Return a function that simulates from equilibrium and returns the trajectory."""
     return lambda: simulation.run(TO, accuracy=ACCURACY, report_interval=TO, equilibrate=True)
@@ -294,7 +294,7 @@ def compare_ends(simulation: Simulation, ours: Any, theirs: Any) -> tuple[str, s
     return str(ours.summary["steps"]), str(opensim_steps), f"{difference:.1e}"
 
 
-# ------------------------------------------------------------------------------------ moment arms, equilibrium
+# ------------------------------------------------------------------------- moment arms, equilibrium
 def prepare_moment_arms(model: Any, opensim_model: Any) -> Callable[[], object]:
     """Return a function that computes all moment arms in OpenSim's default pose."""
     paths = osimlite.paths(model)
@@ -337,11 +337,12 @@ def prepare_equilibria(simulation: Simulation) -> Callable[[], None]:
     return run
 
 
-# --------------------------------------------------------------------------------------- first use, many runs
+# ----------------------------------------------------------------------------- first use, many runs
 def measure_first_use(path: Path) -> str:
     """Return the times of two new processes that simulate a model, the first without a cache."""
     with tempfile.TemporaryDirectory() as cache:
         environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
+        # The cache is empty for the first process, and filled by it for the second.
         command = [sys.executable, "-c", FIRST_USE_SCRIPT, str(path)]
         seconds = []
         for _ in range(2):

@@ -4,8 +4,8 @@
 
 FOLDER contains the sources of opensim-core, or is its git directory, as for benchmarks/optimal.py.
 Both methods are osimlite's and use one model, with muscles of De Groote and Fregly. OpenSim's
-StaticOptimization does not support these muscles; for a check of ours, both programs also solve with
-the original muscles of the file, and the largest difference of an activation is printed.
+StaticOptimization does not support these muscles; for a check of ours, both programs also solve
+with the original muscles of the file, and the largest difference of an activation is printed.
 
 The table in Markdown has, for each muscle, the mean activation and the largest force of MocoInverse
 and then of StaticOptimization, the root mean square of the difference of the forces, and their
@@ -164,7 +164,7 @@ def run_analysis(
     if not all(file.exists() for file in files):
         raise SystemExit(f"{arguments}: {(done.stdout + done.stderr)[-2000:]}")
     tables = [read_sto(file) for file in files]
-    # osimlite does not overwrite results, and the next analysis has files of the same names.
+    # osimlite does not overwrite results, and another analysis has files of the same names.
     for file in files:
         file.unlink()
     return tables

@@ -4,19 +4,19 @@
     python benchmarks/mutants.py --lines lines.sqlite --count 200 --seed 1 >quick.txt
     python benchmarks/mutants.py --lines lines.sqlite --full --again quick.txt
 
-A mutant is the source with one operator, constant or condition changed at random. For each mutant, the
-tests that run its line are called in a copy of the repository, until the first failure. The mutant is
-*killed* if a test fails that passes without it; otherwise it *survives*.
+A mutant is the source with one operator, constant or condition changed at random. For each mutant,
+the tests that run its line are called in a copy of the repository, until the first failure. The
+mutant is *killed* if a test fails that passes without it; otherwise it *survives*.
 
-The first command runs the quick suite once under coverage and records which tests run which lines. Its
-further arguments go to pytest; records of several folders are merged. The second command tries mutants.
-Without a record, and for a line that no test runs in Python (it may be compiled), the tests of the
-package are called. The third command tries the survivors of the second one again, with all tests of the
-same files, including those of the full suite.
+The first command runs the quick suite once under coverage and records which tests run which lines.
+Its further arguments go to pytest; records of several folders are merged. The second command tries
+mutants. Without a record, and for a line that no test runs in Python (it may be compiled), the
+tests of the package are called. The third command tries the survivors of the second one again, with
+all tests of the same files, including those of the full suite.
 
-Each mutant has a line with its outcome, the time, the number of tests, and the change; the next line
-has the test that failed. The last line has the number of killed mutants. A mutant of a kernel changes
-its digest, so that it is compiled again, or runs in Python if there is no compiler.
+Each mutant has a line with its outcome, the time, the number of tests, and the change; the next
+line has the test that failed. The last line has the number of killed mutants. A mutant of a kernel
+changes its digest, so that it is compiled again, or runs in Python if there is no compiler.
 """
 
 from __future__ import annotations
@@ -132,7 +132,11 @@ class _Source:
             self.line_starts.append(self.line_starts[-1] + len(line))
 
     def get_range(self, node: ast.expr) -> tuple[int, int]:
-        """Return the offsets of the first byte of a node and after its last one."""
+        """Return the offsets of a node in the file.
+
+        Returns:
+            Offset of the first byte, and offset after the last one.
+        """
         assert node.end_lineno is not None and node.end_col_offset is not None
         start = self.line_starts[node.lineno - 1] + node.col_offset
         return start, self.line_starts[node.end_lineno - 1] + node.end_col_offset
@@ -172,7 +176,7 @@ class _Source:
 
 
 def _iterate_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the syntax nodes inside functions. Every test detects changes of what runs on import."""
+    """Yield the syntax nodes inside functions: every test would detect changes outside of them."""
     for child in ast.walk(node):
         if isinstance(child, ast.FunctionDef):
             for statement in child.body:
@@ -213,8 +217,8 @@ class Lines:
     """
 
     def __init__(self, file: Path) -> None:
-        # The tables are documented in "Coverage.py database schema". The reader of coverage needs minutes
-        # for a file of this size.
+        # The tables are documented in "Coverage.py database schema". The reader of coverage needs
+        # minutes for a file of this size.
         self.data = sqlite3.connect(file)
         self.files: dict[str, list[int]] = {}
         for number, name in self.data.execute("select id, path from file"):
@@ -224,14 +228,15 @@ class Lines:
         self.sizes = {
             _find_test_name(context): size
             for context, size in self.data.execute(
-                "select context, count(*) from arc join context on context_id = context.id group by context_id"
+                "select context, count(*) from arc join context on context_id = context.id"
+                " group by context_id"
             )
         }
 
     def find_tests(self, mutant: Mutant) -> list[str]:
         """Return the tests that run the line of a mutant.
 
-        Tests of its package come first. Of these, tests that run few lines come first, since they are
+        Tests of its package come first, and of these the ones that run few lines, since they are
         the quickest.
         """
         tests = {
@@ -252,7 +257,7 @@ class Lines:
 
 
 def _find_test_name(context: str) -> str:
-    """Return the test of a context, without the phase and without the context of a parent process."""
+    """Return the test of a context, without its phase and the context of a parent process."""
     return re.sub(r" \((setup|call|teardown)\)(\|.*)?$", "", context.removeprefix("|"))
 
 
@@ -318,7 +323,7 @@ class Trials:
             if outcome != "killed" or not failed or self._passes(failed):
                 return outcome, failed
             if failed not in tests:
-                # All tests of this file were called, so that only the complete file can be left out.
+                # All tests of this file were called, and only the complete file can be left out.
                 self.failing.add(failed.partition("::")[0])
 
     def _passes(self, test: str) -> bool:
@@ -385,8 +390,8 @@ patch = subprocess
 """
 """Settings of coverage for every process of a run.
 
-A command that a test starts inherits the environment variable with the name of the test as its context.
-Tests of `check_*.py` share one process, whose context the plugin below changes.
+A command that a test starts inherits the environment variable with the name of the test, which is
+its context. Tests of `check_*.py` share one process, whose context the plugin below changes.
 """
 
 
@@ -395,7 +400,7 @@ def record_lines(file: Path, words: Sequence[str]) -> int:
 
     Args:
         file: file of the record; new records are added to those that it has.
-        words: further arguments of pytest, for example folders; without them, the complete suite runs.
+        words: further arguments of pytest, for example folders; the complete suite if empty.
 
     Returns:
         Exit code of pytest.

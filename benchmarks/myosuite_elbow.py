@@ -37,7 +37,7 @@ MEAN_ANGLE = 0.95
 
 
 def main(folder: Path) -> None:
-    """Print the results."""
+    """Compute inverse dynamics, static optimization and MocoInverse, and print their results."""
     times = np.linspace(0.0, 2.0, 201)
     angles = MEAN_ANGLE - AMPLITUDE * np.cos(math.pi * times)
     motion = {COORDINATES[0]: 0.0 * times, COORDINATES[1]: angles}
@@ -47,6 +47,7 @@ def main(folder: Path) -> None:
         model, motion, times, compute_mujoco_moments(folder / MODEL, times, angles)
     )
     print_static_optimization(model, motion, times)
+    # MocoInverse reads its model and its motion from files.
     with tempfile.TemporaryDirectory() as temporary:
         rows = np.column_stack(list(motion.values()))
         write_sto(Path(temporary, "flexion.mot"), "flexion", times, COORDINATES, rows)

@@ -4,14 +4,14 @@
 
 FOLDER contains the sources of opensim-core, or is its git directory (``git clone --bare``); studies
 of walking and gait need it. Each study is solved in turn by Moco, by osimlite with the Hessian
-approximation that Moco uses ("as Moco"), and by osimlite with exact Hessians. Studies for which Moco
-needs most of an hour are solved by osimlite alone, and only if they are named.
+approximation that Moco uses ("as Moco"), and by osimlite with exact Hessians. Studies for which
+Moco needs most of an hour are solved by osimlite alone, and only if they are named.
 
 All times are processor times, medians of the rounds. *Set-up and solve* begins with reading the
 files, in a process that has loaded its libraries and solved a small study before. *Process* is a
 complete process that solves one study. After each time, "speed-up" is Moco's time divided by it.
-Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as osimlite does; more threads would increase its
-processor time.
+Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as osimlite does; more threads would increase
+its processor time.
 
 *Violation* is the largest constraint violation that Moco computes for each solution file, by taking
 it as the guess and stopping before the first step.
@@ -98,8 +98,8 @@ if os.path.exists("more.omoco"):
     for name in ("optim_convergence_tolerance", "optim_constraint_tolerance", "optim_max_iterations"):
         getattr(solver, f"set_{name}")(getattr(settings, f"get_{name}")())
 if guess:
-    # This file keeps Ipopt from moving the guess away from its bounds. Simbody's Ipopt, which solves for
-    # assemblies before, reads it too.
+    # This file keeps Ipopt from moving the guess away from its bounds. Simbody's Ipopt, which
+    # solves for assemblies before, reads it too.
     with open("ipopt.opt", "w") as stream:
         stream.write("bound_push 1e-16\\nbound_frac 1e-16\\nbound_relax_factor 0\\n")
     solver.setGuessFile(guess)
@@ -144,7 +144,7 @@ class Solver(NamedTuple):
 
     @property
     def is_moco(self) -> bool:
-        """True for Moco itself."""
+        """True for Moco, which has a script of its own."""
         return self.script == OPENSIM_SCRIPT
 
 
@@ -247,8 +247,8 @@ def _solve_study(
             print(f"{name}, {title}: {numbers}", file=sys.stderr)
             record.solve_times.append(record.solve.seconds)
             if solver.is_moco:
-                # Solving a second time would take minutes. Moco's process is the time of loading its
-                # libraries plus that of the solve.
+                # Solving a second time would take minutes. Moco's process is the time of loading
+                # its libraries plus that of the solve.
                 (import_seconds,), _ = _run_script(IMPORT_SCRIPT, [], folder)
                 record.process_times.append(import_seconds + record.solve.seconds)
             else:

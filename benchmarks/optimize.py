@@ -1,4 +1,4 @@
-"""OpenSim's example of an optimisation, a walker that should get far in ten seconds, with both programs.
+"""OpenSim's example of an optimisation, a walker that should get far, with both programs.
 
     python benchmarks/optimize.py 1 2 3        # three seeds, compared with OpenSim
     python benchmarks/optimize.py --ours 20    # twenty seeds, osimlite only
@@ -7,19 +7,19 @@ The example varies nine variables of the initial state: the angles of hips and k
 speed of the pelvis, and the rates of hips and knees. It maximizes the distance, less 10 times the
 square of the amount by which the forward speed is outside 0 to 2 m/s. The optimizer is CMA-ES with
 populations of 20, an initial step of 0.5, tolerances of 1e-3 and 100 evaluations. Both programs do
-this with the same model and the same random numbers: OpenSim with a loop over its Manager, as in the
-example, osimlite with `optimize` and an objective in Python. Both evaluate the same candidates and
-rank them in the same order.
+this with the same model and the same random numbers: OpenSim with a loop over its Manager, as in
+the example, osimlite with `optimize` and an objective in Python. Both evaluate the same candidates
+and rank them in the same order.
 
-In ten seconds of contact, a change of the last bit of a number grows to millimetres. No two programs
-can agree on a distance more closely than one of them with itself. The first table therefore has the
-distances of OpenSim's best start when one of the nine variables at a time is replaced by the next
-floating-point number.
+In ten seconds of contact, a change of the last bit of a number grows to millimetres. No two
+programs can agree on a distance more closely than one of them with itself. The first table
+therefore has the distances of OpenSim's best start when one of the nine variables at a time is
+replaced by the next floating-point number.
 
 The second table is of `osimlite optimize` with bounds of the variables: with as many evaluations by
 sobol-cma, which is made for few evaluations, and with twenty times as many by cma. The programs run
-in turn. Times are wall-clock times of everything after reading the model; osimlite's include writing
-history and model.
+in turn. Times are wall-clock times of everything after reading the model; osimlite's include
+writing history and model.
 """
 
 from __future__ import annotations

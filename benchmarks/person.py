@@ -1,16 +1,16 @@
-"""Accuracy of models fitted to persons: compared with an expert's model, and with synthetic persons.
+"""Accuracy of models fitted to persons: an expert's model and synthetic persons as references.
 
     python benchmarks/person.py FOLDER        a person as AddBiomechanics publishes it
     python benchmarks/person.py FOLDER 10     also ten synthetic persons with the same motion
 
-FOLDER contains the model `generic.osim`, the model `hand_scaled.osim` that an expert made of it, and
-trials `NAME.trc`, with published coordinates in `NAME.mot` if they exist. `static*.trc` is the
+FOLDER contains the model `generic.osim`, the model `hand_scaled.osim` that an expert made of it,
+and trials `NAME.trc`, with published coordinates in `NAME.mot` if they exist. `static*.trc` is the
 static trial.
 
-The first table has the root mean square of the marker errors (mm) of each trial: of the fitted model
-and of the expert's model with osimlite's inverse kinematics, and of the expert's model in the
-published poses. All markers have the same weight. The scale factors of the fitted model follow, with
-their uncertainty.
+The first table has the root mean square of the marker errors (mm) of each trial: of the fitted
+model and of the expert's model with osimlite's inverse kinematics, and of the expert's model in the
+published poses. All markers have the same weight. The scale factors of the fitted model follow,
+with their uncertainty.
 
 Synthetic persons have random sizes and random marker positions, except for markers on bones, and
 noise of 5 mm. Printed are the largest errors of a size (%) and of a marker position (mm).
@@ -193,7 +193,7 @@ def read_pose(mechanism: Any, table: StoTable, row: int) -> Array:
 
 
 def print_scale_factors(person: Person) -> None:
-    """Print the scale factor of each body along x with its uncertainty, without left-hand bodies."""
+    """Print the scale factor of each body along x with its uncertainty, except on the left."""
     for body, factors in person.factors.items():
         if not body.endswith("_l"):
             print(f"{body:12} {factors[0]:.3f} ± {person.uncertain[body][0]:.3f}")
@@ -209,6 +209,7 @@ def fit_synthetic_person(generic: osimlite.Model, poses: Array, seed: int) -> No
     """
     rng = np.random.default_rng(seed)
     model = generic.copy_deep()
+    # The fit keeps the positions of these markers.
     bony = {
         marker.name
         for marker in list_markers(model)

@@ -1,10 +1,10 @@
-"""Predicted walking, checked in OpenSim: forward simulation with the excitations of optimal control.
+"""Predicted walking, checked in OpenSim by forward simulation with the predicted excitations.
 
     python benchmarks/predicted_walk.py
 
-The study `human-walks` is solved on its own mesh, and with meshes refined to errors of 1e-2 and 1e-3.
-OpenSim then integrates the model from the first state for three strides. It has no reflexes, so
-that it falls in the end: the error of the mesh grows with every step.
+The study `human-walks` is solved on its own mesh, and with meshes refined to errors of 1e-2 and
+1e-3. OpenSim then integrates the model from the first state for three strides. It has no reflexes,
+so that it falls in the end: the error of the mesh grows with every step.
 
 The table in Markdown has for each mesh: the number of intervals, the processor time of the complete
 command, the difference between OpenSim and the solution after one step (the largest of all
@@ -127,7 +127,7 @@ def main() -> None:
             refine: solve_study(model.with_suffix(".omoco"), folder, refine)
             for refine in ("", "1e-2", "1e-3")
         }
-        # OpenSim changes where child processes look for libraries, so it is imported after they ran.
+        # OpenSim changes where child processes find libraries, so it is imported after they ran.
         import opensim as osim
 
         osim.Logger.setLevelString("Error")

@@ -2,11 +2,11 @@
 
     python benchmarks/processes.py [--rounds N] [NAME ...]
 
-Each case is a tool of OpenSim or a simulation. osimlite and OpenSim run in turn, each in a process of
-its own. The table has the median processor times (s), and the median, least and greatest ratio of
-the times of a pair. Processor time is used because a busy machine changes it little. The files are
-those of the reference data in the shared folder. One pair runs before the timed ones, so that byte
-code and results of an earlier run exist, as they do for users.
+Each case is a tool of OpenSim or a simulation. osimlite and OpenSim run in turn, each in a process
+of its own. The table has the median processor times (s), and the median, least and greatest ratio
+of the times of a pair. Processor time is used because a busy machine changes it little. The files
+are those of the reference data in the shared folder. One pair runs before the timed ones, so that
+byte code and results of an earlier run exist, as they do for users.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def list_cases(folder: Path) -> list[ProcessCase]:
     cases = []
     gait2354 = unpack(folder, "ik_id_gait2354")
     unpack_model("gait2354_subject01_simbody", gait2354 / "subject01_simbody.osim")
-    # Inverse dynamics reads the result of inverse kinematics, which may not be among the cases to run.
+    # Inverse dynamics reads the result of inverse kinematics, which may not be run.
     shutil.copy(gait2354 / "ik_accuracy_1e-5.mot", gait2354 / "subject01_walk1_ik.mot")
     steps = unpack_steps(folder)
     for name, source, setup in (

@@ -5,14 +5,14 @@
 
 *setups* runs all setups of ScaleTool and InverseKinematicsTool in a copy of each folder with both
 programs, and prints one line for each: how the scaled models, static poses and motions differ.
-OpenSim runs inverse kinematics with an accuracy of 1e-9, or with a larger one if that takes too long.
-Costs are the objective that inverse kinematics minimizes; a positive difference means that osimlite's
-is larger.
+OpenSim runs inverse kinematics with an accuracy of 1e-9, or with a larger one if that takes too
+long. Costs are the objective that inverse kinematics minimizes; a positive difference means that
+osimlite's is larger.
 
 *people* needs folders as AddBiomechanics publishes them, with `hand_scaled.osim` and trials
-`NAME.trc`, and published coordinates in `NAME.mot`. It prints a table in Markdown with the root mean
-square of the marker errors (mm) in the published frames, and the processor times. All markers have
-the same weight, and OpenSim has its default accuracy.
+`NAME.trc`, and published coordinates in `NAME.mot`. It prints a table in Markdown with the root
+mean square of the marker errors (mm) in the published frames, and the processor times. All markers
+have the same weight, and OpenSim has its default accuracy.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def find_angles(motion: FittedMotion) -> Array:
 
 
 def select_angles(motion: FittedMotion, differences: Array) -> Array:
-    """Return the columns of angles, in degrees, of differences (frames, coordinates) in rad and m."""
+    """Return the angles, in degrees, of differences (frames, coordinates) in rad and m."""
     return np.asarray(np.rad2deg(differences[:, find_angles(motion)]))
 
 
@@ -189,8 +189,8 @@ def compare_inverse_kinematics(tool: Any, setup: Path) -> Iterator[str]:
         f"angles differ by at most {angles.max():.1e} deg, median {np.median(angles):.1e} "
         f"({ours.coordinates[index]}, frame {frame})"
     )
-    # OpenSim's constraints hold to a tenth of the accuracy, osimlite's to rounding. Assemble OpenSim's
-    # poses, because violated constraints would make their cost smaller.
+    # OpenSim's constraints hold to a tenth of the accuracy, osimlite's to rounding. Assemble
+    # OpenSim's poses, because violated constraints would make their cost smaller.
     if any(not isinstance(item, Lock) for item in ours.mechanism.constraints):
         poses = np.array([ours.mechanism.assemble(q) for q in poses])
     excess = ours.costs - compute_costs(ours, tool.ik_task_set.objects, poses)

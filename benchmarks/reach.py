@@ -3,8 +3,8 @@
     python benchmarks/reach.py [ARM26.osim]
 
 The variables are the excitations of six muscles at five times, thirty in all. The arm should flex
-the elbow to 1.5 rad in 0.4 s and stop there, with little activation. Paths around wrap surfaces have
-discontinuous derivatives, so that polynomials replace them (`osimlite.modify`).
+the elbow to 1.5 rad in 0.4 s and stop there, with little activation. Paths around wrap surfaces
+have discontinuous derivatives, so that polynomials replace them (`osimlite.modify`).
 
 The table in Markdown has for each method: the number of simulations, the lowest cost, and the
 processor time (s). The default model is that of the shared corpus.
@@ -52,7 +52,7 @@ SEARCHES = (
 
 
 def main(words: list[str]) -> None:
-    """Print the table."""
+    """Search with each method, and print the table in Markdown."""
     model = osimlite.modify(osimlite.read(words[0] if words else MODEL), paths="polynomial")
     ranges = {
         f"{muscle}/control@{CONTROL_INTERVAL * node:g}": (0.01, 0.9)

@@ -1,4 +1,4 @@
-"""Speed of walking by reflexes: simulated time per processor time, compared with OpenSim's integration.
+"""Speed of walking by reflexes, compared with OpenSim's integration of the same walk.
 
     python benchmarks/reflexes.py [SCENARIO.scone] [SECONDS]
 
@@ -7,7 +7,8 @@ measures, once alone and once with many candidates at a time. OpenSim only integ
 PrescribedController has the excitations that the reflexes computed, and start, integrator and
 accuracy are the same. The programs run in turn; medians of the processor times count.
 
-The table in Markdown has the simulated seconds per second of one core, and their ratio to OpenSim's.
+The table in Markdown has the simulated seconds per second of one core, and their ratio to
+OpenSim's.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ CANDIDATES = 16
 ROUNDS = 3
 """Number of timed runs of each program."""
 
-# Points are slightly before the steps, so that rounding of times cannot delay an excitation by a step.
+# Points are slightly before the steps, so that rounding of times cannot delay an excitation by a
+# step.
 OPENSIM_SCRIPT = """
 import json, sys, time, opensim
 opensim.Logger.setLevelString("Off")

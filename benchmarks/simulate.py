@@ -1,11 +1,11 @@
-"""Simulation speed: two seconds of the Dynamic Walker with osimlite's engines and with OpenSim's Manager.
+"""Simulation speed of the Dynamic Walker with osimlite's engines and with OpenSim's Manager.
 
     python benchmarks/simulate.py
 
-The models are read and initialised once. Only the motion from the default pose is timed, in
-processor time; the programs run in turn. Both integrate with the method of Runge, Kutta and Merson.
-OpenSim records its states at every step, osimlite every 10 ms. Complete processes are timed by
-all.py.
+The walker moves for two seconds. The models are read and initialised once. Only the motion from the
+default pose is timed, in processor time; the programs run in turn. Both integrate with the method
+of Runge, Kutta and Merson. OpenSim records its states at every step, osimlite every 10 ms. Complete
+processes are timed by all.py.
 
 The first table has the error of each program at t = 2 s: the largest difference of any coordinate
 (rad or m) from a motion at accuracy 1e-10. The second has the times and their ratios.

@@ -8,11 +8,11 @@ The walkers are simulated for two seconds at accuracy 1e-3 from different starts
 is recorded. The tables are:
 
 - *workers*: walkers per second of wall-clock time with one and with two workers of a sweep, which
-  run in turn, and of one and two separate processes that share nothing. The latter show how much more
-  the machine does with two processes.
-- *Dynamic Walkers*: processor time of osimlite and OpenSim, which run in turn. osimlite's time is that
-  of the complete sweep: samples, simulations, measures and the results file. OpenSim's model and
-  state are made once, and each walker has a manager of its own, as in OpenSim's examples.
+  run in turn, and of one and two separate processes that share nothing. The latter show how much
+  more the machine does with two processes.
+- *Dynamic Walkers*: processor time of osimlite and OpenSim, which run in turn. osimlite's time is
+  that of the complete sweep: samples, simulations, measures and the results file. OpenSim's model
+  and state are made once, and each walker has a manager of its own, as in OpenSim's examples.
 - *Processor time per walker*: for several kinds of variables, in ms.
 
 The last line has the differences of the distances between the programs.
@@ -105,6 +105,7 @@ def compare_with_opensim(starts: Plan, path: Path, console: Console) -> None:
     import opensim
 
     opensim.Logger.setLevelString("off")
+    # Both programs simulate the same starts.
     rows = choose_samples(starts.variables, "sobol", WALKERS).make_block(0, WALKERS)
     theirs = prepare_opensim_runs(opensim, rows)
     times = time_pair(

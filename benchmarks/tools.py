@@ -2,10 +2,10 @@
 
     python benchmarks/tools.py [--quick] [--trials N]
 
-The programs run the same setup files in turn. A complete run reads and checks the setup and all files
-that it names, and writes its results, in a process that has loaded its libraries. The time of one
-more frame is found by also running half of the frames. Models and trials are those of the reference
-data in the shared folder; inverse kinematics with constraints uses a synthetic motion of
+The programs run the same setup files in turn. A complete run reads and checks the setup and all
+files that it names, and writes its results, in a process that has loaded its libraries. The time of
+one more frame is found by also running half of the frames. Models and trials are those of the
+reference data in the shared folder; inverse kinematics with constraints uses a synthetic motion of
 Rajagopal2016.
 
 The table has the medians of complete runs, the shortest times per additional frame, the speed-ups
@@ -135,7 +135,7 @@ def time_case(case: ToolCase, rounds: int) -> Row:
     return Row(case, complete, frame)
 
 
-# --------------------------------------------------------------------------------------------------------- cases
+# -------------------------------------------------------------------------------------------- cases
 def unpack(folder: Path, *patterns: str) -> None:
     """Make a folder with uncompressed files of the reference data.
 
@@ -382,7 +382,7 @@ def simulate_sensors(motion: RecordedMotion, names: list[str]) -> list[list[floa
     return rows
 
 
-# ------------------------------------------------------------------------------------------------------- results
+# ------------------------------------------------------------------------------------------ results
 def make_table(rows: list[Row]) -> Table:
     """Return the table of times and speed-ups."""
     table = Table(
@@ -471,6 +471,7 @@ def main() -> None:
         "--trials", type=int, default=0, metavar="N", help="also run N trials with one command"
     )
     options = parser.parse_args()
+    # OpenSim's messages would take time, and hide the table.
     opensim.Logger.setLevelString("off")
     rounds = 3 if options.quick else 9
     console = Console(width=120)

@@ -106,7 +106,7 @@ def time_single_models(rounds: int, files: list[Path], each: bool) -> None:
 
 
 def time_folder(count: int, sources: list[Path]) -> None:
-    """Print time and memory of `osimlite validate FOLDER`: no cache, all unchanged, one file changed.
+    """Print time and memory of `osimlite validate FOLDER` with several states of its cache.
 
     Args:
         count: number of models in the folder.

@@ -1,20 +1,20 @@
-"""Compare the verdicts of the linter with OpenSim's, on models with errors, for one or two versions.
+"""Compare the verdicts of the linter with OpenSim's, on models with errors.
 
-    python benchmarks/verdicts.py --edits 1000 [--before FOLDER]     one random edit of a corpus model
-    python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]     two random edits at once
-    python benchmarks/verdicts.py --faults 8000 [--before FOLDER]    two faults of the walker at once
-    python benchmarks/verdicts.py --combinations [--shard 1/2]       all pairs of faults on 20 models
+    python benchmarks/verdicts.py --edits 1000 [--before FOLDER]    one random edit of a model
+    python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]    two random edits at once
+    python benchmarks/verdicts.py --faults 8000 [--before FOLDER]   two faults of the walker
+    python benchmarks/verdicts.py --combinations [--shard 1/2]      all pairs of general faults
 
 `--before` names the folder of another version of osimlite, which is compared too. A verdict of the
 linter is *missed* if OpenSim 4.6 does not load or initialise the model, or computes NaN
-accelerations, and the linter reports no new error. It is *false* if OpenSim loads and initialises the
-model, and an error says that it does not. The models are those of `shared/corpus`.
+accelerations, and the linter reports no new error. It is *false* if OpenSim loads and initialises
+the model, and an error says that it does not. The models are those of `shared/corpus`.
 
-OpenSim and the linters examine a model at the same time, in child processes. A model that OpenSim does
-not finish within the time limit counts neither as missed nor as false. The last lines of the output
-are counts: of trials, of each verdict of OpenSim, of trials by model, and for each version ("now",
-"before") of verdicts with and without new errors, and of wrong ones. `--log` writes each wrong verdict
-to a file.
+OpenSim and the linters examine a model at the same time, in child processes. A model that OpenSim
+does not finish within the time limit counts neither as missed nor as false. The last lines of the
+output are counts: of trials, of each verdict of OpenSim, of trials by model, and for each version
+("now", "before") of verdicts with and without new errors, and of wrong ones. `--log` writes each
+wrong verdict to a file.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ MAX_MODEL_SIZE = 400_000
 MAX_LOGGED_ERRORS = 2
 """Number of errors of a wrong verdict that are logged."""
 
-# Rules of OSIM63 compute muscle paths and fiber lengths, which is slow and predicts no failure to load.
+# Rules of OSIM63 compute muscle paths and fiber lengths, which is slow and predicts no failure to
+# load.
 LINTER_SCRIPT = """
 import json, sys
 from osimlite.lint import validate
@@ -81,6 +82,7 @@ class Linter:
     """
 
     def __init__(self, folder: Path) -> None:
+        # The path decides which version of osimlite the process imports.
         environment = {**os.environ, "PYTHONPATH": str(folder)}
         command = [sys.executable, "-W", "ignore", "-c", LINTER_SCRIPT]
         pipe = subprocess.PIPE
@@ -143,7 +145,7 @@ def answer_requests(reader: int, writer: int) -> None:
 
 
 class Judge:
-    """OpenSim in a child process, which is started again after a crash and after `MAX_MODELS` models."""
+    """OpenSim in a child process, which is replaced after a crash and after `MAX_MODELS` models."""
 
     # A fresh process from time to time bounds the memory of OpenSim.
     MAX_MODELS = 200
@@ -192,7 +194,7 @@ class Judge:
         return status
 
     def _start(self) -> None:
-        """Start a child process. A fork is faster than a new process, which would import OpenSim."""
+        """Start a child process by a fork, since a new process would have to import OpenSim."""
         paths, requests = os.pipe()
         answers, results = os.pipe()
         self._child = os.fork()
@@ -393,7 +395,7 @@ def classify_verdict(verdict: str, new_errors: list[LinterError]) -> str:
     return ""
 
 
-class Comparison:
+class VerdictComparison:
     """Comparison of verdicts on many trials.
 
     Args:
@@ -514,8 +516,9 @@ def main() -> None:
         texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in models}
         walker = folder / "walker.osim"
         walker.write_bytes((ROOT / "fixtures/walker/DynamicWalkerModel.osim").read_bytes())
-        comparison = Comparison(linters, [*models, walker], log)
+        comparison = VerdictComparison(linters, [*models, walker], log)
         stack.callback(comparison.close)
+        # The same seed gives the same trials, also with another version of the linter.
         draw = random.Random(options.seed)
         trials = chain(
             edit_models(texts, options.edits, options.pairs, draw),

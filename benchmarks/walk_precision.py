@@ -7,8 +7,8 @@ the same N control steps are integrated with constant excitations by every metho
 accuracies. As in a walk, each control step is an integration of its own.
 
 The table in Markdown has the errors of the values and of the speeds of all coordinates, relative to
-Merson's method at accuracy 1e-11: the root mean square over coordinates and states (rad and m; rad/s
-and m/s). The work is the simulated time per processor time of one core. The picture is a
+Merson's method at accuracy 1e-11: the root mean square over coordinates and states (rad and m;
+rad/s and m/s). The work is the simulated time per processor time of one core. The picture is a
 work-precision diagram of the speeds.
 """
 
@@ -109,6 +109,7 @@ class Integrations:
         )
         times = []
         for _ in range(rounds):
+            # Every round starts from the same states.
             copies.set_states(slice(None), self.starts)
             before = time.process_time()
             for step in range(self.steps):

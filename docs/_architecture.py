@@ -2,10 +2,10 @@
 
     python docs/_architecture.py
 
-``python packaging/regenerate.py`` does this with all other generated files. A package of the top level is
-called a room. A row has the rooms whose longest chain of imports has the same length. An arrow leads
-from a room to one that it imports. Arrows that follow from others are omitted: if a imports b and b
-imports c, the arrow from a to c is.
+``python packaging/regenerate.py`` does this with all other generated files. A package of the top
+level is called a room. A row has the rooms whose longest chain of imports has the same length. An
+arrow leads from a room to one that it imports. Arrows that follow from others are omitted: if a
+imports b and b imports c, the arrow from a to c is.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SUMMARIES = {
 """Summary of each room, which is drawn below its name."""
 
 OTHER_MODULES = {"__main__", "errors", "gym", "mjcf", "moco"}
-"""Modules of the top level that are no rooms: errors, which every room may import, and public names."""
+"""Modules of the top level that are no rooms: errors and public names."""
 
 BOX_WIDTH = 206
 BOX_HEIGHT = 62
@@ -76,6 +76,7 @@ def find_rooms(graph: ImportGraph) -> list[str]:
     """
     with (ROOT / "pyproject.toml").open("rb") as file:
         contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    # There is one contract of this type.
     (layers,) = (contract["layers"] for contract in contracts if contract["type"] == "layers")
     names = [word.strip("() ") for layer in layers for word in layer.replace("|", ":").split(":")]
     rooms = [
@@ -102,6 +103,7 @@ def find_arrows(graph: ImportGraph, rooms: list[str]) -> Arrows:
     imports: dict[str, set[str]] = {room: set() for room in rooms}
     for module in graph.modules:
         for imported in graph.find_modules_directly_imported_by(module):
+            # The second part of a name such as `osimlite.io.tables` is the room.
             importer, target = (f"{name}.".split(".")[1] for name in (module, imported))
             if importer != target and importer in imports and target in imports:
                 imports[importer].add(target)
@@ -162,6 +164,7 @@ def arrange_rows(rooms: list[str], arrows: Arrows, levels: Mapping[str, int]) ->
             links.setdefault(upper, []).append(lower)
             links.setdefault(lower, []).append(upper)
     for sweep in range(SWEEPS):
+        # Alternate directions, so that upper and lower neighbours both count.
         for row in rows if sweep % 2 == 0 else reversed(rows):
             columns = {
                 item: column

@@ -3,10 +3,10 @@
     python docs/_compare.py [WORD ...]                   of this clone, into docs/gallery/after
     python docs/_compare.py --clone FOLDER [WORD ...]    of another clone, into docs/gallery/before
 
-Without a WORD all pictures are made, otherwise those whose names contain one. The clone for "before" is
-of commit fdb98599; its pictures are tracked and need not be made again. Chromium draws the pages, 1280
-and 400 pixels wide; set OSIMLITE_CHROMIUM to its program if it is not on the PATH. Terminals have 80
-columns. Look at the pictures that you make.
+Without a WORD all pictures are made, otherwise those whose names contain one. The clone for
+"before" is of commit fdb98599; its pictures are tracked and need not be made again. Chromium draws
+the pages, 1280 and 400 pixels wide; set OSIMLITE_CHROMIUM to its program if it is not on the PATH.
+Terminals have 80 columns. Look at the pictures that you make.
 """
 
 from __future__ import annotations
@@ -107,9 +107,10 @@ def make_jump(clone: Path, folder: Path, *options: str) -> None:
     run_command(clone, folder, "simulate", "jumper.osim", "--to", "0.4", "-o", "jump", *options)
 
 
-# ------------------------------------------------------------------------------------------------- pictures
+# ----------------------------------------------------------------------------------------- pictures
 def draw_progress(clone: Path, folder: Path) -> Any:
     """Draw a terminal while four commands work, at several seconds of processor time."""
+    # With processor time, the picture does not depend on other work on the machine.
     os.environ["SCREENS_CLOCK"] = "processor"
     screens.make_inputs(folder)
     commands = (
@@ -185,6 +186,7 @@ def draw_start(clone: Path, folder: Path) -> Any:
     """Draw the first page of the manual."""
     subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "-q", "-f", clone / "mkdocs.yml", "-d", folder],
+        # The first page needs no executed notebooks.
         env={**os.environ, "PYTHONPATH": str(clone), "OSIMLITE_MANUAL": "quick"},
         cwd=clone,
         check=True,
@@ -197,6 +199,7 @@ def draw_terminal(clone: Path, folder: Path) -> Any:
     """Draw tables and help at a terminal of 80 columns."""
     screens.make_inputs(folder)
     text = (folder / "walker.osim").read_text(encoding="utf-8")
+    # A misspelt socket and a misspelt property, as users write them.
     wrong = (
         text.replace("/bodyset/LeftShank<", "/bodyset/LeftShnk<")
         .replace("<mass_center>", "<mass_centre>", 1)
@@ -233,10 +236,10 @@ DRAW: dict[str, Callable[[Path, Path], Any]] = {
     "terminal": draw_terminal,
     "editor": draw_editor,
 }
-"""Functions that draw the pictures; each takes a clone and an empty folder, and returns an image."""
+"""Functions that draw the pictures; each takes a clone and an empty folder."""
 
 
-# --------------------------------------------------------------------------------------------------- helpers
+# ------------------------------------------------------------------------------------------ helpers
 def open_image(path: Path) -> Any:
     """Return the image of a file, in RGB."""
     from PIL import Image
@@ -269,6 +272,7 @@ def capture_page(page: Path, widths: Sequence[int], height: int = 800, script: s
             wait_for_viewers(window)
             if script:
                 window.evaluate(script)
+                # The page may move or draw because of the script.
                 window.wait_for_timeout(WAIT_MS)
             pictures.append(Image.open(io.BytesIO(window.screenshot(timeout=60_000))))
             window.close()

@@ -2,8 +2,9 @@
 
     python docs/_gallery.py [WORD ...]     all pictures, or those whose names contain a WORD
 
-The pictures are small PNG files in ``docs/gallery``. They are tracked, so that clones and the site show
-them, and building the site computes none. Run this after a change of what they show, and look at them.
+The pictures are small PNG files in ``docs/gallery``. They are tracked, so that clones and the site
+show them, and building the site computes none. Run this after a change of what they show, and look
+at them.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ WORKERS = 2
 
 
 def find_sections(text: str) -> list[str]:
-    """Return the sections of the page, each of which has a picture.
+    """Return the sections of the page, each with a picture of its own.
 
     The section "Before and after" is omitted; `docs/_compare.py` makes its pictures.
     """
@@ -43,6 +44,7 @@ def find_sections(text: str) -> list[str]:
 
 def find_picture_name(section: str) -> str:
     """Return the file name of the picture of a section."""
+    # Each section has exactly one picture.
     (name,) = re.findall(r"\]\(gallery/([^)]+)\)", section)
     return str(name)
 

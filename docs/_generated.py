@@ -1,7 +1,8 @@
 """Pages of the manual that are generated from the package when the site is built.
 
-This is a hook of MkDocs. The page of commands consists of their `--help`, the pages of rules of their
-docstrings, and the page of components of the schema, so that the manual agrees with the package.
+This is a hook of MkDocs. The page of commands consists of their `--help`, the pages of rules of
+their docstrings, and the page of components of the schema, so that the manual agrees with the
+package.
 """
 
 from __future__ import annotations
@@ -87,8 +88,9 @@ def generate_components() -> str:
         areas[cls.__module__.removeprefix("osimlite.schema.").replace(".", ": ")].append(cls)
     parts = [
         "# Components",
-        "Classes and properties as OpenSim names them; `osimlite.PinJoint` is the class of `<PinJoint>`. Properties "
-        "that every component has are left out: `name`, and `components` with the components inside.",
+        "Classes and properties as OpenSim names them; `osimlite.PinJoint` is the class of "
+        "`<PinJoint>`. Properties that every component has are left out: `name`, and `components` "
+        "with the components inside.",
     ]
     for area, classes in sorted(areas.items()):
         parts.append(f"## {area.replace('_', ' ')}")
@@ -98,14 +100,14 @@ def generate_components() -> str:
 
 def _format_component(cls: type[Object]) -> str:
     lines = [f"### {cls.tag}", "", _convert_roles(describe_class(cls))]
+    # Every component has `components`; the page says so once.
     specs = [spec for spec in cls.field_specs().values() if spec.tag != "components"]
     if specs:
         lines += ["", "| property | value | default | meaning |", "|---|---|---|---|"]
         for spec in specs:
+            value = _format_cell(describe_value(spec))
             meaning = _format_cell(describe_property(spec))
-            lines.append(
-                f"| `{spec.tag}` | {_format_cell(describe_value(spec))} | {_format_default(spec)} | {meaning} |"
-            )
+            lines.append(f"| `{spec.tag}` | {value} | {_format_default(spec)} | {meaning} |")
     return "\n".join(lines)
 
 

@@ -1,6 +1,7 @@
 """The manual for language models: ``llms.txt`` (https://llmstxt.org) and all pages as Markdown.
 
-This is a hook of MkDocs. Its list of pages and their Markdown are written next to the HTML of the site.
+This is a hook of MkDocs. Its list of pages and their Markdown are written next to the HTML of the
+site.
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ def _format_entry(page: Page, config: MkDocsConfig) -> str:
     text = re.sub(
         r"<!--.*?-->|^```.*?^```|^#.*?$|^[|!].*?$", "", page.markdown or "", flags=re.M | re.S
     )
+    # Links become their texts.
     words = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", " ".join(text.split()))
     first = re.match(r".*?[.?](?= |$)|.*", words)
     assert first is not None

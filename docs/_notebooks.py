@@ -1,9 +1,9 @@
 """The notebooks of the manual as pages with their outputs, executed when the site is built.
 
-This is a hook of MkDocs. Outputs are inserted into the pages after their conversion to HTML, because
-they are no Markdown. An executed notebook is cached until it, osimlite, an installed package or a model
-that it needs changes. With the environment variable ``OSIMLITE_MANUAL=quick`` no notebook is executed,
-for the checks of every push.
+This is a hook of MkDocs. Outputs are inserted into the pages after their conversion to HTML,
+because they are no Markdown. An executed notebook is cached until it, osimlite, an installed
+package or a model that it needs changes. With the environment variable ``OSIMLITE_MANUAL=quick`` no
+notebook is executed, for the checks of every push.
 """
 
 from __future__ import annotations
@@ -95,6 +95,7 @@ def execute_with_cache(path: Path) -> Any:
 def compute_key(path: Path) -> str:
     """Return a digest of everything that the outputs of a notebook depend on."""
     key = sha256(path.read_bytes())
+    # Notebooks list the models that they need in their metadata.
     for name in read(path).metadata.get("needs", []):
         for folder in MODELS:
             if (folder / name).exists():
@@ -107,6 +108,7 @@ def compute_key(path: Path) -> str:
 def list_sources() -> str:
     """Return the versions of Python and all packages, and digests of the files of osimlite."""
     versions = sorted(f"{each.name} {each.version}" for each in distributions())
+    # Compiled kernels and byte code follow from the sources.
     files = sorted(
         file
         for file in PACKAGE.rglob("*")

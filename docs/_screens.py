@@ -5,13 +5,13 @@
     python docs/_screens.py --picture FILE NAME ...  draw the screens of the commands of these rows
 
 Each command runs at a terminal that this program emulates. The screen is read after 0.5, 2 and 5
-seconds, and then Ctrl-C is sent. The command also runs until Ctrl-C after 0.5 s and after 2 s. The table
-has one row for each command: the time of its first output, the last line on the screen at the three
-times, and the longest time between Ctrl-C and the end. "finished" means that the command ended before.
-Run this after a change of what commands print while they work.
+seconds, and then Ctrl-C is sent. The command also runs until Ctrl-C after 0.5 s and after 2 s. The
+table has one row for each command: the time of its first output, the last line on the screen at the
+three times, and the longest time between Ctrl-C and the end. "finished" means that the command
+ended before. Run this after a change of what commands print while they work.
 
-On a busy machine, set SCREENS_CLOCK=processor (Linux only): the times are then the processor time that
-the command has used, which is nearly the time on an idle machine.
+On a busy machine, set SCREENS_CLOCK=processor (Linux only): the times are then the processor time
+that the command has used, which is nearly the time on an idle machine.
 """
 
 from __future__ import annotations
@@ -157,6 +157,7 @@ def record_command(
         # A shell starts jobs in the background with Ctrl-C ignored.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         environment = {**os.environ, "TERM": "xterm-256color", "PYTHONPATH": str(clone)}
+        # This variable would take precedence over the size of the terminal.
         environment.pop("COLUMNS", None)
         os.execve(sys.executable, [sys.executable, "-m", "osimlite", *arguments], environment)
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", height, columns, 0, 0))
@@ -190,7 +191,7 @@ def record_command(
 
 
 def _make_clock(process: int, started: float) -> Callable[[], float]:
-    """Return a function that returns the time since the start of a process, or its processor time (s)."""
+    """Return a function that returns the time or the processor time of a process (s)."""
     if os.environ.get("SCREENS_CLOCK") != "processor":
         return lambda: time.monotonic() - started
 
@@ -281,6 +282,7 @@ def repeat_rows(source: Path, target: Path, time_column: int) -> None:
         time_column: index of the time; in a TRC file it is 1, after the number of the frame.
     """
     lines = source.read_text(encoding="utf-8").splitlines()
+    # The header ends before the first line with many numbers.
     first = next(
         number
         for number, line in enumerate(lines)
@@ -329,10 +331,11 @@ def measure_command(arguments: list[str], inputs: Path) -> Recording:
     longest = 0.0
     for count in range(1, len(MOMENTS_S) + 1):
         with TemporaryDirectory() as name:
-            # Each run starts without the results of the previous one. Commands replace files instead of
-            # changing them, so that links are enough.
+            # Each run starts without the results of the previous one. Commands replace files
+            # instead of changing them, so that links are enough.
             folder = shutil.copytree(inputs, Path(name) / "work", copy_function=os.link)
             recording = record_command(arguments, folder, moments=MOMENTS_S[:count])
+        # A command that has ended before cannot be interrupted later.
         if recording.ended is not None:
             break
         longest = max(longest, recording.stopping)
@@ -373,6 +376,7 @@ def make_table(words: list[str]) -> Iterator[str]:
 
 def write_page() -> None:
     """Write the table of all commands into the page of the manual."""
+    # The text before the table is written by hand.
     head = PAGE.read_text(encoding="utf-8").partition("| command |")[0]
     lines = []
     for line in make_table([]):
