@@ -157,3 +157,23 @@ def test_a_trial_check_names_ground_that_pushes_twice(tmp_path: Path) -> None:
     folder = copy_lab("ground", tmp_path)
     done = run("check-trial", ".", folder=folder)
     assert "OSIM859" in done.out
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        ("0,5 1,0", "0.5 1.0"),
+        ("0 1,25", "0 1.25"),
+        ("(0 1)", "0 1"),
+        ("0,5 1,0 2", None),
+    ],
+)
+def test_decimal_commas_of_a_time_range(tmp_path: Path, times: str, expected: str | None) -> None:
+    folder = copy_lab("paths", tmp_path)
+    before, _, rest = (folder / "id.xml").read_text().partition("<time_range>")
+    after = rest.partition("</time_range>")[2]
+    (folder / "id.xml").write_text(f"{before}<time_range>{times}</time_range>{after}")
+    report = osimlite.validate(folder / "id.xml")
+    assert "OSIM205" not in report.codes
+    (finding,) = [finding for finding in report if finding.code in ("OSIM201", "OSIM202")]
+    assert finding.suggestion == expected

@@ -30,6 +30,7 @@ KEEPS_DEFAULT = "OpenSim keeps the default"
 _SEPARATORS = ",;"
 """Separators of numbers in other languages and programs."""
 _ONE_NUMBER = real()
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+(?:,\d+)?")
 
 
 @rule("OSIM201", "unreadable-value", severity=ERROR, fixes="safe", consequences=(REFUSES, RUNS))
@@ -279,17 +280,28 @@ def _make_readable(text: str, kind: Value) -> str | None:
         return flag_words.get(text.lower()) or find_nearest(text.lower(), ("true", "false"))
     if kind.scalar == "double":
         # Brackets and separators of other languages, and invisible characters.
-        words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _replace_digits(text)).split()
+        plain = _replace_digits(text)
+        words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", plain).split()
         try:
-            numbers = [float(word) for word in words]
+            for word in words:
+                float(word)
         except ValueError:
             return None
         # One plain number would not have been unreadable.
-        if (len(words) > 1 or not text.isascii()) and (
-            kind.size is None or len(numbers) == kind.size
-        ):
-            return " ".join(words)
+        candidates = [words] if len(words) > 1 or not text.isascii() else []
+        if re.search(r"\d,\d", plain) and all(map(_DECIMAL_COMMA.fullmatch, plain.split())):
+            candidates.append(plain.replace(",", ".").split())
+        possible = [words for words in candidates if _has_valid_count(words, kind)]
+        # A comma may separate numbers or be a decimal comma; only the count can tell.
+        if len(possible) == 1:
+            return " ".join(possible[0])
     return None
+
+
+def _has_valid_count(words: list[str], kind: Value) -> bool:
+    if kind.size is not None:
+        return len(words) == kind.size
+    return kind.least <= len(words) and (kind.most is None or len(words) <= kind.most)
 
 
 def _replace_digits(text: str) -> str:
