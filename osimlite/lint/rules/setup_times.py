@@ -167,6 +167,10 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1],
                 fault="too-short-for-control",
             )
+        filter_note = ""
+        if getattr(item, "lowpass_cutoff_frequency_for_coordinates", 0.0) > 0.0:
+            # Inverse dynamics and the analyses compute rows there as well.
+            filter_note = ": the filter extrapolates it, and OpenSim also computes rows there"
         for name, kind in _list_tables(item):
             table = setup.read_table(name)
             span = (
@@ -211,14 +215,14 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 )
             if are_explicit[-1] and math.isfinite(last) and last > span[1] + slack:
                 report(
-                    f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}",
+                    f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind or filter_note}",
                     item,
                     tag=tags[-1],
                     fault="data-end-early",
                 )
             if are_explicit[0] and math.isfinite(first) and first < span[0] - slack:
                 report(
-                    f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}",
+                    f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind or filter_note}",
                     item,
                     tag=tags[0],
                     fault="data-begin-late",
