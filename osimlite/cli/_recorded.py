@@ -77,6 +77,32 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
     say(f"{len(times)} rows from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
 
 
+def warn_of_extrapolated_loads(loads: str | Path | None, recorded: RecordedMotion) -> None:
+    """Print a warning if a motion has times at which its loads were not measured.
+
+    Args:
+        loads: file of the loads; None without.
+        recorded: motion along which the loads act.
+    """
+    if loads is None:
+        return
+    from osimlite.simulation.elements.external_loads import read_measured_times
+
+    times = read_measured_times(loads)
+    if len(times) < 2:
+        # A single row is a constant load.
+        return
+    # One row more or less, and rounded times, are no fault, as in OSIM845.
+    slack = 1.01 * (times[-1] - times[0]) / (len(times) - 1)
+    first, last = recorded.times[0], recorded.times[-1]
+    if first < times[0] - slack or last > times[-1] + slack:
+        say(
+            f"warning: the loads are measured from {times[0]:g} to {times[-1]:g} s, but the motion lasts from {first:g} "
+            f"to {last:g} s: as in OpenSim, the loads are extrapolated, which can make them very large; limit the times "
+            "with --from and --until"
+        )
+
+
 def require_plots(*, plot: bool, band: Path | None = None) -> None:
     """Raise an error if requested pictures cannot be drawn.
 

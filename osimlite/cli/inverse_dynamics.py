@@ -39,7 +39,12 @@ def inverse_dynamics(
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml
     """
     from osimlite.cli._progress import progress_bar
-    from osimlite.cli._recorded import draw_tables, require_plots, write_results
+    from osimlite.cli._recorded import (
+        draw_tables,
+        require_plots,
+        warn_of_extrapolated_loads,
+        write_results,
+    )
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import inverse_dynamics as forces_of
 
@@ -63,6 +68,7 @@ def inverse_dynamics(
     folder = options.choose_output_folder(file, output)
     tables = {"inverse_dynamics.sto": table}
     write_results(table.motion, tables, folder)
+    loads = option_values.get("external_loads")
+    warn_of_extrapolated_loads(loads, table.motion)
     if plot:
-        loads = option_values.get("external_loads")
         draw_tables(tables, folder, model, table.motion.mechanism, loads, band=band)

@@ -60,7 +60,12 @@ def static_optimization(
     """
     from osimlite.cli._console import complain
     from osimlite.cli._progress import progress_bar
-    from osimlite.cli._recorded import draw_tables, print_motion_summary, require_plots
+    from osimlite.cli._recorded import (
+        draw_tables,
+        print_motion_summary,
+        require_plots,
+        warn_of_extrapolated_loads,
+    )
     from osimlite.io.document.reader import read
     from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 
@@ -87,6 +92,7 @@ def static_optimization(
     folder = options.choose_output_folder(file, output)
     files = result.write(folder)
     print_motion_summary(result.motion, files)
+    warn_of_extrapolated_loads(option_values.get("external_loads"), result.motion)
     if plot:
         # The units of the columns follow from the model, which needs the added forces for that.
         from osimlite.simulation.inverse_dynamics import add_forces

@@ -140,6 +140,16 @@ def test_measured_forces(fixtures: Path, tmp_path: Path) -> None:
     )
     assert (done.code, done.err) == (0, "")
     assert read_sto(tmp_path / "out" / "forces.sto")["Pelvis_push_Fy"] == pytest.approx(7.0)
+    # Without data at some times the loads are extrapolated, as in OpenSim.
+    push_times, push = times[:11], [[0.0, 7.0, 0.0]] * 11
+    write_sto(tmp_path / "push.sto", "push", push_times, ("f_x", "f_y", "f_z"), push)
+    for until, is_warned in (("0.1", False), ("1", True)):
+        done = run(
+            "inverse-dynamics", walker, "still.mot", "-o", "out", "--external-loads", "loads.xml",
+            "--until", until, folder=tmp_path,
+        )  # fmt: skip
+        warning = "the loads are measured from 0 to 0.1 s, but the motion lasts from 0 to 0.19 s"
+        assert (warning in done.out) == is_warned
     (tmp_path / "loads.xml").write_text(LOADS.format(body="Pelvic"))
     for command in (("simulate", walker), ("inverse-dynamics", walker, "still.mot")):
         done = run(*command, "-o", "out", "--external-loads", "loads.xml", folder=tmp_path)

@@ -160,6 +160,23 @@ def read_load_of_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     return _read_load(builder.mechanism, force, columns, builder.path(loads))
 
 
+def read_measured_times(source: str | Path) -> Array:
+    """Return the times (s) at which some loads were measured.
+
+    Args:
+        source: file of a document of ExternalLoads, or a table of forces.
+
+    Raises:
+        DocumentError: a file is missing or cannot be read.
+    """
+    path = Path(source)
+    if path.suffix.lower() in TABLES:
+        loads, file = ExternalLoads(name="loads", datafile=str(path)), None
+    else:
+        loads, file = read_object(path, ExternalLoads), str(path)
+    return read_loads_table(loads, Path() if file is None else path.parent, file).times
+
+
 def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTable:
     """Return the data of some loads.
 
