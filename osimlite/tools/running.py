@@ -12,7 +12,13 @@ from osimlite.base.progress import report_stage
 from osimlite.base.records import replace
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import add_article, format_count, join_words
-from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
+from osimlite.errors import (
+    DocumentError,
+    MissingFileError,
+    ModelError,
+    OsimliteError,
+    SettingError,
+)
 from osimlite.io.document.cache import keep_object
 from osimlite.io.document.reader import pause_collector, read_any
 from osimlite.lint.checked import CheckTarget
@@ -40,7 +46,7 @@ DEFAULTED = ("OSIM201", "OSIM202")
 
 STUDY = ".omoco"
 """Suffix of Moco studies."""
-NO_OPTION = " there, or take it out of the model"
+NO_OPTION = ", or remove them from the model"
 """Text that replaces advice about an option that `run` does not have."""
 
 
@@ -159,6 +165,12 @@ def run(
 
         # The advice names an option of other commands, which this function lacks.
         error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
+        model_name = str(getattr(setup_object, "model_file", ""))
+        model_path = Job(setup_object, file).resolve_name(model_name)
+        if isinstance(error, ModelError) and not error.file and model_path is not None:
+            # The rules for models were not applied; they find more, and where it is in the file.
+            shown_path = get_relative_path(str(model_path), Path.cwd())
+            error.message += f"; 'osimlite validate {shown_path}' checks the model"
         error.file = error.file or str(file)
         subject = load_subject(str(file), Config()) if isinstance(error, MissingFileError) else None
         if (

@@ -124,6 +124,15 @@ def test_a_misspelt_name_is_told_with_its_line_and_nothing_is_written(setup: Pat
     assert not (setup.parent / "results").exists()
 
 
+def test_an_impossible_model_names_the_command_that_checks_it(setup: Path) -> None:
+    model = setup.parent / "walker.osim"
+    text = model.read_text()
+    model.write_text(text.replace("<mass>", "<mas>", 1).replace("</mass>", "</mas>", 1))
+    done = run("run", "setup.xml", folder=setup.parent)
+    assert done.code == 1 and "has mass nan" in done.err
+    assert "'osimlite validate walker.osim' checks the model" in done.err
+
+
 def test_what_a_setup_names_is_checked_too(setup: Path) -> None:
     motion = setup.parent / "walk.mot"
     motion.write_text(motion.read_text().replace("\n0.05\t", "\n0.04\t"))
