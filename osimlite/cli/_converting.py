@@ -15,6 +15,7 @@ from osimlite.cli import _options as options
 from osimlite.cli._console import add_row, create_table, print_table, say
 from osimlite.cli._fidelity_table import tabulate
 from osimlite.errors import SettingError
+from osimlite.lint.project_files import is_table
 from osimlite.translate.exporters import EXPORTERS, Exporter
 from osimlite.translate.importers import MARKERS, OSIM, PROJECT, find_format, list_importers
 
@@ -86,6 +87,11 @@ class Request:
         if source is not None and source not in sources:
             raise SettingError(f"--from: unknown format '{source}'{suggest_name(source, sources)}")
         source_format = find_format(file) if source is None else source
+        if source_format is None and is_table(str(file)):
+            raise SettingError(
+                f"'{file.name}' is already a table of OpenSim, which 'convert' does not convert; to convert it together "
+                "with its model, name the model first and add --motion"
+            )
         if source_format is None:
             raise SettingError(
                 f"the format of '{file.name}' is not one that 'convert' recognizes; name it with --from: "

@@ -58,6 +58,13 @@ def diff(
         from osimlite.cli._table_diff import describe_table_differences
 
         lines = describe_table_differences(old_file, new_file)
+    elif any(is_table(str(file)) for file in (old_file, new_file)) and not any(
+        str(file) == "/dev/null" for file in (old_file, new_file)
+    ):
+        table, other = (old_file, new_file) if is_table(str(old_file)) else (new_file, old_file)
+        raise OsimliteError(
+            f"'{table}' is a table and '{other}' is not; name two tables, or two models or setups"
+        )
     else:
         documents = [
             None if str(file) == "/dev/null" else read_any(file) for file in (old_file, new_file)

@@ -68,6 +68,7 @@ def test_formats_are_listed() -> None:
         (("walker.osim", "--to", "urdv"), "unknown format 'urdv'; did you mean 'urdf'?"),
         (("walker.osim", "--from", "x"), "--from: unknown format 'x'"),
         (("notes.txt",), "'convert' recognizes; name it with --from"),
+        (("walk.trc",), "'walk.trc' is already a table of OpenSim"),
         (("gone.b3d",), "no such file"),
         (("gone.xml", "--from", "osim", "-o", "walker.osim"), "osimlite upgrade"),
         (("gone.osim", "--from", "osim", "-o", "notes.xml"), "no such file"),
@@ -82,7 +83,7 @@ def test_formats_are_listed() -> None:
 def test_what_cannot_be_converted_is_said_in_one_line(
     walker: Path, words: tuple[str, ...], message: str
 ) -> None:
-    for name in ("notes.txt", "notes.xml"):
+    for name in ("notes.txt", "notes.xml", "walk.trc"):
         (walker / name).write_text("nothing")
     code, out, error = run("convert", *words, folder=walker)
     assert code == 2 and out == "" and len(error.splitlines()) == 1 and message in error

@@ -108,6 +108,8 @@ def test_diff_of_tables(fixtures, tmp_path):
         "  pelvis_tx: 0.62331989 -> 1.5 at 0.1 s, where it differs most; 1 of 60 rows differ"
     ]
     assert (run("diff", old, old).code, run("diff", old, old).out) == (0, "")
+    told = run("diff", new, fixtures / "walker" / "DynamicWalkerModel.osim")
+    assert told.code == 2 and "is a table and" in told.err and "XML" not in told.err
     said = run("format", old).err
     assert "no element in it; the commands 'validate', 'info' and 'diff' accept tables" in said
     assert (
