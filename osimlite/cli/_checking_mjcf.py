@@ -41,6 +41,11 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
         say(f"wrote {output / 'check.json'}")
 
 
+def _format_mm(error: float) -> str:
+    """Format an error (m) in mm; 0 if it is only rounding."""
+    return "0" if error < 1e-9 else f"{1e3 * error:.3g}"
+
+
 def _make_table(result: Any, name: str) -> Any:
     """Make the table of errors, one muscle per row, sorted by the error of the moment arm.
 
@@ -62,8 +67,8 @@ def _make_table(result: Any, name: str) -> Any:
         add_row(
             table,
             muscle.name,
-            f"{1e3 * muscle.length.rms:.3g}",
-            f"{1e3 * muscle.worst_arm.rms:.3g}",
+            _format_mm(muscle.length.rms),
+            _format_mm(muscle.worst_arm.rms),
             "" if muscle.force is None else f"{muscle.force.rms:.3f}",
             "" if muscle.fiber is None else f"{muscle.fiber:.4g}",
             "" if muscle.tendon is None else f"{1e3 * muscle.tendon:+.3g}",

@@ -113,7 +113,7 @@ def scale(
     for name, ratio in result.measured.ratios.items():
         say(f"{name}: {ratio:.6g}")
     for note in result.measured.notes:
-        say(note)
+        say(f"left out: {note}")
     if result.placed is not None:
         for line in result.placed.describe_pose():
             say(line)

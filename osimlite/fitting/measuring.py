@@ -83,7 +83,7 @@ class ScaleFactorFinder:
             name = measurement.name or f"number {number}"
             ratio, reason = self._compute_ratio(measurement, data, frames)
             if reason:
-                self.result.notes.append(f"measurement '{name}' is left out: {reason}")
+                self.result.notes.append(f"measurement '{name}': {reason}")
                 continue
             self.result.ratios[name] = ratio
             for body in measurement.body_scale_set.objects:

@@ -175,7 +175,7 @@ def test_what_cannot_be_scaled_is_told() -> None:
         osimlite.scale(model, measurements=LENGTH)
     notes = osimlite.scale(model, {"top": STATIC["top"]}, measurements=LENGTH).measured
     assert notes is not None and notes.notes == [
-        "measurement 'length' is left out: the data have no marker 'bottom'"
+        "measurement 'length': the data have no marker 'bottom'"
     ]
     with pytest.raises(OsimliteError, match=r"is one of the model \(top and bottom\)"):
         osimlite.scale(model, {"elsewhere": STATIC["top"]}, place=True)
