@@ -164,7 +164,6 @@ def test_a_trial_check_names_ground_that_pushes_twice(tmp_path: Path) -> None:
     [
         ("0,5 1,0", "0.5 1.0"),
         ("0 1,25", "0 1.25"),
-        ("(0 1)", "0 1"),
         ("0,5 1,0 2", None),
     ],
 )
