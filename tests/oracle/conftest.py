@@ -1,4 +1,4 @@
-"""A live OpenSim to ask about files."""
+"""Fixtures that run OpenSim in processes of its own, and that reset OpenSim's state in this process."""
 
 from __future__ import annotations
 
@@ -24,15 +24,21 @@ else:
         opensim.OpenSimObject.newInstanceOfType(_names.get(k)) for k in range(_names.getSize())
     ]
 finally:
-    # It puts its folder into the paths of libraries and programs, and with these its CasADi into
-    # processes to come.
+    # Importing OpenSim adds its folder to the search paths of libraries and programs in the
+    # environment. Child processes would then load OpenSim's CasADi instead of their own.
     os.environ.clear()
     os.environ.update(_environment)
-"""One object of each class, as OpenSim makes it before it has read any file: made while tests are collected."""
+"""One object of each OpenSim class with OpenSim's default values.
+
+The objects are made while tests are collected, before a file with a `<defaults>` block is read.
+"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave Bullet beside OpenSim on many models to the full suite; tests/simulation/ has it on recorded motions."""
+    """Mark comparisons of Bullet with OpenSim on many models as `full`.
+
+    The usual run covers Bullet on recorded motions in tests/simulation/.
+    """
     for item in items:
         parameters = getattr(getattr(item, "callspec", None), "params", {})
         engines = [value for value in parameters.values() if isinstance(value, str)]
@@ -45,14 +51,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="module", autouse=True)
 def opensims_defaults() -> None:
-    """A `<defaults>` block of a file holds for the whole process, in OpenSim: each module starts with its own."""
+    """Restore OpenSim's default values before each test module.
+
+    OpenSim applies the `<defaults>` block of a file to everything that the process reads later.
+    """
     for item in PRISTINE:
         opensim.OpenSimObject.registerType(item)
 
 
 @pytest.fixture(scope="session", autouse=True)
 def default_constants_of_smooth_muscles() -> None:
-    """OpenSim keeps the time constants of the first DeGrooteFregly2016Muscle that a process computes: take the defaults."""
+    """Compute one DeGrooteFregly2016Muscle with default time constants before all tests.
+
+    OpenSim uses the time constants of the first muscle of this class for all others of the process.
+    """
     if not PRISTINE:
         return
     model = opensim.Model()
@@ -69,7 +81,11 @@ def default_constants_of_smooth_muscles() -> None:
 
 @pytest.fixture(scope="session")
 def opensim_says() -> Iterator[Callable[[Path], str | None]]:
-    """Asks OpenSim about a file: None if it takes it, else what it says."""
+    """Return a function that asks OpenSim whether it accepts a model file.
+
+    The function takes the path of the file. It returns None if OpenSim accepts the file, else
+    OpenSim's message. All questions go to one process, see `opensim_verdicts.py`.
+    """
     pytest.importorskip("opensim")
     command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_verdicts.py"))]
     with subprocess.Popen(
@@ -91,7 +107,11 @@ def opensim_says() -> Iterator[Callable[[Path], str | None]]:
 
 @pytest.fixture(scope="module")
 def run_live() -> Iterator[Callable[[Path, str, str], dict[str, Any]]]:
-    """Runs a tool by OpenSim, by its folder, class and setup; returns how it ended, and its log."""
+    """Return a function that runs an OpenSim tool in another process.
+
+    The function takes the folder, the class of the tool and its setup file. It returns how the run
+    ended and the warnings of the log, see `opensim_tools.py`.
+    """
     pytest.importorskip("opensim")
     command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_tools.py"))]
     pipe = subprocess.PIPE

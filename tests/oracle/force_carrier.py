@@ -1,4 +1,4 @@
-"""A model that carries any force, and the comparison of what OpenSim 4.6 computes for it live."""
+"""A model that can carry any force, and the comparison of its dynamics with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ JOINTS = {
 
 
 def carrier(kinds) -> Model:
-    """Three bodies in a row, each on a joint of another kind and with a frame of its own."""
+    """Return a chain of bodies with one joint of each class in `kinds`.
+
+    Each body carries an offset frame, so that forces can act on frames as well as on bodies.
+    """
     model = Model(name="carrier")
     below = model.ground
     for number, kind in enumerate(kinds):
@@ -62,10 +65,17 @@ def carrier(kinds) -> Model:
 
 
 def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
-    """Accelerations, records with their labels, and energy at some states.
+    """Compare accelerations, force records and energy with OpenSim at random states.
 
-    `counted` says how often OpenSim counts the energy of the forces; None if it has an energy of
-    its own. Returns how many numbers of the records differ from zero.
+    Args:
+        model: model made by `carrier`, with the forces to be compared.
+        tmp_path: folder for the model file.
+        counted: how often OpenSim counts the potential energy of the forces; None for a model whose
+            energy is not compared.
+        tolerance: relative tolerance.
+
+    Returns:
+        The number of record values that differ from zero.
     """
     busy = 0
     from osimlite.simulation.engines.bullet.engine import BulletEngine
@@ -158,7 +168,11 @@ def along(kind, **more):
 
 
 def drive(model, *names):
-    """Controls by functions of time: one for each actuator, and one more for the first."""
+    """Add controllers that prescribe the controls of actuators as functions of time.
+
+    The first actuator gets a second controller, because OpenSim adds up controls. A disabled
+    controller must have no effect.
+    """
     functions = [Sine(amplitude=0.5, omega=3.0, phase=0.1, offset=1.0), Constant(value=-2.0)]
     paths = [f"/forceset/{name}" for name in names]
     for number, function in enumerate(functions):

@@ -1,7 +1,7 @@
-"""OpenSim's Moco on a study with goals and a path constraint of frames: writes the study and where one step leads.
+"""Run OpenSim's Moco on a study with goals and a path constraint of frames for one iteration.
 
-Run in a folder with ``model.osim``, ``places.sto``, ``turns.sto``, ``spins.sto``, ``pulls.sto`` and
-``motion.sto``.
+The script writes the study and the result. It runs in a folder with ``model.osim``, ``places.sto``,
+``turns.sto``, ``spins.sto``, ``pulls.sto`` and ``motion.sto``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ places = osim.MocoTranslationTrackingGoal("places", 1.5)
 places.setTranslationReferenceFile("places.sto")
 places.setWeightForFrame("/bodyset/b1", 2.0)
 turns = osim.MocoOrientationTrackingGoal("turns", 0.7)
-# It reads no file of orientations that it writes.
+# OpenSim cannot read the orientation files that it writes, therefore the goal gets a table instead
+# of a file name.
 quaternions = osim.TimeSeriesTableQuaternion("turns.sto")
 turns.setRotationReference(osim.OpenSenseUtilities.convertQuaternionsToRotations(quaternions))
 moved = osim.MocoOrientationTrackingGoal("moved", 1.3)
@@ -79,8 +80,8 @@ problem.addPathConstraint(apart)
 solver = study.initCasADiSolver()
 solver.set_num_mesh_intervals(2)
 solver.set_transcription_scheme("trapezoidal")
-# Each change of a parameter makes its system anew, which is slow: the fewest differences do, for
-# what is compared are the costs where the step ends.
+# OpenSim builds the system anew for each value of a parameter, which is slow. Forward differences
+# need the fewest evaluations, and the test compares only the costs at the final point.
 solver.set_optim_finite_difference_scheme("forward")
 solver.set_optim_max_iterations(1)
 ended(study)

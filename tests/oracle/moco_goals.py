@@ -1,6 +1,7 @@
-"""OpenSim's Moco on a study with goals and path constraints: writes the study and its solution.
+"""Solve a study with goals and path constraints with OpenSim's Moco.
 
-Run in a folder with ``model.osim``, ``markers.trc``, ``controls.sto`` and ``guess.sto``.
+The script writes the study and its solution. It runs in a folder with ``model.osim``,
+``markers.trc``, ``controls.sto`` and ``guess.sto``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""OpenSim's Moco on a study of goals of loads: writes the study and where one step leads.
+"""Run OpenSim's Moco on a study with goals of joint reactions and other loads for one iteration.
 
-Run in a folder with ``model.osim``, ``moments.sto``, ``loads.xml`` and ``loads.sto``.
+The script writes the study and the result. It runs in a folder with ``model.osim``,
+``moments.sto``, ``loads.xml`` and ``loads.sto``.
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ impulse.setImpulseAxis(1)
 if not is_given:
     problem.addGoal(impulse)
 
-# With tendons of the explicit kind it asks for what is not computed yet, and fails.
+# With explicit tendon dynamics this goal requests a quantity that OpenSim has not computed yet, and
+# fails.
 if "explicit</tendon" not in model:
     balance = osim.MocoInitialVelocityEquilibriumDGFGoal("balance")
     balance.setMode("cost")

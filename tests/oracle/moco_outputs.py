@@ -1,7 +1,7 @@
-"""OpenSim's Moco on a study of goals of outputs: writes the study and where one step leads.
+"""Run OpenSim's Moco on a study with goals of model outputs for one iteration.
 
-Run in a folder with ``model.osim``, and ``outputs.json`` with the class, and the properties of each
-goal.
+The script writes the study and the result. It runs in a folder with ``model.osim`` and
+``outputs.json``, which holds the class and the properties of each goal.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""OpenSim's Moco on a study of a model with constraints, met by Bordalba 2023: writes the study and its solution.
+"""Solve a study of a constrained model with OpenSim's Moco and the method of Bordalba 2023.
 
-Run in a folder with ``model.osim``, given the scheme of transcription and the mode of the dynamics.
+The script writes the study and its solution. It runs in a folder with ``model.osim``. Its arguments
+are the transcription scheme and the mode of the multibody dynamics.
 """
 
 from __future__ import annotations

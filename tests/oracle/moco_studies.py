@@ -1,4 +1,4 @@
-"""How the studies begin and end that OpenSim's Moco is asked about."""
+"""Functions that set up and solve the studies of the scripts for OpenSim's Moco."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ osim.Logger.setLevelString("Off")
 
 
 def begun(values, speeds, controls, pattern=".*"):
-    """A study of ``model.osim`` over a second, with ranges of values, speeds and of the controls of a pattern."""
+    """Return a study of ``model.osim`` over one second, and its problem.
+
+    Args:
+        values: bounds of all coordinate values.
+        speeds: bounds of all speeds.
+        controls: bounds of the controls that match `pattern`.
+        pattern: regular expression of controls.
+    """
     study = osim.MocoStudy()
     problem = study.updProblem()
     problem.setModelProcessor(osim.ModelProcessor("model.osim"))
@@ -22,7 +29,11 @@ def begun(values, speeds, controls, pattern=".*"):
 
 
 def ended(study):
-    """Write ``study.omoco`` and where the search leads, ``theirs.sto``, and print the terms of the objective."""
+    """Write ``study.omoco``, solve the study, write ``theirs.sto`` and print the objective terms as JSON.
+
+    The solution is written even if Moco reports a failure, since some studies stop after one
+    iteration.
+    """
     study.printToXML("study.omoco")
     solution = study.solve()
     if solution.isSealed():

@@ -1,6 +1,6 @@
-"""What the linter measures of paths and muscles, beside what OpenSim gives for the same; also as a script over files.
+"""Compare the linter's measurements of paths and muscles with OpenSim's values for the same poses.
 
-python -m tests.oracle.opensim_measures FILE...
+As a script: ``python -m tests.oracle.opensim_measures FILE...`` prints the differences.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from osimlite.lint.measuring.sweeps import find_tied_coordinates
 from tests.oracle.opensim_runs import put
 
 BEYOND = 0.05
-"""Outside a range, rad or m."""
+"""Distance outside of a coordinate range at which a moving path point is evaluated (rad or m)."""
 
 
 class Beside:
-    """A model in both programs."""
+    """One model loaded in osimlite and in OpenSim, for comparisons at the same pose."""
 
     def __init__(self, file: Path) -> None:
         opensim.Logger.setLevelString("off")
@@ -44,7 +44,12 @@ class Beside:
         ]
 
     def at(self, pose: MeasuringPose, aside: float = 0.0) -> np.ndarray:
-        """Take both to a pose; returns the values of the coordinates."""
+        """Move both models to a pose and return the coordinate values (n,).
+
+        Args:
+            pose: pose of a measurement.
+            aside: distance from the pose that is added to its coordinates (rad or m).
+        """
         q = self.default.copy()
         places = [self.paths.mechanism.coordinate_index(value.coordinate) for value in pose.values]
         q[places] = [value.value + aside for value in pose.values]
@@ -54,13 +59,13 @@ class Beside:
         return q
 
     def length(self, owner: str) -> float:
-        """OpenSim's length of a path where it is, m."""
+        """Return OpenSim's length (m) of the path of `owner` at the current pose."""
         tree = self.model.tree()
         path = self.theirs.getComponent(tree.path_of(tree.by_path[owner].geometry_path))
         return float(opensim.AbstractGeometryPath.safeDownCast(path).getLength(self.state))
 
     def findings(self) -> Iterator[tuple[str, str, float, float]]:
-        """Code, owner, what is told, and what OpenSim gives for it."""
+        """Yield code, component, reported value and OpenSim's value of each measurement."""
         yield from self._of_paths()
         yield from self._of_points()
         yield from self._of_muscles()
@@ -85,7 +90,11 @@ class Beside:
             yield "OSIM633", item.owner, self.paths.lengths(q)[item.owner], self.length(item.owner)
 
     def is_free(self, item: Any) -> bool:
-        """Whether constraints move nothing with the pose: how OpenSim would bring it about is another question."""
+        """Return whether the constraints of the model move no coordinate of the pose.
+
+        Otherwise it depends on OpenSim's assembly how the pose is reached, and values are not
+        comparable.
+        """
         places = [
             self.paths.mechanism.coordinate_index(value.coordinate) for value in item.pose.values
         ]
@@ -152,7 +161,7 @@ class Beside:
 
 
 def main(files: list[str]) -> None:
-    """Print for each code how many numbers were compared, and the greatest differences."""
+    """Print how many values of each rule were compared, and the largest differences."""
     counts: Counter[str] = Counter()
     worst: dict[str, list[tuple[float, str]]] = {}
     for file in files:

@@ -1,4 +1,4 @@
-"""Lengths, speeds and moment arms of the paths of a file, beside OpenSim's."""
+"""Compare lengths, lengthening speeds and moment arms of the paths of a file with OpenSim's."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ from osimlite.mechanics.multibody.constraints import Lock
 from tests.oracle.opensim_runs import put
 
 JUMP = 1e-11
-"""Change of length (m) between poses that are 1e-13 apart from which on rounding decides."""
+"""Change of length (m) between two poses 1e-13 apart above which a path counts as discontinuous there."""
 
 
 def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
-    """Compare at random poses within the ranges of the coordinates, and random speeds; locked coordinates rest.
+    """Compare all paths at random poses within the coordinate ranges and at random speeds.
 
-    Where bodies are tied to each other, the poses are near the default one. Paths whose lengths
-    jump at a pose, here or in OpenSim, are left out: there rounding decides. Where rounding is
-    magnified, lengths are as equal as those of poses that are hardly apart; where OpenSim has no
-    length (NaN), there is none here.
+    Locked coordinates keep their values. Models with constraints between bodies stay near the
+    default pose.
+
+    Paths whose length is discontinuous at a pose, here or in OpenSim, are skipped, because rounding
+    decides the result there. Where a path amplifies rounding, the tolerance is the change of length
+    between poses that are hardly apart. Where OpenSim's length is NaN, osimlite must have no length
+    either.
     """
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
@@ -36,7 +39,7 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
         opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos
     ]
     along = [_path(theirs, model, name) for name in paths.names]
-    # OpenSim projects speeds to 1e-10 only.
+    # OpenSim projects speeds onto the constraints with an accuracy of 1e-10 only.
     coupled = (
         1e-8 if any(not isinstance(item, Lock) for item in paths.mechanism.constraints) else 0.0
     )
@@ -76,7 +79,7 @@ def _jumps(nearby: np.ndarray, length: float) -> bool:
 
 
 def _lengths(path, theirs, coordinates, state, poses, u) -> np.ndarray:
-    """OpenSim's lengths of a path in some poses."""
+    """Return OpenSim's lengths (m) of a path at several poses."""
     result = []
     for q in poses:
         put(coordinates, state, q, u)

@@ -1,4 +1,4 @@
-"""What OpenSim's own programs make of a file, or of a state."""
+"""Functions that set OpenSim states and run OpenSim's integrator and inverse dynamics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from osimlite.io.tables.storage import StoTable, read_sto
 
 
 def put(coordinates: Iterable[Any], state: Any, q: Iterable[float], u: Iterable[float]) -> None:
-    """Values and speeds of OpenSim's coordinates into a state; locked ones keep their values."""
+    """Set values and speeds of OpenSim's coordinates in a state; locked coordinates keep their values."""
     for coordinate, value, speed in zip(coordinates, q, u, strict=True):
         if not coordinate.getLocked(state):
             coordinate.setValue(state, float(value), False)
@@ -18,7 +18,14 @@ def put(coordinates: Iterable[Any], state: Any, q: Iterable[float], u: Iterable[
 
 
 def simulated(path: Path, to: float, accuracy: float, *, equilibrate: bool = False) -> StoTable:
-    """The states of a model over time, from its default state, or one with all muscles in equilibrium."""
+    """Return the states of a model over time, integrated by OpenSim's Manager.
+
+    Args:
+        path: model file; the table is written to its folder.
+        to: final time (s).
+        accuracy: accuracy of the integrator.
+        equilibrate: whether all muscles start in equilibrium instead of in their default states.
+    """
     import opensim
 
     opensim.Logger.setLevelString("off")
@@ -44,7 +51,16 @@ def inverse_dynamics(
     lowpass: float = -1.0,
     exclude: str = "ALL",
 ) -> StoTable:
-    """The forces that a motion takes, some forces of the model left aside; files are in the current folder."""
+    """Return the generalized forces that OpenSim's InverseDynamicsTool computes for a motion.
+
+    Args:
+        model: model file in the current folder.
+        motion: file of coordinates.
+        loads: file of external loads, None for none.
+        to: final time (s).
+        lowpass: cut-off frequency of the filter (Hz), negative for no filter.
+        exclude: forces of the model that the tool ignores.
+    """
     import opensim
 
     opensim.Logger.setLevelString("off")

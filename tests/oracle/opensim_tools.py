@@ -1,8 +1,8 @@
-"""Runs tools as standard input asks, one line of JSON each: the folder, the class and the setup; run by tests.
+"""Run OpenSim tools as requested on standard input, one JSON line with folder, class and setup each.
 
-Each runs in a child of this process, so that a crash is an answer too and nothing reaches the next.
-The answer is how the run ended (``done``, ``false``, ``raises``, ``crashes``, ``hangs``), what was
-raised, and the warnings of the log.
+Each tool runs in a child process. A crash is therefore a result too, and no run affects the next
+one. The answer says how the run ended (``done``, ``false``, ``raises``, ``crashes``, ``hangs``),
+and has the message of the exception and the warnings of the log.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ LOG = ".log"
 
 
 def run(kind: str, setup: str) -> str:
-    """Run a tool in the current folder; how it ended, and what was raised."""
+    """Run a tool in the current folder; return how it ended, followed by the message of an exception."""
     try:
-        # The classes do not look at the tag of the setup; opensim-cmd chooses the class by it.
+        # The constructors ignore the root tag of the setup; opensim-cmd selects the class by it.
         result = opensim.OpenSimObject.makeObjectFromFile(setup)
         if result is None or result.getConcreteClassName() != kind:
             return f"raises no {kind}"
@@ -39,7 +39,11 @@ def run(kind: str, setup: str) -> str:
 
 
 def answer(folder: str, kind: str, setup: str) -> dict[str, object]:
-    """How a tool ends."""
+    """Run a tool in a child process and return the result.
+
+    Returns:
+        How the run ended (``end``), the exception (``message``), and the warnings (``log``).
+    """
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:

@@ -1,8 +1,8 @@
-"""Says of each model file named on standard input whether OpenSim takes it; run by tests, in a process of its own.
+"""Report for each model file named on standard input whether OpenSim accepts it.
 
-Each file is loaded and initialised in a child of this process, so that a crash in OpenSim is a
-verdict too and nothing that one file does to OpenSim's defaults reaches the next. One line of JSON
-answers each line: None, or the message.
+Tests run this script as a process of its own. It loads and initialises each file in a child
+process. A crash in OpenSim is therefore a verdict too, and the `<defaults>` of one file do not
+affect the next. It answers each line by one line of JSON: null, or the message.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ SECONDS = 60
 
 
 def verdict(path: str) -> str | None:
-    """What OpenSim says against a file, None if it takes it."""
+    """Return why OpenSim rejects a model file, or None if it accepts it."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         signal.alarm(SECONDS)
-        # What OpenSim prints must not mix with the answers.
+        # OpenSim's log on standard output must not mix with the answers.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         try:
             opensim.Model(path).initSystem()

@@ -1,4 +1,4 @@
-"""Random models: trees of joints of every kind under springs, bushings and stops."""
+"""Random models for tests: trees of joints of every class with springs, bushings and coordinate limits."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ AXES = ("rotation1", "rotation2", "rotation3", "translation1", "translation2", "
 
 
 class RandomModel:
-    """One model for each seed."""
+    """Random model that is determined by its seed."""
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -82,7 +82,11 @@ class RandomModel:
         self.coordinates += own
 
     def set_axes(self, transform: Any, names: list[str]) -> None:
-        """Every coordinate moves one axis by itself, and perhaps others by a function."""
+        """Set the axes of a custom joint at random.
+
+        Each coordinate moves one axis alone; some of the other axes follow a function of one
+        coordinate.
+        """
         frame = np.linalg.qr(self.rng.normal(size=(3, 3)))[0]
         alone = dict(zip(self.rng.permutation(6).tolist(), names, strict=False))
         for index, name in enumerate(AXES):

@@ -1,7 +1,8 @@
-"""Edits of a model's text at random: elements taken out, doubled, swapped, moved, renamed; values and names changed.
+"""Random edits of the text of a model, for comparisons of the linter's verdict with OpenSim's.
 
-Every edit leaves well-formed XML, or nearly so, that says something else. Rare tags are drawn as
-often as common ones.
+Edits remove, duplicate, swap, move and rename elements, and change values and names. Each edit
+leaves well-formed XML, with few exceptions, that means something else. Rare tags are drawn as often
+as common ones.
 """
 
 from __future__ import annotations
@@ -106,29 +107,29 @@ CHANGES: tuple[Callable[[random.Random, str, list[str]], str], ...] = (
     lambda draw, word, names: f"/jointset/{word.rpartition('/')[2]}",
     lambda draw, word, names: f"/markerset/{word.rpartition('/')[2]}",
 )
-"""Ways to change a word that names a component, given the names of the model."""
+"""Functions that change a word that names a component, given the names in the model."""
 
 
 class Edit(NamedTuple):
-    """A changed text, and what was done to it."""
+    """Edited text, and a description of the edit."""
 
     what: str
     text: str
 
 
 class Element(NamedTuple):
-    """An element of a text: its tag, the element it stands in, and its places."""
+    """Element of a text: tag, index of its parent, and offsets in the text."""
 
     tag: str
     parent: int
     start: int
-    head: int  # behind its start tag
-    tail: int  # before its end tag
+    head: int  # end of the start tag
+    tail: int  # beginning of the end tag
     end: int
 
 
 class Text:
-    """The text of a model, with its elements by their tags."""
+    """Text of a model, with its elements grouped by tag."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -168,7 +169,7 @@ class Text:
         return self.text[element.head : element.tail] if element.end > element.head else ""
 
     def path(self, element: Element) -> str:
-        """The tags that lead to an element, for people."""
+        """Return the tags of the innermost ancestors and of the element, for messages."""
         words = [element.tag]
         while element.parent > 1:
             element = self.elements[element.parent]
@@ -183,14 +184,17 @@ class Text:
         ]
 
     def any(self, draw: random.Random, groups: dict[str, list[Element]] | None = None) -> Element:
-        """An element; each tag as often as any other in half of the cases."""
+        """Return a random element.
+
+        In half of the cases each tag is equally likely, in the others each element.
+        """
         groups = self.by_tag if groups is None else groups
         if draw.random() < 0.5:
             return draw.choice(groups[draw.choice(sorted(groups))])
         return draw.choice([element for tag in sorted(groups) for element in groups[tag]])
 
     def put(self, *changes: tuple[int, int, str]) -> str:
-        """The text with pieces of it replaced."""
+        """Return the text with each range of offsets replaced by a new text."""
         text = self.text
         for start, end, new in sorted(changes, reverse=True):
             text = text[:start] + new + text[end:]
@@ -203,7 +207,7 @@ _NAME = re.compile(r'\sname="([^"<]+)"')
 
 
 def _attribute(text: Text, draw: random.Random) -> tuple[str, str] | None:
-    """An attribute added, taken away, renamed or given twice."""
+    """Add, remove, rename or repeat an attribute."""
     element = text.any(draw, text.named if draw.random() < 0.6 else None)
     head = text.head(element)
     name = _NAME.search(head)
@@ -269,7 +273,10 @@ def _double(text: Text, draw: random.Random) -> tuple[str, str] | None:
 
 
 def _targets(text: Text, element: Element, draw: random.Random) -> Element | None:
-    """An element in which another one may be put: of the same tag as that in which it stands, or any."""
+    """Return an element into which another one can be moved, or None.
+
+    In half of the cases it has the same tag as the present parent.
+    """
     if draw.random() < 0.5:
         result = text.by_tag.get(text.elements[element.parent].tag, [])
     else:
@@ -344,7 +351,7 @@ def _value(text: Text, draw: random.Random) -> tuple[str, str] | None:
 
 
 def _class(text: Text, draw: random.Random) -> tuple[str, str] | None:
-    """A tag renamed: another of the model, another class, or misspelt."""
+    """Rename a tag to another tag of the model, to another class, or to a misspelling."""
     element = text.any(draw)
     tag = element.tag
     at = draw.randrange(len(tag))
@@ -386,7 +393,7 @@ def _version(text: Text, draw: random.Random) -> tuple[str, str] | None:
 
 
 def _reference(text: Text, draw: random.Random) -> tuple[str, str] | None:
-    """The text of a leaf that names something, changed."""
+    """Change the text of an element that names a component."""
     known = set(text.names) | {"ground"}
     groups = {
         tag: result
@@ -403,7 +410,7 @@ def _reference(text: Text, draw: random.Random) -> tuple[str, str] | None:
 
 
 def _rename(text: Text, draw: random.Random) -> tuple[str, str] | None:
-    """A name changed to another: of the model, or one that is none."""
+    """Change a name to another name of the model, or to one that does not occur."""
     if not text.named:
         return None
     element = text.any(draw, text.named)
@@ -456,7 +463,7 @@ OPERATIONS: tuple[Operation, ...] = (
 
 
 def edits(text: Text, draw: random.Random) -> Iterator[Edit]:
-    """Edits of a text without end."""
+    """Yield random edits of a text without end."""
     while True:
         done = draw.choice(OPERATIONS)(text, draw)
         if done is not None and done[1] is not None and done[1] != text.text:

@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models, helper functions and comparisons that several test modules of this folder share."""
 
 from __future__ import annotations
 
@@ -51,7 +51,11 @@ def _vec(*values: float) -> Any:
 
 
 def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
-    """Ground, a body on a ball joint, one on a pin beyond, one that floats."""
+    """Return a model with a body on a ball joint, one on a pin beyond it, and one that floats freely.
+
+    Returns:
+        The OpenSim model and its three bodies.
+    """
     opensim.Logger.setLevelString("off")
     model = opensim.Model()
     model.setName("m")
@@ -115,7 +119,10 @@ def _weld(model: Any, bodies: Bodies) -> None:
 
 
 def _point_on_offset_frame(model: Any, bodies: Bodies) -> None:
-    """OpenSim takes the location in the body, not in the frame."""
+    """Add a PointConstraint on an offset frame.
+
+    OpenSim interprets the location in the frame of the body, not in the offset frame.
+    """
     frame = opensim.PhysicalOffsetFrame(
         "spot",
         bodies[1],
@@ -196,12 +203,16 @@ CASES: dict[str, Change] = {
 
 
 def ask(script: str, folder: Path, *words: str) -> None:
-    """Let OpenSim work in a process of its own, which may crash."""
+    """Run a Python script that uses OpenSim in another process, because OpenSim may crash."""
     run_script(script, *words, folder=folder)
 
 
 def model_with(kind: str) -> osimlite.Model:
-    """A pelvis, a thigh and a shank with markers, whose knee is clamped, coupled, locked or loose."""
+    """Return a model with pelvis, thigh, shank and markers.
+
+    Args:
+        kind: how the knee is treated: clamped, coupled, locked or loose.
+    """
     model = osimlite.Model(name="leg")
     carrier: Any = model.ground
     for number, joint in enumerate(
@@ -246,7 +257,7 @@ def model_with(kind: str) -> osimlite.Model:
 
 
 class Place(NamedTuple):
-    """A word of the text that names a component: what kind of reference it is, and where it stands."""
+    """Reference to a component in a text: kind of the reference, offset, and the word itself."""
 
     kind: str
     start: int
@@ -254,7 +265,7 @@ class Place(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A component that a reference leads to: its class, its name, its element and the value of its name attribute."""
+    """Component that a reference leads to: class, name, range of its element, offset of its name attribute."""
 
     cls: str
     name: str
@@ -264,7 +275,11 @@ class Target(NamedTuple):
 
 
 class Victim(NamedTuple):
-    """A model to break: its text, where it is kept with the files it needs, its references by kind, their targets."""
+    """Model to be broken by a test.
+
+    It has the text, the folder with the files that the model needs, references and their targets by
+    kind.
+    """
 
     name: str
     folder: Path
@@ -275,7 +290,7 @@ class Victim(NamedTuple):
 
 
 def places_of(source: Source) -> Iterator[Place]:
-    """Every reference in a document that stands in its text."""
+    """Yield every reference to a component whose value stands in the text of the document."""
     subject = Subject(survey_source(source))
     seen = set()
     for use in subject.uses:
@@ -300,7 +315,7 @@ def places_of(source: Source) -> Iterator[Place]:
 
 
 def targets_of(source: Source) -> Iterator[Target]:
-    """Every component of a document that a reference leads to and that has a name in the text."""
+    """Yield every component of a document that has a name in the text and that a reference leads to."""
     subject = Subject(survey_source(source))
     seen = set()
     for use in subject.uses:
@@ -321,7 +336,11 @@ def targets_of(source: Source) -> Iterator[Target]:
 
 
 def victim(model: CorpusModel, folder: Path) -> Victim | None:
-    """A model that OpenSim loads, in OpenSim's own print of it; None if the validator finds errors in it as it is."""
+    """Return OpenSim's print of a model with its references, for tests that break them.
+
+    The result is None if OpenSim cannot load the model, if the linter finds errors in it, or if it
+    has no references.
+    """
     if model.converted is None:
         return None
     folder.mkdir()
@@ -343,7 +362,7 @@ def victim(model: CorpusModel, folder: Path) -> Victim | None:
 
 
 def claims_refusal(finding: Finding) -> bool:
-    """Whether a finding says that OpenSim does not take the model."""
+    """Return whether a finding says that OpenSim rejects the model."""
     return finding.consequence is Consequence.REFUSES
 
 
@@ -357,7 +376,13 @@ KEPT = (
 
 
 def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Model:
-    """A model whose muscles are of another class."""
+    """Return the model with all muscles replaced by muscles of another class.
+
+    Args:
+        model: model that is changed.
+        cls: new class of the muscles.
+        more: further properties of the new muscles.
+    """
     forces = model.force_set.objects
     for index, muscle in enumerate(list(forces)):
         if isinstance(muscle, Muscle):
@@ -370,7 +395,7 @@ OPERATIONS = "value", "integrate", "differentiate", "minimum", "minabs", "maximu
 
 
 def add_actuators(model):
-    """One of each class that has one control and pushes bodies or coordinates."""
+    """Add actuators of each class that has one control and acts on bodies or coordinates."""
     bodies = {"bodyA": "b2", "bodyB": "b0"}
     for there in (False, True):
         model.add(
@@ -418,7 +443,7 @@ TOOL_SETUP = """<OpenSimDocument Version="40600">
 
 
 def build_printed(model: Any, folder: Path) -> Mechanism:
-    """Return our mechanism of a model of OpenSim's, by way of a file."""
+    """Print an OpenSim model to a file and return osimlite's mechanism of it."""
     model.finalizeConnections()
     path = folder / "model.osim"
     model.printToXML(str(path))
@@ -426,7 +451,7 @@ def build_printed(model: Any, folder: Path) -> Mechanism:
 
 
 def real(corpus: Any, name: str) -> Path:
-    """The file of a real model."""
+    """Return the file of a corpus model."""
     path: Path = next(model.path for model in corpus if model.id == name)
     return path
 
@@ -435,7 +460,19 @@ def both(
     folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0,
     change: Callable[[Path], object] | None = None,
 ) -> tuple[Path, Path]:  # fmt: skip
-    """Where we and OpenSim have put the results of a tool on some motion of a model, which may be changed."""
+    """Run a tool on a motion of a model with osimlite and with OpenSim.
+
+    Args:
+        folder: folder for all files.
+        model: model to be analysed.
+        tool: class of the tool.
+        more: further lines of the setup.
+        cutoff: cut-off frequency of the filter (Hz), negative for no filter.
+        change: function that changes the motion file before both runs.
+
+    Returns:
+        The output folders of osimlite and of OpenSim.
+    """
     osimlite.write(model, folder / "model.osim")
     mechanism = osimlite.mechanism(model)
     times = np.linspace(0.0, 0.5, 26)
@@ -447,8 +484,8 @@ def both(
         ]
     )
     if mechanism.constraints and tool != "InverseDynamicsTool":
-        # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends
-        # of their ranges.
+        # While fulfilling constraints, OpenSim moves coordinates by 1e-5 rad off the ends of their
+        # ranges. The motion therefore stays away from the ends.
         low, high = np.array([info.range for info in infos]).T[:, :, None]
         starts = np.clip(rows[:, :1], low + 0.2, high - 0.2)
         moved = np.clip(rows + starts - rows[:, :1], low + 0.1, high - 0.1)
@@ -472,7 +509,14 @@ def both(
 
 
 def compare(ours: Path, theirs: Path, tolerance: float, small: float = 1e-11) -> None:
-    """All files are there, with the same words and numbers that differ by parts of the largest of their columns."""
+    """Compare two output folders: same files, headers, labels and times, and nearly equal numbers.
+
+    Args:
+        ours: output folder of osimlite.
+        theirs: output folder of OpenSim.
+        tolerance: largest difference relative to the largest number of the column.
+        small: absolute difference that is allowed in addition.
+    """
     assert sorted(path.name for path in ours.iterdir()) == sorted(
         path.name for path in theirs.iterdir()
     )

@@ -1,4 +1,4 @@
-"""Actuators and prescribed forces against a live OpenSim 4.6."""
+"""Compare actuators and prescribed forces with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -58,7 +58,8 @@ def test_actuators_by_torque(model, tmp_path):
             bodyB="/bodyset/b1",
             axis=axis,
             torque_is_global=False,
-            # OpenSim takes the defaults of a document for those of all that it reads later.
+            # Set the value explicitly: OpenSim applies the defaults of a document to everything
+            # that it reads later.
             optimal_force=1.0,
         ),
         TorqueActuator(name="idle", bodyA="b1", bodyB="b0", axis=axis),

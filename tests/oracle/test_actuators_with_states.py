@@ -1,6 +1,7 @@
-"""Muscles, and actuators with states of their own, against a live OpenSim 4.6.
+"""Compare muscles and actuators with internal states with a live OpenSim 4.6.
 
-Derivatives, records, energies of random ones in random states; the steps of a motion and its table.
+The tests compare derivatives, records and energies at random states, and the steps and tables of a
+motion.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ BOUNDS = {
     "fiber_length": (0.03, 0.09),
     "fiber_velocity": (-0.5, 0.5),
 }
-"""Of the states that are tried, by their names."""
+"""Range of each state from which the tests draw values, by the name of the state."""
 HILL = {
     "max_isometric_force": (200, 2000),
     "optimal_fiber_length": (0.05, 0.06),
@@ -49,8 +50,8 @@ TIMES = {
     "deactivation_time_constant": (0.03, 0.08),
     "activation_dynamics_smoothing": (0.1, 10),
 }
-# A process of OpenSim has one set of these times for all of De Groote's muscles; here the usual
-# one.
+# One process of OpenSim uses the same time constants for all muscles of this class. They have their
+# default values here.
 DEGROOTE = {
     **SMOOTH,
     "default_normalized_tendon_force": (0.1, 0.4),
@@ -123,7 +124,12 @@ CASES = {
 
 
 def made(case, control):
-    """A block that hangs on an actuator of random numbers."""
+    """Return a block that hangs on a random actuator, and the random generator.
+
+    Args:
+        case: key of `CASES`.
+        control: constant control of the actuator.
+    """
     name, bounds, more = CASES[case]
     rng = np.random.default_rng(len(case))
     component = find_class(name)
@@ -137,7 +143,7 @@ def made(case, control):
 
 @pytest.fixture(autouse=True)
 def quiet():
-    """Muscles that buckle or are too fast say so."""
+    """Turn off OpenSim's log, which has a line for each muscle that buckles or shortens too fast."""
     opensim.Logger.setLevelString("off")
 
 
@@ -163,7 +169,7 @@ def test_derivatives_and_records(case, control, tmp_path):
         coordinate.setValue(state, y[0], False)
         for path, value in zip(own, y[2:], strict=True):
             theirs.setStateVariableValue(state, path, value)
-        # Last, since that lets go of what muscles keep of their states.
+        # Set the speed last: it makes OpenSim recompute what muscles cache of their states.
         coordinate.setSpeedValue(state, y[1])
         theirs.realizeAcceleration(state)
         expected = [theirs.getStateVariableDerivativeValue(state, path) for path in own]
@@ -172,7 +178,7 @@ def test_derivatives_and_records(case, control, tmp_path):
         labels, values = force.getRecordLabels(), force.getRecordValues(state)
         assert list(engine.columns) == [labels.get(k) for k in range(labels.getSize())]
         assert engine.force_records(0.0, y) == pytest.approx([values.get(0)], rel=1e-9, abs=1e-12)
-        # The old muscles know nothing of energy.
+        # OpenSim computes no potential energy for the deprecated muscles.
         if "Deprecated" not in CASES[case][0]:
             stored = theirs.calcPotentialEnergy(state) + MASS * 9.80665 * y[0]
             assert engine.compute_energies(0.0, y)[2] == pytest.approx(stored, rel=1e-9, abs=1e-9)
@@ -182,7 +188,8 @@ def test_derivatives_and_records(case, control, tmp_path):
 def test_states_and_steps(case, tmp_path):
     model, _ = made(case, 0.5)
     osimlite.write(model, tmp_path / "model.osim")
-    # Stability bounds the steps that Delp's mass allows: every rounding grows.
+    # Stability limits the steps of the stiff Delp1990 muscle with mass, so that rounding errors
+    # grow.
     end = 0.02 if case == "delp" else 0.2
     theirs = simulated(tmp_path / "model.osim", end, 1e-5, equilibrate=True)
     trajectory = osimlite.simulate(model, end, accuracy=1e-5, engine="compiled", equilibrate=True)
@@ -197,14 +204,14 @@ def test_states_and_steps(case, tmp_path):
 
 @pytest.mark.parametrize("case", CASES)
 def test_states_of_what_is_off(case, tmp_path):
-    """Some rest, others change as ever; nothing pulls."""
+    """If the force is disabled, some states rest and others change as usual; no force acts."""
     model, _ = made(case, 0.5)
     actuator = model.find("/forceset/mu")
     actuator.appliesForce = False
     trajectory = osimlite.simulate(model, 0.05, accuracy=1e-5, engine="compiled")
     assert trajectory.forces == {}
-    # OpenSim's ClutchedPathSpring pulls whatever the file says, and its Delp1990Muscle cannot be
-    # computed.
+    # OpenSim's ClutchedPathSpring ignores `appliesForce`, and its Delp1990Muscle cannot be computed
+    # when disabled.
     if case in ("clutched", "delp"):
         assert trajectory.speeds[-1, 0] == pytest.approx(9.80665 * 0.05)
         return
@@ -218,7 +225,7 @@ def test_states_of_what_is_off(case, tmp_path):
 
 
 def test_constants_of_the_first_muscle_count_for_all(tmp_path):
-    """As in a process that computes no other model of such muscles."""
+    """The time constants of the first muscle apply to all, as in an OpenSim process with this model only."""
     model, _ = made("degroote", 0.9)
     slow = {
         "activation_time_constant": 0.03,

@@ -1,4 +1,4 @@
-"""Dampers that keep count of energy against a live OpenSim 4.6: the same steps, the same table of states."""
+"""Compare dampers that integrate dissipated energy with a live OpenSim 4.6: steps and state tables."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ def test_states_and_steps(engine, accuracy, tmp_path):
 
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
 def test_components_anywhere_have_their_places_in_the_table(engine, tmp_path):
-    """Those that the model holds beside its sets stand before all coordinates, those that a body holds too."""
+    """Dampers outside the ForceSet keep OpenSim's order of states.
+
+    States of components that the model or a body holds precede those of all coordinates.
+    """
     model = damped()
     force_set = model.force_set.objects
     slack, stop = force_set.pop(0), force_set.pop(0)

@@ -1,5 +1,6 @@
-"""biorbd, live: it reads our files, and has the poses, mass matrices, markers and path lengths of the model.
+"""Compare exported bioMod files, read by a live biorbd, with the model.
 
+The tests compare poses, mass matrices, markers, path lengths, moment arms and muscle parameters.
 The variable OSIMLITE_BIORBD names a Python that has biorbd (``pip install biorbd``).
 """
 
@@ -121,7 +122,7 @@ def test_biorbd_computes_the_same(tmp_path: Path, make: Callable[[], osimlite.Mo
                 muscle.pennation_angle_at_optimal,
                 muscle.max_contraction_velocity,
             ]
-            # OpenSim's activation dynamics of first order, with the time constants of biorbd.
+            # First-order activation dynamics of OpenSim with the time constants that biorbd uses.
             assert result["rising"][k] == pytest.approx((0.8 - 0.3) / (0.01 * (0.5 + 1.5 * 0.3)))
             assert result["muscles"][k] == pytest.approx(characteristics, abs=1e-12)
             if muscle.path in wrapped:
@@ -132,5 +133,5 @@ def test_biorbd_computes_the_same(tmp_path: Path, make: Callable[[], osimlite.Mo
                     moment_arms[muscle.path].get(mechanism.coordinates[index].path, 0.0)
                     for index in indices
                 ]
-                # OpenSim's moment arm is the negative derivative of the length.
+                # OpenSim defines the moment arm as the negative derivative of the length.
                 np.testing.assert_allclose(-np.array(result["arms"][k]), arms, atol=1e-9)

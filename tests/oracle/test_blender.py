@@ -1,6 +1,7 @@
-"""Blender, live: it places the bones of our BVH files and the bodies of our glTF files where the model has them.
+"""Compare poses in a live Blender with the model, after export to BVH and glTF.
 
-The variable OSIMLITE_BLENDER names a Python 3.11 that has Blender (``pip install bpy``).
+Bones of BVH files and objects of glTF files must be where the model has its bodies. The variable
+OSIMLITE_BLENDER names a Python 3.11 that has Blender (``pip install bpy``).
 """
 
 from __future__ import annotations
@@ -65,14 +66,14 @@ os.write(answer_stream, b"\\nANSWER" + json.dumps([bpy.app.version_string, resul
 """
 
 UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Rotation from our axes, whose Y points upwards, to Blender's, whose Z does."""
+"""Rotation from OpenSim's axes (Y up) to Blender's axes (Z up)."""
 
 CLOSE = 2e-6
-"""Largest difference of positions (m) and of elements of rotation matrices: Blender has single precision."""
+"""Largest difference of positions (m) and of entries of rotation matrices; Blender has single precision."""
 
 
 def ask_blender(path: Path, times: list[float]) -> list[dict[str, Any]]:
-    """Return the poses (4, 4) of bones or objects that Blender has at each time."""
+    """Return for each time the poses (4, 4) of all bones or objects in Blender, by name."""
     python = os.environ.get(VARIABLE)
     if not python:
         pytest.skip(f"needs Blender: {VARIABLE} names no Python that has bpy")
@@ -96,13 +97,17 @@ def ask_blender(path: Path, times: list[float]) -> list[dict[str, Any]]:
 def measure(
     mechanism: Mechanism, values: Any, result: list[dict[str, Any]], at_joint: bool
 ) -> tuple[float, float]:
-    """Return the largest differences of positions (m) and of rotations from the bodies of a mechanism.
+    """Return the largest differences between Blender's poses and the bodies of a mechanism.
 
     Args:
-        mechanism: of the model.
+        mechanism: mechanism of the model.
         values: coordinates (frames, n).
-        result: poses that Blender has.
-        at_joint: whether a pose is at the centre of the joint of a body, not at the body's origin.
+        result: Blender's poses.
+        at_joint: whether a pose is at the centre of the joint of a body, not at the origin of the
+            body.
+
+    Returns:
+        The largest difference of positions (m) and that of entries of rotation matrices.
     """
     position_error = rotation_error = 0.0
     for q, poses in zip(values, result, strict=True):
@@ -118,8 +123,12 @@ def measure(
 
 
 def make_motion(mechanism: Mechanism, file: Path) -> tuple[Any, Any]:
-    """Write a smooth motion of all coordinates; return its times and values."""
-    # The exporter for glTF writes 60 poses per second.
+    """Write a smooth motion of all coordinates.
+
+    Returns:
+        The times (frames,) in s, and the coordinates (frames, n).
+    """
+    # The glTF exporter writes 60 poses per second.
     times = np.arange(31) / 60.0
     phases = 1.7 * np.arange(len(mechanism.coordinates))
     values = np.array(
@@ -141,7 +150,11 @@ def make_motion(mechanism: Mechanism, file: Path) -> tuple[Any, Any]:
 
 
 def compare(model: Model, suffix: str, folder: Path) -> tuple[float, float]:
-    """Export a model with a motion, read it in Blender, and return the differences of all poses."""
+    """Export a model with a motion and compare it in Blender.
+
+    Returns:
+        The largest differences of `measure`.
+    """
     osimlite.write(model, folder / "it.osim")
     mechanism = osimlite.mechanism(model)
     times, values = make_motion(mechanism, folder / "motion.sto")

@@ -1,4 +1,4 @@
-"""Paths over obstacles, against a live OpenSim 4.6."""
+"""Compare paths over obstacles (Scholz2015GeometryPath) with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def at(frame, *location):
 
 
 def over(kind, frame, *location, hint=(nan, nan, nan)):
-    """An obstacle."""
+    """Return an obstacle as the tuple that `carrier` expects."""
     return kind, frame, location, hint
 
 
@@ -77,7 +77,7 @@ PATHS = {
 
 
 def carrier(elements):
-    """Three bodies in a row, and a spring along a path."""
+    """Return a chain of three bodies and a spring along a path with the given elements."""
     model, body = Model(name="cables"), None
     for number in range(3):
         below, body = (
@@ -121,7 +121,11 @@ def carrier(elements):
 
 @pytest.mark.parametrize("elements", PATHS.values(), ids=PATHS)
 def test_cable(elements, tmp_path):
-    """At poses that OpenSim comes to from the default one: it starts each search from the path that it found last."""
+    """Compare four random poses, each with a fresh OpenSim model.
+
+    OpenSim starts each search for a path from the path that it found last, so its result depends on
+    the previous poses.
+    """
     opensim.Logger.setLevelString("off")
     model, file = carrier(elements), tmp_path / "model.osim"
     osimlite.write(model, file)

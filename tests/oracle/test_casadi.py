@@ -1,4 +1,7 @@
-"""Accelerations by functions of CasADi are OpenSim's; CasADi has a process of its own."""
+"""Compare accelerations of exported CasADi functions with OpenSim's.
+
+CasADi runs in another process, because it cannot be loaded together with OpenSim.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,7 @@ def test_accelerations_are_those_of_opensim(number, shared):
     states, controls, rows = json.loads(done.stdout)
     opensim.Logger.setLevelString("error")
     model = opensim.Model(str(path))
-    # Controls are given.
+    # The test sets the controls itself.
     for controller in model.getControllerSet():
         controller.set_enabled(False)
     state = model.initSystem()

@@ -1,4 +1,4 @@
-"""The compiled engine against OpenSim's Manager, from random starts."""
+"""Compare the compiled engine with OpenSim's Manager from random initial states."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def path(fixtures):
 
 
 def opensim_end(path, values, speeds):
-    """Values of all coordinates when OpenSim's Manager has integrated from a start."""
+    """Return the values of all coordinates at the end of an integration by OpenSim's Manager."""
     opensim.Logger.setLevelString("error")
     model = opensim.Model(path)
     state = model.initSystem()
@@ -43,7 +43,8 @@ def test_random_starts(path):
         free = [info for info in simulation.mechanism.coordinates if not info.locked]
         for _ in range(STARTS):
             values = {info.name: info.default_value + rng.uniform(-0.2, 0.2) for info in free}
-            # Above the platform, so that nothing starts deep inside of it.
+            # The pelvis starts above the platform, so that no contact geometry starts deep inside
+            # of it.
             values["Pelvis_ty"] = 1.0 + rng.uniform(0.0, 0.2)
             speeds = {info.name: rng.uniform(-0.5, 0.5) for info in free}
             ours = simulation.run(UNTIL, accuracy=ACCURACY, initial=values, initial_speeds=speeds)

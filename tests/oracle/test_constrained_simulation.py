@@ -1,4 +1,4 @@
-"""Motion on axes that follow functions and under constraints against OpenSim 4.6, live."""
+"""Compare simulations with axis functions and constraints with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -24,14 +24,26 @@ pytestmark = pytest.mark.oracle
 
 @pytest.fixture(params=["bullet", "compiled"])
 def engine(request: pytest.FixtureRequest) -> str:
-    """Each engine by name."""
+    """Return the name of each engine in turn."""
     return str(request.param)
 
 
 def both(
     path: Path, to: float, accuracy: float, seed: int, **settings: Any
 ) -> tuple[Any, Any, tuple[int, int]]:
-    """Ends (2, n) of values and speeds of either program from the same random speeds, and how many steps each took."""
+    """Simulate a model with osimlite and with OpenSim from the same random speeds.
+
+    Args:
+        path: model file.
+        to: final time (s).
+        accuracy: accuracy of both integrators.
+        seed: seed of the random speeds.
+        **settings: arguments of `Simulation`.
+
+    Returns:
+        Final values and speeds (2, n) of osimlite, those of OpenSim, and the numbers of steps of
+            both.
+    """
     rng = np.random.default_rng(seed)
     with Simulation(osimlite.read(path), **settings) as simulation:
         mechanism = simulation.mechanism
@@ -94,7 +106,8 @@ def test_real_models_without_muscles(name: str, engine: str, corpus: Any, tmp_pa
         if FORCE_TYPES.find(type(force)) is None or isinstance(force, PathSpring | Muscle):
             force.appliesForce = False
     osimlite.write(model, tmp_path / "model.osim")
-    # Knees that turn about several axes have OpenSim's derivatives.
+    # OpenSim's derivatives are inexact for knees that rotate about several axes, therefore use its
+    # own.
     path = tmp_path / "model.osim"
     ours, theirs, (our_steps, their_steps) = both(
         path, CORPUS[name], 1e-6, 7, engine=engine, opensim_derivatives=True
@@ -104,10 +117,10 @@ def test_real_models_without_muscles(name: str, engine: str, corpus: Any, tmp_pa
 
 
 def four_bars() -> osimlite.Model:
-    """Crank, coupler and rocker on pins, the last of which closes the loop.
+    """Return a four-bar linkage: crank, coupler and rocker on pins, closed by the last pin.
 
-    OpenSim halves a body for that and gives one half a wrong inertia; not so for 2 kg about the
-    body's origin.
+    OpenSim splits a body to close the loop and gives one half a wrong inertia. With a mass of 2 kg
+    about the origin of the body its error vanishes.
     """
     model, inertia = osimlite.Model(name="four_bars"), (0.3, 0.2, 0.4, 0.0, 0.0, 0.0)
     crank, coupler, rocker = (
@@ -135,10 +148,10 @@ def test_a_loop_of_four_bars(engine: str, tmp_path: Path) -> None:
 
 
 def tilted_chain() -> osimlite.Model:
-    """Four bars on pins, one of whose axes is all but parallel to the others, the last bar's end held at its place.
+    """Return a chain of four bars on pins whose end is fixed at its position.
 
-    What holds the end in the plane says almost nothing: OpenSim leaves that equation out of
-    accelerations.
+    The axis of one pin is inclined to the others by 2e-6 rad. The constraint out of the plane is
+    therefore nearly redundant, and OpenSim leaves that equation out of the accelerations.
     """
     model, inertia = osimlite.Model(name="chain"), (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
     parent: osimlite.Body | osimlite.Ground = model.ground

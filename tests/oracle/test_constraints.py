@@ -1,4 +1,4 @@
-"""Constraints, prescribed coordinates and loops against OpenSim 4.6, live, in models made for it."""
+"""Compare constraints, prescribed coordinates and closed loops with a live OpenSim 4.6, in small models."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.oracle
 
 
 def _rolling(model: Any, bodies: Bodies) -> None:
-    """OpenSim's Python has no such class, its files have."""
+    """Add a RollingOnSurfaceConstraint, which OpenSim's Python module can only read from a file."""
     text = """<?xml version="1.0"?><OpenSimDocument Version="40600"><RollingOnSurfaceConstraint name="roll">
         <socket_rolling_body>/bodyset/loose</socket_rolling_body>
         <socket_surface_body>/bodyset/outer</socket_surface_body>
@@ -53,7 +53,7 @@ def _weld_like_loop(model: Any, bodies: Bodies) -> None:
 
 
 def _loop(kind: str, count: int) -> Change:
-    """A joint that closes a loop from the floating body to the outer one."""
+    """Return a function that adds a joint from the floating body to the outer one, which closes a loop."""
 
     def add(model: Any, bodies: Bodies) -> None:
         joint = getattr(opensim, kind)(
@@ -73,7 +73,10 @@ def _loop(kind: str, count: int) -> Change:
 
 
 def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) -> None:
-    """OpenSim binds the first independent one, and leaves the dependent one free."""
+    """A coupler with a constant function determines the dependent coordinate.
+
+    OpenSim constrains the first independent coordinate instead, and leaves the dependent one free.
+    """
     model, bodies = _chain(np.random.default_rng(15))
     _coupler(("pin_0",), "free_3", opensim.Constant(0.25))(model, bodies)
     mechanism = build_printed(model, tmp_path)
@@ -89,13 +92,17 @@ def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) 
 
 
 def _no_further_than(mechanism: Mechanism, ours: Any, theirs: Any) -> None:
-    """Our default pose is as near to the default values as OpenSim's, if that fulfils the constraints."""
+    """Assert that our default pose is at least as near to the default values as OpenSim's.
+
+    The assertion is skipped if OpenSim's pose violates the constraints.
+    """
     wanted, state = mechanism.values({}), mechanism.at(theirs)
     if any(
         np.abs(item.position_errors(state)).max(initial=0.0) > 1e-9
         for item in mechanism.constraints
     ):
-        # It never assembles loops that only joints close, and cannot always reach what it wants.
+        # OpenSim never assembles loops that only joints close, and its assembly cannot always reach
+        # its target.
         return
     counted = np.array([not info.yielding for info in mechanism.coordinates])
     our_cost, their_cost = (float(np.sum((counted * (q - wanted)) ** 2)) for q in (ours, theirs))
@@ -123,7 +130,11 @@ def _numbers(what: str, state: Any, coordinates: list[Any]) -> Any:
 def _go(
     rng: np.random.Generator, mechanism: Mechanism, state: Any, coordinates: list[Any]
 ) -> tuple[Any, Any, float]:
-    """Both to the same random state that fulfils the constraints."""
+    """Move both models to the same random state that fulfils the constraints.
+
+    Returns:
+        Coordinates, speeds and time (s).
+    """
     time = float(rng.uniform(0.0, 2.0))
     q, _ = mechanism.default_state()
     moved = [0.0 if info.locked else rng.uniform(-0.2, 0.2) for info in mechanism.coordinates]
@@ -135,7 +146,7 @@ def _go(
 
 
 def _unbroken(model: Any, state: Any) -> None:
-    """OpenSim sees no violation either, so it means the same by the constraints."""
+    """Assert that OpenSim too finds no violation of the constraints in the state."""
     model.realizeAcceleration(state)
     for errors in (state.getQErr(), state.getUErr()):
         assert np.abs(errors.to_numpy()).max() < 1e-8
@@ -167,7 +178,8 @@ def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
     mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     assert mechanism.total_mass == pytest.approx(model.getTotalMass(state), rel=1e-14)
-    # OpenSim gives the half that it adds the unit inertia about the body's origin for an inertia.
+    # OpenSim uses the unit inertia about the origin of the body as the inertia of the half that it
+    # adds.
     half = mechanism.bodies[-1]
     properties, arm = half.mass_properties, half.mass_properties.center
     wrong = properties.inertia / properties.mass + (arm @ arm) * np.eye(3) - np.outer(arm, arm)
@@ -196,7 +208,7 @@ def test_a_weld_that_closes_a_loop_is_a_constraint(tmp_path: Path) -> None:
 
 
 def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
-    """OpenSim leaves it off until told, and sees no violation of positions or speeds in our states."""
+    """OpenSim does not enforce rolling by default, and finds no violation in our states once enforced."""
     rng = np.random.default_rng(14)
     model, bodies = _chain(rng)
     _rolling(model, bodies)
@@ -215,7 +227,10 @@ def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("accuracy", "off"), [(1e-9, 5e-11), (1e-9, 1e-3), (1e-3, 5e-5)])
 def test_a_motion_starts_at_opensims_pose(accuracy: float, off: float, tmp_path: Path) -> None:
-    """A pose within a tenth of the assembly accuracy is assembled: only the integrator mends it, evenly."""
+    """OpenSim does not assemble a pose that is within a tenth of the assembly accuracy.
+
+    Only the integrator then corrects the pose, by an equal change of all coordinates.
+    """
     model, bodies = _chain(np.random.default_rng(14))
     _coupler(("ball_0",), "pin_0", _linear((1.0, 0.0)))(model, bodies)
     model.set_assembly_accuracy(accuracy)

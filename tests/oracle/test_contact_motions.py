@@ -1,4 +1,7 @@
-"""Motions with contact against a live OpenSim 4.6 at equal accuracy: balls, blocks, terrain, feet that are meshes."""
+"""Compare motions with contact with a live OpenSim 4.6 at equal accuracy.
+
+The models have balls, blocks, terrain of several surfaces, and feet that are meshes.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ UP = (0.0, 0.0, -1.5707963267948966)
 
 
 def by_opensim(path, to, accuracy):
-    """The states at the end, by label."""
+    """Return OpenSim's final state by label."""
     result = simulated(path, to, accuracy)
     return dict(zip(result.columns, result.rows[-1], strict=True))
 
@@ -57,12 +60,12 @@ def compare(path, to=0.5, accuracy=1e-9, tolerance=1e-6):
 
 @pytest.mark.parametrize("name", ["m0134", "m0178", "m0466", "m0478"])
 def test_published_models(corpus, name, tmp_path):
-    """A ball that is a mesh, a tug of war by an actuator, a hopping leg, a walker."""
+    """The models are a mesh ball, a tug of war by an actuator, a hopping leg and a walker."""
     model = next(model for model in corpus if model.id == name)
     shutil.copytree(model.path.parent, tmp_path / "model")
     path = tmp_path / "model" / model.path.name
-    # As OpenSim prints it: where it brings an old file up to date, it keeps six digits of some
-    # numbers.
+    # Use OpenSim's print of the model: when OpenSim upgrades an old file it keeps six digits of
+    # some numbers.
     path.write_bytes(gzip.decompress(model.converted.read_bytes()))
     compare(path)
 
@@ -83,7 +86,7 @@ def touching(name, surfaces, stiffness=1e6, kind=HuntCrossleyForce, transition=0
 
 
 def balls(count=2) -> Model:
-    """Balls thrown on a floor and on each other."""
+    """Return a model of balls that are thrown on a floor and on each other."""
     model = Model(name="balls")
     floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=UP)
     model.add(floor)
@@ -120,8 +123,8 @@ def test_balls_at_several_accuracies(tmp_path):
         error, their_error = (
             max(abs(result[label] - exact[label]) for label in ours) for result in (ours, theirs)
         )
-        # OpenSim hands out states between its steps, so that the two agree no better than they are
-        # exact.
+        # OpenSim reports states between its steps. The two programs therefore agree only within the
+        # error of each.
         assert error < 10.0 * max(their_error, 1e-8)
         errors.append(error)
     assert errors[-1] < 1e-6 and errors == sorted(errors, reverse=True)
@@ -134,7 +137,7 @@ def test_balls_at_several_accuracies(tmp_path):
 
 
 def terrain(folder) -> Model:
-    """The walker among half spaces, balls and a mesh, held by springs, drawn by a magnet."""
+    """Return the walker among half spaces, balls and a mesh, held by springs and drawn by a magnet."""
     model = dynamic_walker()
     platform, feet = "/bodyset/Platform", []
     for side in ("R", "L"):
@@ -194,7 +197,7 @@ def terrain(folder) -> Model:
 
 
 def foot(folder) -> Model:
-    """The walker on feet that are meshes."""
+    """Return the walker with feet that are meshes."""
     model = dynamic_walker()
     write_vtp(folder / "foot.vtp", *ball((0.12, 0.05, 0.06), 14, 9))
     for force in [item for item in model.components(HuntCrossleyForce) if "Foot" in item.name]:

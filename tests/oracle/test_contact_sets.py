@@ -1,4 +1,7 @@
-"""Several spheres in one HuntCrossleyForce, at random: OpenSim's order of work and its early return."""
+"""Compare random HuntCrossleyForces with several spheres with OpenSim.
+
+The result depends on the order of OpenSim's computation and on its early return.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,13 @@ NORMAL = 0.0, 1.0, 0.0
 
 
 def draw(rng):
-    """Radii, positions and velocities of spheres near the plane y = 0, close enough to touch each other too."""
+    """Return random radii, positions and velocities of spheres near the plane y = 0.
+
+    The spheres are close enough to touch each other too.
+
+    Returns:
+        Radii (n,), positions (n, 3) and velocities (n, 3).
+    """
     count = int(rng.integers(2, 7))
     radii = rng.uniform(0.03, 0.08, count)
     positions = rng.uniform(-0.15, 0.15, (count, 3))
@@ -34,7 +43,7 @@ def draw(rng):
 
 
 def by_opensim(radii, positions, velocities):
-    """Force on each sphere, and energy of the HuntCrossleyForce."""
+    """Return OpenSim's force on each sphere and the energy of the HuntCrossleyForce."""
     opensim.Logger.setLevelString("error")
     model = opensim.Model()
     model.setGravity(opensim.Vec3(0))
@@ -109,12 +118,12 @@ def test_random_sets_of_spheres():
         assert found_energy == pytest.approx(energy, rel=1e-9)
         alone, _ = by_osimlite(*case, simbody_early_return=False)
         suppressed += not np.allclose(alone, expected, rtol=1e-6)
-    # The switch must matter for some of the draws, and not for all.
+    # The early return must change the result of some of the draws, and not of all.
     assert 5 < suppressed < 60
 
 
 def test_one_sphere_a_force_has_no_early_return():
-    """A set of a plane and one sphere is the same both ways."""
+    """A force between a plane and one sphere is the same with and without the early return."""
     rng = np.random.default_rng(21)
     for _, early in itertools.product(range(5), (True, False)):
         radii, positions, velocities = (x[:1] for x in draw(rng))

@@ -1,4 +1,4 @@
-"""Controls from files against a live OpenSim 4.6."""
+"""Compare controls that are read from files with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def model(request, tmp_path, monkeypatch):
 
 
 def compare_controls(path, times, tolerance=1e-12) -> None:
-    """The controls of all actuators of a model at some times, from files in its folder."""
+    """Compare the controls of all actuators of a model with OpenSim's at several times."""
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(path))
     state = theirs.initSystem()
@@ -57,7 +57,7 @@ TIMES = [-1.0, -0.1, 0.0, 0.013, 0.2, 0.3, 0.37, 0.5, 0.61, 0.99, 1.0, 1.7]
 
 @pytest.mark.parametrize("interpolation", ["linear", "steps", "cubic"])
 def test_controls_that_a_search_writes(tmp_path, interpolation):
-    """Nodes, switches at one time, a factor and a number are the same to OpenSim, but exactly at steps."""
+    """OpenSim reads nodes, switches, a factor and a number as osimlite does, except exactly at steps."""
     model = carrier(next(iter(JOINTS.values())))
     first, second = (info.name for info in build_mechanism(model).coordinates[:2])
     motors(model, first, second)
@@ -85,7 +85,7 @@ def motors(model, *names) -> None:
 @pytest.mark.parametrize("start", [-0.1, 0.37, 0.5])
 @pytest.mark.parametrize("method", [None, 0, 1, 2, 3, 4, 5])
 def test_controls_from_a_file(model, method, start, tmp_path):
-    """At a time within the table, at its start, and before it."""
+    """The times lie within the table, at its start, and before it."""
     motors(model, "q0_0", "q1_0", "q2_0")
     times = np.linspace(start, 1.0, 23)
     rows = np.column_stack([np.sin((3.0 + k) * times + k) for k in range(2)])
@@ -102,13 +102,13 @@ def test_controls_from_a_file(model, method, start, tmp_path):
         )
     )
     assert compare(model, tmp_path) > 0
-    # Far outside, splines of high degree have lost digits.
+    # Splines of high degree lose digits far outside of the data.
     compare_controls(tmp_path / "model.osim", TIMES, 1e-11)
 
 
 @pytest.mark.parametrize("method", [0, 1, 3])
 def test_a_file_with_equal_times_and_labels(model, method, tmp_path):
-    """The last row at a time counts, and the first column of a label."""
+    """The last of several rows at one time counts, and the first of several columns with one label."""
     motors(model, "q0_0")
     rows = [[float(number), 5.0] for number in range(6)]
     write_sto(
@@ -127,7 +127,7 @@ def test_a_file_with_equal_times_and_labels(model, method, tmp_path):
 
 
 def test_a_column_beside_a_function_of_the_same_name(model, tmp_path):
-    """The function counts, and the column does not."""
+    """A control function takes precedence over a column of the controls file."""
     model.add(CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0))
     write_sto(
         tmp_path / "controls.sto", "controls", [0.0, 1.0], ["/forceset/motor"], [[1.0], [2.0]]
@@ -161,7 +161,10 @@ POINTS = {
 )
 @pytest.mark.parametrize("enabled", [True, False])
 def test_control_sets(model, enabled, more, points, tmp_path):
-    """A set enables its controller; limits and controls of other than the model do nothing."""
+    """A ControlSetController is enabled by its set.
+
+    Limits of controls, and controls for something else than the model, have no effect.
+    """
     motors(model, "q0_0", "q1_0", "q2_0")
     curve = f"<default_max>0.5</default_max>{more}<x_nodes>{points}</x_nodes>"
     controls = (
@@ -199,7 +202,10 @@ def test_a_control_set_in_a_table(model, tmp_path):
 
 @pytest.mark.parametrize("frames", [(False, False), (True, False), (False, True)])
 def test_synergies(model, frames, tmp_path):
-    """Of signals and columns of tables, some controls being those of a body; they add to what others do."""
+    """Synergies combine signals and columns of tables, and add to the controls of other controllers.
+
+    One of the actuators, a BodyActuator, has several controls.
+    """
     motors(model, "q0_0", "q1_0")
     here, there = frames
     body = BodyActuator(name="push", socket_body="/bodyset/b1", point=(0.1, 0.2, 0.3))
@@ -236,7 +242,10 @@ def test_synergies(model, frames, tmp_path):
 
 
 def test_reflexes(model, tmp_path):
-    """A muscle that lengthens, at some of the states, has a greater control; here that is its activation."""
+    """A reflex increases the control of a muscle that lengthens, which happens at some of the states.
+
+    The control is the activation of this muscle class.
+    """
     model.add(*along(RigidTendonMuscle, optimal_fiber_length=0.4, max_contraction_velocity=3.0))
     drive(model, "along0", "along1")
     for name, gain in (("first", 2.0), ("second", 3.0)):
@@ -284,7 +293,7 @@ def test_a_column_beside_a_function_of_the_same_name_in_an_old_document(model, w
     ],
 )
 def test_files_that_do_not_fit(label, method, words, tmp_path):
-    """OpenSim refuses these too."""
+    """OpenSim rejects these files too."""
     model = carrier(JOINTS["pin, slider, universal"])
     for name, coordinate in (("motor", "q1_0"), ("other", "q0_0")):
         model.add(CoordinateActuator(name=name, coordinate=coordinate))

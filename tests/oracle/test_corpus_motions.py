@@ -1,6 +1,7 @@
-"""Every real model beside a live OpenSim 4.6: equilibrium, derivatives at random states, and motions step by step.
+"""Compare every corpus model with a live OpenSim 4.6: equilibrium, derivatives and motions.
 
-Large models are taken only if OSIMLITE_ALL_MODELS is set.
+Derivatives are compared at random states, motions step by step. Large models are included only if
+OSIMLITE_ALL_MODELS is set.
 """
 
 from __future__ import annotations
@@ -25,26 +26,26 @@ opensim = pytest.importorskip("opensim", reason="needs the opensim package (extr
 pytestmark = pytest.mark.oracle
 
 SMALL = 15_000
-"""Bytes of OpenSim's print, compressed: about so large is a leg, or an arm."""
+"""Compressed size (bytes) of OpenSim's print up to which a model is included by default: a leg or an arm."""
 SECONDS, ACCURACY = 0.05, 1e-5
 MOST_STEPS = 2_000
-"""Of OpenSim; models that it can follow take a tenth."""
+"""Largest number of steps for OpenSim; models that it can simulate need a tenth of it."""
 NEAR = 1e-9
-"""Of the largest number."""
+"""Tolerance of final states, relative to the largest number."""
 
 SINGULAR = {"m0109"}
-"""A motion moves no mass."""
+"""Models with a singular mass matrix: some motion moves no mass."""
 SLOWLY = {"m0129", "m0239"}
-"""OpenSim comes to no end, and takes minutes for it."""
+"""Models whose simulation OpenSim cannot finish, after minutes."""
 STUCK = {"m0115", "m0123"} | SLOWLY | SINGULAR
-"""OpenSim comes to NaN, or to no end."""
+"""Models for which OpenSim's simulation ends in NaN, or does not end."""
 SENSITIVE = {"m0014", "m0037", "m0116", "m0161", "m0163", "m0172", "m0225"}
-"""OpenSim's own motion is about as far off if it starts 1e-14 or 1e-11 away."""
+"""Models for which OpenSim's own result changes as much if the start changes by 1e-14 or 1e-11."""
 CHOICES: Any = {"opensim_derivatives": True, "simbody_early_return": True}
 
 
 class Both(NamedTuple):
-    """A model in OpenSim, ready to be computed, and the same as osimlite reads it."""
+    """A model initialised in OpenSim, its initial state, and the model as osimlite reads it."""
 
     theirs: Any
     start: Any
@@ -54,14 +55,17 @@ class Both(NamedTuple):
 
 @pytest.fixture
 def both(corpus_model: Any, tmp_path: Path) -> Both:
-    """Of a real model, as OpenSim prints it: what it reads of old files has six digits."""
+    """Return a corpus model as OpenSim prints it, in both programs.
+
+    OpenSim's upgrade of old files leaves six digits, which both programs must read.
+    """
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
     if corpus_model.converted.stat().st_size > SMALL and "OSIMLITE_ALL_MODELS" not in os.environ:
         pytest.skip("large; OSIMLITE_ALL_MODELS=1 takes it too")
     opensim.Logger.setLevelString("off")
     for item in PRISTINE:
-        # What `<defaults>` of the models before have changed.
+        # Undo the changes that `<defaults>` of earlier models have made.
         opensim.OpenSimObject.registerType(item)
     for beside in corpus_model.path.parent.iterdir():
         shutil.copy(beside, tmp_path)
@@ -89,7 +93,7 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
     try:
         both.theirs.equilibrateMuscles(start)
     except RuntimeError:
-        # Some muscle has no equilibrium where the model starts.
+        # Some muscle has no equilibrium at the initial state of the model.
         start, is_settled = both.start, False
     rng = np.random.default_rng(3)
     with Simulation(both.ours, engine, folder=both.folder, **CHOICES) as simulation:
@@ -113,7 +117,8 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
         expected = np.array(
             [both.theirs.getStateVariableDerivativeValue(state, path) for path in paths]
         )
-        # Of the value of a coordinate, OpenSim gives the speed.
+        # OpenSim gives the speed as the derivative of a coordinate's value; compare the rates of
+        # the coordinates.
         owners = [
             opensim.Coordinate.safeDownCast(both.theirs.getComponent(info.path)) for info in free
         ]
@@ -125,7 +130,16 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
 
 
 def _moved(both: Both, paths: Sequence[str], apart: float = 0.0) -> tuple[Any, int]:
-    """Where OpenSim ends (n,), from a start that may be some way apart, and after how many steps."""
+    """Simulate a model with OpenSim.
+
+    Args:
+        both: model in both programs.
+        paths: state variables.
+        apart: relative and absolute change of the initial coordinates.
+
+    Returns:
+        The final state (n,) and the number of steps.
+    """
     start = opensim.State(both.start)
     for path in paths if apart else ():
         coordinate = opensim.Coordinate.safeDownCast(
@@ -142,7 +156,11 @@ def _moved(both: Both, paths: Sequence[str], apart: float = 0.0) -> tuple[Any, i
 
 
 def test_motions(both: Both, corpus_model: Any) -> None:
-    """Of 41 models none is refused, 28 end near and take as many steps, 7 end as near as OpenSim's own."""
+    """Compare the final state and the number of steps with OpenSim's.
+
+    None of 41 models is rejected. 28 end near OpenSim's state after the same number of steps. For 7
+    others the difference is as large as OpenSim's own after a tiny change of the start.
+    """
     names = both.theirs.getStateVariableNames()
     paths = [names.get(index) for index in range(names.getSize())]
     if not paths:
@@ -154,7 +172,7 @@ def test_motions(both: Both, corpus_model: Any) -> None:
             assert np.isnan(_moved(both, paths)[0]).any()
         return
     with Simulation(both.ours, "compiled", folder=both.folder, **CHOICES) as simulation:
-        # OpenSim's optimizer may start 1e-10 apart.
+        # OpenSim's assembly may start 1e-10 apart, therefore use its initial values.
         moving = {
             info.path
             for info in simulation.mechanism.coordinates
@@ -183,6 +201,7 @@ def test_motions(both: Both, corpus_model: Any) -> None:
         )
     else:
         assert off < NEAR * scale
-        # What reports at times of its own cuts OpenSim's rows, not its steps.
+        # A reporter with its own times adds rows to OpenSim's table without a step of the
+        # integrator.
         if not any("Reporter" in type(component).__name__ for component in both.ours.components()):
             assert trajectory.summary["steps"] == steps

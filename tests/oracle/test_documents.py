@@ -1,4 +1,4 @@
-"""OpenSim 4.6 prints setup files and other documents as osimlite does."""
+"""Compare OpenSim 4.6's print of setup files and other documents with osimlite's."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.oracle
 DOCUMENTS = sorted((ROOT / "fixtures" / "documents").iterdir())
 OLD = {"one_trial": "InverseKinematicsTool", "inverse_dynamics": "InverseDynamicsTool"}
 OLD |= {"force_files": "CMCTool", "replaced_forces": "AnalyzeTool"}
-"""Documents of old versions, and the class that OpenSim reads them with."""
+"""Documents of old versions, and the class with which OpenSim reads each."""
 
 
 PRINT = """
@@ -34,10 +34,10 @@ for path in sys.argv[2:]:
 
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of the documents as OpenSim prints them."""
+    """Return a folder with the documents as OpenSim prints them."""
     folder = tmp_path_factory.mktemp("printed")
-    # In a process of its own, and last what has defaults: in OpenSim they are those of all that is
-    # read later.
+    # OpenSim runs in another process. The document with `<defaults>` comes last, because OpenSim
+    # applies its defaults to everything that it reads later.
     paths = sorted(DOCUMENTS, key=lambda path: path.stem == "defaults")
     run_script(PRINT, folder, *paths)
     return folder
@@ -54,7 +54,7 @@ def test_opensim_prints_the_same(path: Path, printed: Path) -> None:
     lines = osimlite.to_text(result.top, numbers="opensim", comments=False).splitlines(
         keepends=True
     )
-    # OpenSim drops what it does not know; here it is kept.
+    # OpenSim drops unknown elements; osimlite retains them.
     unknown = [note.word for note in result.notes if note.kind == "unknown-tag"]
     ours = "".join(
         line for line in lines if not any(line.strip().startswith(f"<{tag}>") for tag in unknown)
@@ -69,7 +69,7 @@ def test_opensim_prints_the_same(path: Path, printed: Path) -> None:
 @pytest.mark.parametrize("name", OLD)
 def test_opensim_upgrades_alike(name: str, tmp_path: Path) -> None:
     opensim.Logger.setLevelString("off")
-    # OpenSim writes a file beside the old one.
+    # OpenSim writes a file beside the old one, therefore use a copy.
     copy = tmp_path / f"{name}.xml"
     copy.write_bytes((ROOT / "fixtures" / "versions" / copy.name).read_bytes())
     cls = getattr(opensim, OLD[name])

@@ -1,4 +1,4 @@
-"""Lengths and moment arms of paths while MuJoCo moves a model, beside OpenSim's in the same pose."""
+"""Compare lengths and moment arms of paths, while MuJoCo moves a model, with OpenSim's in the same pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contact of ellipsoids with each other and with spheres against a live OpenSim 4.6."""
+"""Compare contact of ellipsoids with each other and with spheres with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -29,7 +29,15 @@ TRANSITION = 0.1
 
 
 def touching_pair(rng, round_one):
-    """Half axes, angles and the centre of the second of two ellipsoids that overlap a little."""
+    """Return two random ellipsoids that overlap a little.
+
+    Args:
+        rng: random generator.
+        round_one: whether the second ellipsoid is a sphere.
+
+    Returns:
+        Half axes of both (m), angles (2, 3) in rad, and the centre of the second (m).
+    """
     radii = (
         rng.uniform(0.3, 1.0, 3),
         np.full(3, rng.uniform(0.3, 1.0)) if round_one else rng.uniform(0.3, 1.0, 3),

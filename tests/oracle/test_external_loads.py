@@ -1,4 +1,4 @@
-"""Measured forces against a live OpenSim 4.6: in a model, and in its InverseDynamicsTool."""
+"""Compare external loads with a live OpenSim 4.6: within a model, and in its InverseDynamicsTool."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write_data(path, rows, start=0.0, end=1.0):
 
 
 def loads(names):
-    """Every combination of what there may be, in some bodies and frames."""
+    """Return external forces with every combination of options, on several bodies and frames."""
     first, second, third, framed = names
     ids = {"force_identifier": "f_v", "point_identifier": "f_p", "torque_identifier": "m_"}
     forces = [
@@ -103,7 +103,7 @@ def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
     write_loads(tmp_path / "loads.xml", places)
     theirs = opensim.Model("model.osim")
     if within:
-        # OpenSim gives sets within a model a name of its own.
+        # OpenSim gives a set within a model a name of its own.
         added = opensim.ExternalLoads.safeDownCast(theirs.getComponent("/externalloads"))
     else:
         added = opensim.ExternalLoads("loads.xml", True)
@@ -114,7 +114,7 @@ def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
     rng = np.random.default_rng(rows)
     forces = force_elements(model, mechanism, external_loads=None if within else "loads.xml")
     with BulletEngine(mechanism, forces) as engine:
-        # Within the data, and before and after it.
+        # Times within the data, before them and after them.
         for time in (0.0, 0.37, 0.93, -0.2, 1.3):
             q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
             put(map(theirs.getCoordinateSet().get, names), state, q, u)
@@ -165,7 +165,7 @@ def test_inverse_dynamics(corpus, name, tmp_path, monkeypatch, capfd):
     exclude_forces(model, ["All"])
     ours = motion.inverse_dynamics(force_elements(model, mechanism, external_loads="loads.xml"))
     assert ours.columns == theirs.columns
-    # The tool writes eight digits after the point.
+    # The tool writes eight digits after the decimal point.
     assert np.abs(ours.rows - theirs.rows).max() < 1e-8 * np.abs(theirs.rows).max() + 1e-8
     without = motion.inverse_dynamics()
     assert np.abs(ours.rows - without.rows).max() > 1.0

@@ -1,4 +1,4 @@
-"""Inverse kinematics and scaling against OpenSim's own tools, live."""
+"""Compare inverse kinematics and scaling with a live OpenSim's tools."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ tool.run()
 )
 @pytest.mark.parametrize("ground", [False, True])
 def test_real_models_are_scaled_alike(corpus: Any, name: str, ground: bool, tmp_path: Path) -> None:
-    """By random factors of all bodies, with the mass of a subject or without."""
+    """Scale all bodies by random factors, with and without a given mass of the subject."""
     converted = next(model.converted for model in corpus if model.id == name)
     (tmp_path / "model.osim").write_bytes(gzip.decompress(converted.read_bytes()))
     model = osimlite.read(tmp_path / "model.osim")
@@ -89,7 +89,7 @@ def test_real_models_are_scaled_alike(corpus: Any, name: str, ground: bool, tmp_
 
 @pytest.mark.parametrize("kind", ["loose", "clamped", "locked", "coupled"])
 def test_minima_are_those_of_opensim(kind: str, tmp_path: Path) -> None:
-    """Noisy markers, some of them missing: OpenSim at accuracy 1e-9 is as near as it can be."""
+    """Noisy markers, some of them missing; OpenSim runs at accuracy 1e-9, the finest that it reaches."""
     model, rng = model_with(kind), np.random.default_rng(4)
     osimlite.write(model, tmp_path / "model.osim")
     mechanism = osimlite.mechanism(model)
@@ -119,7 +119,7 @@ def test_minima_are_those_of_opensim(kind: str, tmp_path: Path) -> None:
         places = np.array([state.point(*station) for station in stations])
         assert cost <= 0.5 * np.nanmean(np.sum((places - measured) ** 2, axis=1)) + 1e-12
     if kind != "clamped":
-        # IPOPT keeps clamped coordinates, and the others with them, off the ends of their ranges.
+        # IPOPT keeps clamped coordinates off the ends of their ranges, which shifts the others too.
         assert ours.in_degrees == pytest.approx(theirs.rows, abs=1e-5)
 
 
@@ -133,7 +133,7 @@ def test_minima_are_those_of_opensim(kind: str, tmp_path: Path) -> None:
 def test_public_setups_at_the_best_accuracy(
     shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str, setup: str, model: str
 ) -> None:
-    """What OpenSim's optimizer still finds is the minimum, whose cost is the least in every frame."""
+    """OpenSim at its best accuracy finds the same minimum; osimlite's cost is the lowest in every frame."""
     monkeypatch.chdir(tmp_path)
     source = shared / "oracle" / "tools" / "reference"
     tool: Any = osimlite.read_document(source / case / setup)
@@ -152,8 +152,8 @@ def test_public_setups_at_the_best_accuracy(
     ours = run_inverse_kinematics(tool, subject, data)
     mechanism = ours.mechanism
     assert theirs.columns == ours.coordinates and not ours.unsettled
-    # In single frames, which ones depends on the processor, its line search gives up before the
-    # minimum.
+    # In single frames OpenSim's line search gives up before the minimum. Which frames these are
+    # depends on the processor.
     apart = np.abs(ours.in_degrees - theirs.rows).max(axis=1)
     assert np.count_nonzero(apart > 2e-5) <= 0.05 * len(apart) and apart.max() < 1e-3
     tasks = collect_targets(subject, mechanism, tool.ik_task_set.objects, data, None)
@@ -172,7 +172,7 @@ def test_public_setups_at_the_best_accuracy(
 
 
 def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> None:
-    """Sizes, masses and places of markers, from the generic model."""
+    """Sizes, masses and marker positions agree, starting from the generic model."""
     osimlite.write(marked(), tmp_path / "generic.osim")
     result = osimlite.fit(marked(), {"moving": person(4)[0]}, held=HELD, mass=70.0)
     texts = create_person_files(result, tmp_path / "generic.osim", tmp_path, 70.0)
@@ -194,7 +194,10 @@ def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> N
 def test_who_turns_around_is_held_at_the_end_of_the_range_in_opensim(
     step: float, tmp_path: Path
 ) -> None:
-    """And goes on at the other end here; the cost is never larger."""
+    """OpenSim stops at the end of the range, osimlite continues at its other end.
+
+    The cost of osimlite's solution is never larger.
+    """
     angles = np.arange(100.0, 480.0, step)
     model = turner(-180.0, 180.0)
     mechanism, stations, places = trial_of(model, poses(angles), 0.003)

@@ -1,4 +1,4 @@
-"""Motions under springs, actuators and prescribed forces against a live OpenSim 4.6 at equal accuracy."""
+"""Compare motions under springs, actuators and prescribed forces with a live OpenSim 4.6 at equal accuracy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ACCURACY = 1e-9
 
 
 def double_pendulum() -> Model:
-    """Two slender rods, pushed and held by one force of each family."""
+    """Return two slender rods on hinges with one force of each family."""
     model = Model(name="double_pendulum")
     below = model.ground
     for number in (0, 1):
@@ -103,7 +103,7 @@ def double_pendulum() -> Model:
 
 
 def walker() -> Model:
-    """The walker with springs in its hips and between its feet."""
+    """Return the walker with springs at its hips and between its feet."""
     model = dynamic_walker()
     for side in ("RHip_rz", "LHip_rz"):
         model.add(
@@ -135,7 +135,7 @@ def walker() -> Model:
 
 
 def bouncing() -> Model:
-    """A free ball on a smooth floor."""
+    """Return a free ball above a smooth floor."""
     model = Model(name="bouncing")
     ball = model.add(Body(name="ball", mass=1.0, inertia=(0.004, 0.004, 0.004, 0, 0, 0)))
     joint = osimlite.FreeJoint(name="free")

@@ -1,4 +1,4 @@
-"""Paths that are functions of coordinates, against a live OpenSim 4.6."""
+"""Compare paths that are functions of coordinates with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RNG = np.random.default_rng(3)
 
 
 def polynomial(dimension, order):
-    """All coefficients up to an order."""
+    """Return a multivariate polynomial with random coefficients up to an order."""
     count = 1
     for k in range(order):
         count = count * (dimension + k + 1) // (k + 1)
@@ -94,7 +94,7 @@ PATHS = {
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
 def model(request):
-    """Springs along such paths."""
+    """Return a model with a spring along each path of `PATHS`, for each kind of joints."""
     model = carrier(request.param)
     for number, (coordinates, length, arms, speed) in enumerate(PATHS.values()):
         path = FunctionBasedPath(

@@ -1,4 +1,4 @@
-"""Sensors on models: IMUPlacer and inverse kinematics of orientations against OpenSim's own, live."""
+"""Compare IMUPlacer and inverse kinematics of orientations with a live OpenSim."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ json.dump(rows, open("theirs.json", "w"))
 
 
 def real_model(corpus: Any, name: str, folder: Path) -> osimlite.Model:
-    """A real model, in a folder and read from there."""
+    """Write OpenSim's print of a corpus model into a folder and read it from there."""
     converted = next(model.converted for model in corpus if model.id == name)
     (folder / "model.osim").write_bytes(gzip.decompress(converted.read_bytes()))
     return osimlite.read(folder / "model.osim")
@@ -102,7 +102,7 @@ def real_model(corpus: Any, name: str, folder: Path) -> osimlite.Model:
 def write_orientations(
     path: Path, times: Sequence[float], names: Sequence[str], rotations: Any
 ) -> None:
-    """Rotation matrices (t, k, 3, 3) as a table of quaternions."""
+    """Write rotation matrices (t, k, 3, 3) as a table of quaternions."""
     rows = quaternion_of(rotations).reshape(len(times), -1).tolist()
     write_sto(path, "orientations", times, names, rows, kind="Quaternion", has_missing=True)
 
@@ -119,7 +119,7 @@ def write_orientations(
     ],
 )
 def test_sensors_are_placed_alike(corpus: Any, name: str, axis: str, tmp_path: Path) -> None:
-    """Worn on random bodies, turned at random; the model of m0097 has its sensors already."""
+    """Sensors on random bodies in random orientations; the model m0097 has sensors already."""
     model, rng = real_model(corpus, name, tmp_path), np.random.default_rng(int(name[1:]))
     bodies = [body.name for body in model.body_set.objects]
     worn = [str(body) for body in rng.choice(bodies, min(5, len(bodies)), replace=False)]
@@ -145,7 +145,7 @@ def test_sensors_are_placed_alike(corpus: Any, name: str, axis: str, tmp_path: P
 
 
 def wear(model: osimlite.Model) -> list[str]:
-    """Sensors on all bodies and one in ground; their names."""
+    """Add a sensor frame in random orientation to each body and to ground; return the names of the sensors."""
     rng, names = np.random.default_rng(7), []
     for frame in (*model.components(osimlite.Body), model.ground):
         turn = tuple(rng.uniform(-3.0, 3.0, 3).tolist())
@@ -159,7 +159,18 @@ def wear(model: osimlite.Model) -> list[str]:
 def trial(
     folder: Path, model: osimlite.Model, names: Sequence[str], noise: float, *, markers: bool
 ) -> Any:
-    """A motion that sensors, and if asked for markers, have measured; the rotations (t, k, 3, 3), with gaps of two."""
+    """Write a noisy recording of a motion by sensors, and optionally by markers.
+
+    Args:
+        folder: folder for ``trial.sto`` and ``trial.trc``.
+        model: model with sensor frames.
+        names: names of the sensors.
+        noise: standard deviation of the angles (rad).
+        markers: whether to write the markers too.
+
+    Returns:
+        Rotation matrices (t, k, 3, 3) of the sensors, NaN in three places.
+    """
     mechanism, rng = osimlite.mechanism(model), np.random.default_rng(3)
     frames = {path.rpartition("/")[2]: frame for path, frame in mechanism.frames.items()}
     times, rotations, rows = [0.1 * k for k in range(12)], [], []
@@ -188,7 +199,10 @@ def trial(
 
 
 def squared(mechanism: Any, names: Sequence[str], q: Any, rotations: Any) -> Any:
-    """The squared angles (k,) of sensors from where they were measured; NaN where one was not."""
+    """Return the squared angles (k,) between measured and modelled orientations (rad^2).
+
+    The angle of a sensor without a measurement is NaN.
+    """
     state, result = mechanism.at(q), []
     frames = {path.rpartition("/")[2]: frame for path, frame in mechanism.frames.items()}
     for name, wanted in zip(names, rotations, strict=True):
@@ -201,7 +215,7 @@ def squared(mechanism: Any, names: Sequence[str], q: Any, rotations: Any) -> Any
 @pytest.mark.parametrize("markers", [False, True])
 @pytest.mark.parametrize("kind", ["loose", "clamped", "locked", "coupled"])
 def test_minima_of_angles_are_those_of_opensim(kind: str, markers: bool, tmp_path: Path) -> None:
-    """Noisy sensors, gaps, weights, with markers or without: OpenSim as exact as it can be made."""
+    """Noisy sensors with gaps and weights, with and without markers; OpenSim runs as exactly as it can."""
     model: Any = model_with(kind)
     for number, item in enumerate(model.components(osimlite.Coordinate)):
         item.default_value = item.default_value or 0.01 * number
@@ -209,7 +223,7 @@ def test_minima_of_angles_are_those_of_opensim(kind: str, markers: bool, tmp_pat
     osimlite.write(model, tmp_path / "model.osim")
     rotations = trial(tmp_path, model, names, 0.1, markers=markers)
     weights = {"b0_imu": 2.0, "b2_imu": 0.5}
-    # With couplers IPOPT cannot be asked for 1e-9: it finds no pose that keeps them so well.
+    # With couplers IPOPT does not reach 1e-9: it finds no pose that fulfils them so exactly.
     accuracy = 1e-7 if kind == "coupled" else 1e-9
     ask(SOLVE, tmp_path, str(accuracy), json.dumps(weights))
     theirs = np.array(json.loads((tmp_path / "theirs.json").read_text()))
@@ -253,7 +267,11 @@ def test_minima_of_angles_are_those_of_opensim(kind: str, markers: bool, tmp_pat
 def test_the_tool_writes_opensims_files(
     results: str, motion: str, errors: str, tmp_path: Path
 ) -> None:
-    """Names, headers, columns, digits; each frame fits no worse, and better by less than OpenSim stops short."""
+    """Names, headers, columns and digits of the output files agree.
+
+    No frame fits worse than OpenSim's. It fits better only by less than OpenSim's convergence
+    tolerance explains.
+    """
     model: Any = model_with("loose")
     names = wear(model)
     osimlite.write(model, tmp_path / "model.osim")

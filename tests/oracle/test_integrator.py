@@ -1,7 +1,7 @@
-"""Runge-Kutta-Merson over OpenSim's own accelerations takes the very steps of OpenSim's Manager.
+"""Compare Runge-Kutta-Merson over OpenSim's accelerations with the steps of OpenSim's Manager.
 
-Both run on one machine with one library, so nothing but a different method, or a different order of
-rounding, could make the steps differ: where the states are the same numbers, they are compared
+Both run on one machine with one library, so that only a different method, or a different order of
+rounding, can make the steps differ. Where the states are the same numbers, they are compared
 without tolerance.
 """
 
@@ -27,7 +27,10 @@ def walker(fixtures):
 
 
 def dynamics(model, state):
-    """Derivative of the state in Simbody's order (all q, all u, all z), and its initial value."""
+    """Return the derivative of an OpenSim state as a function f(t, y), and the initial state.
+
+    The order of states is Simbody's: all q, all u, all z.
+    """
     size = state.getNY()
 
     def f(t, y):
@@ -42,7 +45,12 @@ def dynamics(model, state):
 
 
 def manager_run(model, until, accuracy=None, method=None):
-    """Times that a Manager records, its last state, and (taken, attempted, realizations) of its integrator."""
+    """Integrate a model with OpenSim's Manager.
+
+    Returns:
+        The recorded times, the final state, and the counts (taken steps, attempted steps,
+            realizations).
+    """
     sink = opensim.StringLogSink()
     state = model.initSystem()
     manager = opensim.Manager(model)
@@ -87,7 +95,7 @@ def test_the_walkers_steps_are_opensims(walker, accuracy, expected, code):
 
 
 def test_recorded_steps(walker, shared):
-    """Not only the run of this day: times and states of the reference data."""
+    """Compare with times and states of the reference data too, not only with a run of this OpenSim."""
     f, y0 = dynamics(walker, walker.initSystem())
     with (shared / "oracle" / "trajectory_default_internal_steps.csv").open() as text:
         rows = [
@@ -101,7 +109,7 @@ def test_recorded_steps(walker, shared):
 
 
 def test_a_locked_coordinate_left_out_but_counted(walker):
-    """Platform out of the state: count_q and count_u keep OpenSim's norm, and so its steps."""
+    """The state leaves out the locked platform; count_q and count_u keep OpenSim's error norm."""
     times, last, _ = manager_run(walker, 2.0)
     whole, y0 = dynamics(walker, walker.initSystem())
 
@@ -120,7 +128,7 @@ def test_a_locked_coordinate_left_out_but_counted(walker):
 
 @pytest.mark.parametrize("interval", [1, 13, 37])
 def test_a_manager_that_is_stopped_often(walker, interval):
-    """The Manager does not interpolate: its steps end where it is told to stop, and so do ours."""
+    """The Manager does not interpolate: its steps end at each requested time, and so do ours."""
     state = walker.initSystem()
     f, y0 = dynamics(walker, opensim.State(state))
     manager = opensim.Manager(walker)
@@ -134,7 +142,7 @@ def test_a_manager_that_is_stopped_often(walker, interval):
 
 
 def test_auxiliary_states(walker):
-    """Energy dissipated by the limit forces, integrated along as auxiliary states."""
+    """The energy that limit forces dissipate is integrated as auxiliary states."""
     for name in ("RKneeLimitTorque", "LHipLimitTorque"):
         force = opensim.CoordinateLimitForce.safeDownCast(walker.updForceSet().get(name))
         force.set_compute_dissipation_energy(True)
@@ -150,7 +158,7 @@ def test_auxiliary_states(walker):
 
 
 def test_a_free_joint_counts_one_coordinate_more():
-    """Simbody keeps seven slots for the six coordinates of a free joint, and divides the squares of errors by seven."""
+    """Simbody has seven q for a free joint, and divides the sum of squared errors by seven."""
     opensim.Logger.setLevelString("error")
     model = opensim.Model()
     body = opensim.Body("body", 1.0, opensim.Vec3(0.1, 0.2, 0.0), opensim.Inertia(0.3, 0.5, 0.4))
@@ -174,7 +182,7 @@ def test_a_free_joint_counts_one_coordinate_more():
     integrator = runge_kutta_merson(f, 0.0, y0[:6] + y0[7:], 6, accuracy=1e-6, counted=(7, 6))
     steps = list(integrator.iterate_steps(1.0))
     assert counts(integrator)[:2] == measured[:2]
-    # Simbody weights errors of q by way of those of u, which rounds.
+    # Simbody weights errors of q by converting them to u and back, which rounds.
     assert [t for t, _ in steps] == pytest.approx(times[1:], abs=1e-9)
     assert steps[-1][1] == pytest.approx(last[:6] + last[7:], abs=1e-9)
 
@@ -190,7 +198,7 @@ def test_a_free_joint_counts_one_coordinate_more():
     ],
 )
 def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
-    """Contact, balls, constraints, muscles."""
+    """The models have contact, ball joints, constraints and muscles."""
     method = opensim.Manager.IntegratorMethod_SemiExplicitEuler2
     model = opensim.Model(str(fixtures / path))
     times, last, (taken, attempted, _) = manager_run(model, until, accuracy, method)
@@ -206,6 +214,6 @@ def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
     assert len(times) == taken + 1
     assert (found.summary["steps"], found.summary["attempted_steps"]) == (taken, attempted)
     own = [*found.values[-1], *found.speeds[-1], *(rows[-1] for rows in found.auxiliary.values())]
-    # Contact makes a hundred times as much of every rounding in a second. Locked coordinates are no
-    # states there.
+    # Contact amplifies every rounding error about a hundredfold per second. Locked coordinates are
+    # no states in OpenSim, therefore compare each of its states with the nearest of ours.
     assert max(min(abs(here - there) for here in own) for there in last) < 1e-6

@@ -1,6 +1,7 @@
-"""Joints and bodies at random: what OpenSim refuses is an error, and what it does with joints that stand twice.
+"""Compare random graphs of bodies and joints with OpenSim: verdicts and accelerations.
 
-``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` asks for more graphs, and for others.
+Models that OpenSim rejects must have an error, and duplicate joints must be treated as in OpenSim.
+``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` sets the number of graphs and the seed.
 """
 
 from __future__ import annotations
@@ -45,7 +46,13 @@ Joint = tuple[str, str, str]
 
 
 def text(bodies: list[str], joints: list[Joint], offsets: list[bool]) -> str:
-    """A model of bodies and of joints from a class, a parent and a child, some on offset frames."""
+    """Return the text of a model.
+
+    Args:
+        bodies: XML elements of the bodies.
+        joints: class, parent and child of each joint.
+        offsets: for each joint, whether it uses offset frames.
+    """
     written = []
     for number, ((cls, parent, child), is_offset) in enumerate(zip(joints, offsets, strict=True)):
         coordinates = "".join(
@@ -75,7 +82,10 @@ def body(name: str, mass: float = 1.0, more: str = "", center: str = "0 0 0") ->
 
 
 def graph(draw: random.Random) -> str:
-    """Some bodies, some without mass or with a frame, and joints between them that close up to two loops."""
+    """Return a model of random bodies and joints.
+
+    Some bodies have no mass, some have a frame, and the joints close up to two loops.
+    """
     names = [f"b{number}" for number in range(draw.randint(1, 5))]
     light, frame = draw.choice((0.0, 0.2)), f"<components>{OFFSET.format('f', '..')}</components>"
     bodies = [
@@ -169,6 +179,6 @@ def test_a_joint_that_stands_twice_moves_as_in_opensim(
     mechanism = build_mechanism(osimlite.read(path), opensim_derivatives=True)
     ours = mechanism.acceleration(*mechanism.default_state())
     assert np.abs(ours - theirs).max() < 1e-9
-    # Without the switch the body has its own mass and inertia.
+    # Without `opensim_derivatives` the body has its own mass and inertia.
     right = build_mechanism(osimlite.read(path))
     assert right.total_mass == pytest.approx(5.0)

@@ -1,4 +1,8 @@
-"""What joints carry, beside OpenSim: sides, frames, welded and coupled joints, actuators that push as a file says."""
+"""Compare joint reactions with OpenSim's.
+
+The tests cover both sides of a joint, frames, welded and coupled joints, and actuators whose forces
+are read from a file.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +56,7 @@ def test_joint_reactions(
     more = MORE.format(joints=f"{joints[0]} {joints[-1]}", frame=frame)
     ours, theirs = both(tmp_path, model, "AnalyzeTool", more)
     largest = max(np.abs(read_sto(file).rows).max() for file in theirs.iterdir())
-    # Where there are constraints, OpenSim's poses fulfil them to 1e-9 rad.
+    # OpenSim's poses fulfil constraints only within 1e-9 rad.
     compare(ours, theirs, 1e-8, (1e-9 if name == "Rajagopal2016" else 1e-10) * largest)
 
 
@@ -76,11 +80,11 @@ def test_forces_of_constraints(
     monkeypatch.chdir(tmp_path)
     ids = {"couplers": "m0954", "points on lines": "m0466", "a point of the shoulder": "m0163"}
     model = osimlite.read(real(corpus, ids[name]))
-    # Each program has its own pose that fulfils constraints as well as it must.
+    # Each program assembles its own pose. A fine accuracy makes them nearly equal.
     model.assembly_accuracy = 1e-12
     for coordinate in model.components(Coordinate):
         coordinate.locked = False
-    # OpenSim's moment on the thorax is not about the point that it writes.
+    # OpenSim's moment on the thorax is not about the point that OpenSim writes.
     joints = [
         joint.name
         for joint in model.joint_set.objects
@@ -98,7 +102,7 @@ def test_forces_of_constraints(
 def test_what_rolls_on_a_surface_is_free(
     corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """OpenSim's tools never turn such constraints on, whatever `isEnforced` says."""
+    """OpenSim's tools never enforce a RollingOnSurfaceConstraint, whatever `isEnforced` says."""
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))
     bodies = [model.tree().path_of(body) or "" for body in model.body_set.objects]

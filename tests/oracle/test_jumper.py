@@ -1,4 +1,4 @@
-"""OpenSim 4.6 itself jumps as high with the jumper that is shipped."""
+"""Compare the height that the jumper model reaches in OpenSim 4.6 with osimlite."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ pytestmark = pytest.mark.oracle
 
 
 def test_opensim_rises_alike(tmp_path):
-    """Up to where the mass center is highest, all muscles and contacts at work; 1e-5 m is less than a step's error."""
+    """Up to the highest point of the mass center, with all muscles and contacts active.
+
+    The tolerance of 1e-5 m is less than the error of one step.
+    """
     osimlite.write(jumper(), tmp_path / "jumper.osim")
     theirs = simulated(tmp_path / "jumper.osim", 0.48, 1e-5)
     with Simulation(jumper(), "compiled") as simulation:

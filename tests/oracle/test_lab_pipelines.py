@@ -1,4 +1,7 @@
-"""Pipelines of labs here and by OpenSim, live: what OpenSim runs is run, with the same numbers."""
+"""Compare complete pipelines of setups, as laboratories have them, with a live OpenSim.
+
+Whatever OpenSim runs must run, with the same numbers.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +26,9 @@ SECOND_MUSCLE = """<DeGrooteFregly2016Muscle name="quad"><max_isometric_force>90
 </PathPoint></objects></PathPointSet></GeometryPath></path></DeGrooteFregly2016Muscle></objects></ForceSet>
 <MarkerSet>"""
 MUSCLES = {
-    # A second muscle that always has an equilibrium.
+    # The second muscle has an equilibrium at all times.
     "one fails": ("</objects></ForceSet>\n<MarkerSet>", SECOND_MUSCLE.format(slack="0.35")),
-    # One that has none at other times than the first.
+    # The second muscle has no equilibrium at some times, other than those of the first muscle.
     "both fail": ("</objects></ForceSet>\n<MarkerSet>", SECOND_MUSCLE.format(slack="0.51")),
 }
 REST = """<ForceReporter name="F"/><Actuation name="A"/><Kinematics name="K"/><StatesReporter name="S"/>
@@ -34,7 +37,10 @@ REST = """<ForceReporter name="F"/><Actuation name="A"/><Kinematics name="K"/><S
 
 @pytest.mark.parametrize("which", [*MUSCLES])
 def test_a_muscle_without_equilibrium(tmp_path: Path, which: str) -> None:
-    """What does not depend on it is as in OpenSim; what does is NaN, where OpenSim takes any state of the fibers."""
+    """Results that do not depend on the muscle agree with OpenSim; the others are NaN.
+
+    OpenSim computes the others with arbitrary states of the fibers.
+    """
     folder = copy_lab("unbalanced", tmp_path)
     change(folder / "leg.osim", MUSCLES[which])
     change(folder / "so.xml", ("</objects>", REST))
@@ -49,7 +55,7 @@ def test_a_muscle_without_equilibrium(tmp_path: Path, which: str) -> None:
         assert table.columns == theirs.columns
         scale = max(1.0, float(np.abs(theirs.rows).max()))
         tolerance = 5e-3 if "StaticOptimization" in name else 1e-6
-        # OpenSim's equilibria end at 1e-10 of a force, and its static optimization at 1e-4.
+        # OpenSim stops at 1e-10 of a force in the equilibrium, and at 1e-4 in static optimization.
         assert difference(table, theirs) <= tolerance * scale, name
         gaps[name] = np.isnan(table.rows)
     missing = result.summary["without_equilibrium"]
@@ -80,7 +86,13 @@ def test_a_muscle_without_equilibrium(tmp_path: Path, which: str) -> None:
 
 
 def compare_runs(folder: Path, setup: str, tolerance: float = 2e-6) -> None:
-    """Run a setup here and by OpenSim; every table is the same to parts of the largest number of a column."""
+    """Run a setup with osimlite and OpenSim and compare every table.
+
+    Args:
+        folder: folder of the setup; results are written to its subfolders ``ours`` and ``theirs``.
+        setup: name of the setup file.
+        tolerance: largest difference relative to the largest number of the column.
+    """
     ran, log = run_opensim(folder / setup, folder / "theirs")
     assert ran, log
     result = osimlite.run(folder / setup, folder / "ours")
@@ -88,7 +100,8 @@ def compare_runs(folder: Path, setup: str, tolerance: float = 2e-6) -> None:
     assert result.tables
     for name, table in result.tables.items():
         if name.endswith("_states.sto"):
-            # OpenSim prints these by another route whose header its own reader does not take.
+            # OpenSim writes the states with another function, whose header its own reader does not
+            # accept.
             continue
         theirs = read_sto(folder / "theirs" / name)
         assert table.columns == theirs.columns
@@ -118,7 +131,8 @@ LOOPS = {
 }
 
 
-# Frames whose X axis is the Z axis of their base, in which the first rotation of every joint is that of the bars.
+# The X axes of the frames are the Z axes of their bases. The first rotation of every joint is
+# therefore in the plane of the bars.
 JOINT = """<{kind} name="{name}"><socket_parent_frame>{name}_p</socket_parent_frame>
 <socket_child_frame>{name}_c</socket_child_frame><coordinates>{coordinates}</coordinates><frames>
 <PhysicalOffsetFrame name="{name}_p"><socket_parent>/bodyset/{upper}</socket_parent><translation>0 -0.3 0</translation>
@@ -146,16 +160,19 @@ BARS = {
         [("jc", "a", "c", "0.2", "BallJoint"), ("jd", "b", "d", "-0.2", "UniversalJoint")],
     ),
 }
-"""Constraints that close a loop with a third bar, or two halves of it; the joints leave no equation redundant."""
+"""Constraints that close a loop with a third bar, or with two halves of it, and the additional joints.
+
+The joints leave enough freedom that no equation is redundant.
+"""
 
 
 def close_loop(folder: Path, closed_by: str, *, is_planar: bool = False) -> None:
-    """Close the loop of two bars not by a rod, but by a coupler, or by a third bar.
+    """Replace the rod that closes the loop of two bars by a coupler or by a third bar.
 
     Args:
-        folder: a copy of the lab.
+        folder: copy of the lab.
         closed_by: key of `FUNCTIONS` or `BARS`.
-        is_planar: whether the third bar turns in the plane only, so that equations are redundant.
+        is_planar: whether the third bar moves in the plane only, so that equations are redundant.
     """
     text = (folder / "bars.osim").read_text()
     start, end = text.index("<ConstantDistance"), text.index(ROD) + len(ROD)
@@ -175,7 +192,7 @@ def close_loop(folder: Path, closed_by: str, *, is_planar: bool = False) -> None
             name=name,
             upper=upper,
             bar=bar,
-            # A pin turns about Z.
+            # A pin rotates about Z, so that its frames need no rotation.
             turn=0 if is_planar else -np.pi / 2.0,
             coordinates="".join(
                 f'<Coordinate name="{name}"><range>-3 3</range></Coordinate>' for name in names
@@ -185,7 +202,7 @@ def close_loop(folder: Path, closed_by: str, *, is_planar: bool = False) -> None
             "</objects></BodySet>", f"{BAR.format(bar, center)}</objects></BodySet>"
         )
         text = text.replace("</objects></JointSet>", f"{joint}</objects></JointSet>")
-        # The third bar stays horizontal.
+        # The third bar stays horizontal in the motion.
         columns = (*columns, *names)
         angles = np.outer(table.rows[:, 0], [-1.0, 0.0, 0.0][: len(names)])
         rows = np.hstack([rows, angles])
@@ -210,7 +227,10 @@ def test_loops_closed_by_other_constraints_are_tracked(
 @pytest.mark.parametrize("closed_by", [*BARS])
 @pytest.mark.full
 def test_redundant_equations_of_a_loop_change_nothing(tmp_path: Path, closed_by: str) -> None:
-    """Without freedom out of the plane the bars move as with it; OpenSim's assembly may fail there."""
+    """Bars that move in the plane only have the same motion as bars that are free out of it.
+
+    OpenSim is not compared, because its assembly may fail with redundant equations.
+    """
     tables = []
     for is_planar in (False, True):
         (tmp_path / str(is_planar)).mkdir()
@@ -226,7 +246,7 @@ def test_redundant_equations_of_a_loop_change_nothing(tmp_path: Path, closed_by:
 
 @pytest.mark.parametrize("setup", ["so.xml", "rra.xml"])
 def test_fewer_actuators_than_coordinates(tmp_path: Path, setup: str) -> None:
-    """RRA and CMC follow their tasks; static optimization refuses, as in OpenSim."""
+    """RRA and CMC follow their tasks; static optimization rejects the setup, as OpenSim does."""
     folder = copy_lab("loop", tmp_path)
     text = (folder / "bars.osim").read_text()
     start, end = text.index("<ConstantDistance"), text.index(ROD) + len(ROD)
@@ -256,7 +276,7 @@ def test_closed_loops_are_tracked(tmp_path: Path, loop: str) -> None:
 @pytest.mark.full
 @pytest.mark.parametrize("setup", ["rra2.xml", "cmc.xml"])
 def test_a_redundant_constraint_changes_nothing(tmp_path: Path, setup: str) -> None:
-    """A coupler that the rod implies leaves the tables as they are without it.
+    """A coupler that follows from the rod does not change the tables.
 
     OpenSim's assembly of redundant constraints depends on the processor: with the same wheel it
     started at 13 degrees on one machine and at 0 on another.
@@ -276,7 +296,7 @@ def test_a_redundant_constraint_changes_nothing(tmp_path: Path, setup: str) -> N
 
 @pytest.mark.parametrize("setup", ["rra.xml", "cmc.xml"])
 def test_a_motion_off_the_constraints_is_tracked(tmp_path: Path, setup: str) -> None:
-    """The first controls are those of the desired speeds, before the start is projected onto the constraints."""
+    """The first controls use the desired speeds before the start is projected onto the constraints."""
     folder = copy_lab("loop", tmp_path)
     table = read_sto(folder / "walk.mot")
     rows = table.rows.copy()
@@ -316,7 +336,7 @@ HELD = {
 
 @pytest.mark.parametrize("held", [*HELD])
 def test_tasks_of_coordinates_that_are_held(tmp_path: Path, held: str) -> None:
-    """Locks win over the file, and so does the function of a prescribed coordinate, at the time 0."""
+    """A lock takes precedence over the motion file, and so does the function of a prescribed coordinate at time 0."""
     folder = copy_lab("locked", tmp_path)
     change(folder / "leg.osim", *HELD[held])
     change(folder / "rra.xml", ("<final_time>0.3<", "<final_time>0.22<"))
@@ -328,7 +348,7 @@ UNSEEN = {"in some frames": None, "in all frames": "ANK", "another in all": "KNE
 
 @pytest.mark.parametrize("which", [*UNSEEN])
 def test_marker_errors_where_a_marker_is_unseen(tmp_path: Path, which: str) -> None:
-    """Sums and largest errors are of the markers that are seen, means of all."""
+    """Sums and largest errors include only visible markers, means divide by the number of all markers."""
     folder = copy_lab("unseen", tmp_path)
     if marker := UNSEEN[which]:
         lines = (folder / "walk.trc").read_text().splitlines()
@@ -387,7 +407,7 @@ def test_inverse_kinematics_of_coordinates_that_are_held(tmp_path: Path, fixed: 
     ran, log = run_opensim(folder / "ik.xml", folder / "theirs")
     assert ran, log
     result = osimlite.run(folder / "ik.xml", folder / "ours")
-    # OpenSim writes the motion where the setup says, beside it.
+    # OpenSim writes the motion beside the setup, not into the results folder.
     assert difference(result.tables["ik.mot"], folder / "ik.mot") < 0.05
     errors = "ik_ik_marker_errors.sto"
     assert difference(result.tables[errors], folder / "theirs" / errors) < 2e-5
@@ -404,7 +424,7 @@ SPEEDS = {
 
 @pytest.mark.parametrize("which", [*SPEEDS])
 def test_speeds_of_a_static_pose(tmp_path: Path, which: str) -> None:
-    """OpenSim writes the speeds of the initial state, at the time 0, beside the fitted values."""
+    """OpenSim writes the speeds of the initial state at time 0 beside the fitted values."""
     folder = copy_lab("plugin", tmp_path)
     copy_lab("one_frame", tmp_path / "sound")
     (folder / "leg.osim").write_bytes((tmp_path / "sound" / "leg.osim").read_bytes())

@@ -1,6 +1,6 @@
-"""References of real models, broken at random: the validator's verdict is OpenSim's.
+"""Compare the linter's verdict on broken references of corpus models with OpenSim's.
 
-A hundred cases by default; ``OSIMLITE_BREAKAGES=2000`` asks for that many.
+A quick run has 40 cases, a complete one 120; ``OSIMLITE_BREAKAGES=2000`` sets another number.
 """
 
 from __future__ import annotations
@@ -21,28 +21,31 @@ from tests.suite import choose
 pytestmark = pytest.mark.oracle
 
 WANTED = int(os.environ.get("OSIMLITE_BREAKAGES", choose("40", "120")))
-# Of the hundred; whoever asks for more waits for them.
+# Time limit (s) of the default number of cases; a larger number gets an hour.
 SECONDS = 90 if "OSIMLITE_BREAKAGES" not in os.environ else 3600
 
-# Errors that OpenSim passes over in silence, and computes something other than what the text says.
+# Errors that OpenSim does not mention: it computes something else than the file says.
 SILENT = {"OSIM108", "OSIM311", "OSIM322", "OSIM406", "OSIM410", "OSIM414", "OSIM607"}
 SILENTLY = ("OpenSim disables the whole probe", "OpenSim welds a hidden body between them")
-# OpenSim then computes with whatever its memory contains, so that its verdict changes from run to run.
+# OpenSim reads undefined memory in these cases, so that its verdict changes from run to run.
 UNDEFINED = ("OpenSim reads beyond the end of the list", "OpenSim reads memory that it has not set")
-# Said by Simbody when a model whose references all lead somewhere cannot take its first pose:
-# constraints that cannot be met, a cable with no way around its obstacles.
+# Simbody's messages when all references are valid but the model cannot take its initial pose:
+# constraints that contradict each other, or a cable without a way around its obstacles.
 ASSEMBLY = ("projectQ", "CableSpan")
 
 
 class Breakage(NamedTuple):
-    """A changed text, and what was done to it."""
+    """Edited text, and a description of the edit."""
 
     what: str
     text: str
 
 
 def broken(model: Victim, draw: random.Random) -> Breakage:
-    """One reference of a model changed, or what one leads to; rare kinds as often as common ones."""
+    """Return a model with one broken reference or one broken target.
+
+    Rare kinds of references are chosen as often as common ones.
+    """
     if model.targets and draw.random() < 0.25:
         return _without_target(model, draw)
     place = draw.choice(model.places[draw.choice(sorted(model.places))])
@@ -55,14 +58,17 @@ def broken(model: Victim, draw: random.Random) -> Breakage:
         return Breakage(f"{model.name} {place.kind}: '{place.word}' left out with its tag", text)
     new = draw.choice(CHANGES)(draw, place.word, model.names)
     while "<" in new and place.kind.endswith(".name"):
-        # Not in an attribute.
+        # A "<" would not be well-formed in an attribute.
         new = draw.choice(CHANGES)(draw, place.word, model.names)
     text = model.text[: place.start] + new + model.text[end:]
     return Breakage(f"{model.name} {place.kind}: '{place.word}' -> '{new}'", text)
 
 
 def _element_around(text: str, start: int, end: int) -> tuple[int, int] | None:
-    """The element that holds nothing but the characters from `start` to `end`."""
+    """Return the range of the element that contains nothing but the characters from `start` to `end`.
+
+    The result is None if there is no such element.
+    """
     before, after = (
         re.search(r"<[^<>/]+>\s*\Z", text[max(0, start - 200) : start]),
         text.find(">", end),
@@ -73,7 +79,7 @@ def _element_around(text: str, start: int, end: int) -> tuple[int, int] | None:
 
 
 def _without_target(model: Victim, draw: random.Random) -> Breakage:
-    """The component that a reference leads to taken out, or called otherwise."""
+    """Remove or rename a component that a reference leads to."""
     target = draw.choice(model.targets[draw.choice(sorted(model.targets))])
     others = sorted({other.name for group in model.targets.values() for other in group})
     same = [other.name for other in model.targets[target.cls]]
@@ -106,7 +112,7 @@ def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(
     corpus, opensim_says, tmp_path
 ):
     draw = random.Random(int(os.environ.get("OSIMLITE_SEED", "1")))
-    # To survey a model takes as long as to ask for one case of it.
+    # Surveying a model takes as long as one question to OpenSim, therefore use few models.
     models = draw.sample(corpus, min(len(corpus), WANTED))
     victims = [
         result for model in models if (result := victim(model, tmp_path / model.id)) is not None

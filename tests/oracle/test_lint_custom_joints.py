@@ -1,4 +1,7 @@
-"""Custom joints that are written as nobody means them: where OpenSim refuses, crashes or computes NaN, we say so."""
+"""Compare the linter's verdict on unusual custom joints with OpenSim's.
+
+There must be an error where OpenSim rejects the model, crashes, or computes NaN.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,14 @@ def square(*coefficients: float) -> str:
 def document(
     coordinates: str, on: dict[int, tuple[str, str]], axes: tuple[str, ...] = (), inside: str = ""
 ) -> str:
-    """A body on a custom joint: its coordinates, those on each axis with their function, and the axes."""
+    """Return a model with a body on a custom joint.
+
+    Args:
+        coordinates: name of each coordinate, one letter each.
+        on: coordinates and function of each axis, by the index of the axis.
+        axes: directions of the six axes, X, Y, Z twice by default.
+        inside: properties of each coordinate.
+    """
     rows = ""
     for number, name in enumerate(AXES):
         names, function = on.get(number, ("", ""))
@@ -95,7 +105,7 @@ CASES = {
     "in one plane": document("a", ONE, (X, Y, "1 1 0", X, Y, Z)),
 }
 
-# OpenSim computes something, without a message, that depends on what is in memory or is no function
+# OpenSim computes a result without a message. It depends on undefined memory, or is not a function
 # of both variables.
 SILENT = (
     "one coefficient",
@@ -105,12 +115,15 @@ SILENT = (
 
 
 def fails(path: Path) -> bool:
-    """Whether OpenSim refuses or crashes, or has NaN for an acceleration; asked in a process of its own."""
+    """Return whether OpenSim rejects the model, crashes, or computes NaN for an acceleration.
+
+    OpenSim runs in a child process.
+    """
     opensim = pytest.importorskip("opensim")
     child = os.fork()
     if child == 0:
         signal.alarm(60)
-        # A crash is an answer here, of which pytest's handler would print an account.
+        # A crash is an expected result here. Pytest's fault handler would print a traceback.
         faulthandler.disable()
         try:
             opensim.Logger.setLevelString("Off")

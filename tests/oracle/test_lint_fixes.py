@@ -1,4 +1,8 @@
-"""Safe mends: after them OpenSim reads the model that the author meant, or still the one it read before."""
+"""Compare models before and after safe fixes in OpenSim.
+
+After a safe fix OpenSim must read the model that the author meant, or still the one that it read
+before.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +30,18 @@ _spec.loader.exec_module(faults)
 
 
 def safely_mended(text: str) -> tuple[str, int]:
-    """The text after the safe mends, and how many these were."""
+    """Apply all safe fixes to a text.
+
+    Returns:
+        The fixed text, and the number of fixes.
+    """
     source = Source(text.encode())
     data, count = apply_fixes(source, validate(source, ignore="OSIM63"))
     return data.decode(), count
 
 
 def printed(text: str, path: Path) -> str | None:
-    """Return OpenSim's print of a document with one spelling of ground, None if it rejects it."""
+    """Return OpenSim's print of a document with one spelling of ground, or None if OpenSim rejects it."""
     opensim = pytest.importorskip("opensim")
     opensim.Logger.setLevelString("Off")
     path.write_text(text, encoding="utf-8")
@@ -55,7 +63,8 @@ def test_after_a_safe_mend_opensim_reads_what_was_meant(tmp_path):
         if count:
             mends += 1
             assert printed(text, tmp_path / "mended.osim") == original, fault.name
-            # Nothing of the file is left in the process.
+            # A second reading must give the same print: the first one left no changed defaults in
+            # the process.
             assert printed(text, tmp_path / "mended.osim") == original, fault.name
     assert mends >= 10
 

@@ -1,4 +1,4 @@
-"""What the linter tells of measured paths and muscles is what OpenSim computes."""
+"""Compare the numbers in findings about paths and muscles with OpenSim's."""
 
 from __future__ import annotations
 

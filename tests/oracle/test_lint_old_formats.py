@@ -1,6 +1,6 @@
-"""What OpenSim's own upgrade of an old document throws over, and what it takes, is as tests without OpenSim have it.
+"""Check with OpenSim the verdicts on old documents that `tests/lint/old_documents.py` records.
 
-`tests/lint/test_old_formats.py` compares the verdicts on the same documents.
+`tests/lint/test_old_formats.py` compares the linter with the same verdicts without OpenSim.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Broken references: the validator's verdict is OpenSim's."""
+"""Compare the linter's verdict on broken references in the walker with OpenSim's."""
 
 from __future__ import annotations
 
@@ -21,7 +21,11 @@ CODES = ("OSIM301", "OSIM302", "OSIM303", "OSIM304", "OSIM305", "OSIM402", "OSIM
 
 
 def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:
-    """Randomly changed references: letters swapped, dropped, doubled, in another case; other names; other forms."""
+    """Return descriptions and texts with one randomly changed reference each.
+
+    Letters are dropped, repeated or change case, or another name or another form of the path is
+    written.
+    """
     draw = random.Random(seed)
     places = [match for match in REFERENCE.finditer(text) if match[2] != ".."]
     names = sorted(
@@ -65,7 +69,10 @@ def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:
 
 
 def connects(path: Path) -> bool:
-    """Whether OpenSim connects the model; a loop it cannot assemble is no matter of references."""
+    """Return whether OpenSim resolves all references of the model.
+
+    A loop that OpenSim cannot assemble does not count as a broken reference.
+    """
     opensim = pytest.importorskip("opensim")
     opensim.Logger.setLevelString("Off")
     try:
@@ -82,7 +89,7 @@ def test_the_verdict_on_broken_references_is_that_of_opensim(seed, tmp_path):
     for what, broken in breakages(text, 15, seed):
         report = validate(Source(broken.encode()))
         if {"OSIM401", "OSIM403", "OSIM404"} & set(report.codes):
-            # A joint that now leads elsewhere leaves a body behind, on which OpenSim crashes.
+            # A joint that leads elsewhere leaves a body without a joint, on which OpenSim crashes.
             continue
         path = tmp_path / "walker.osim"
         path.write_text(broken)

@@ -1,4 +1,7 @@
-"""What the rules on find_contradictions and missing parts report, OpenSim refuses; the sound spelling it takes."""
+"""Compare rules about contradictions and missing parts with OpenSim.
+
+OpenSim must reject what the rules report, and accept the correct form.
+"""
 
 from __future__ import annotations
 
@@ -173,7 +176,7 @@ def test_opensim_refuses_what_is_an_error_and_takes_what_is_none(tmp_path: Path)
 def test_a_path_goes_straight_through_a_surface_that_holds_its_point(
     name: str, points: int
 ) -> None:
-    """As rule OSIM616 says."""
+    """Check the statement of rule OSIM616 about points inside of a wrap object."""
     import opensim
 
     opensim.Logger.setLevelString("Off")

@@ -1,4 +1,4 @@
-"""What the linter finds by geometry OpenSim computes with, without a word: the results are others."""
+"""Check that faults which the linter finds by geometry change OpenSim's results without a message."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RESULTS = {
     "InverseKinematicsTool": ("ik.xml", "ik_out.mot"),
 }
 CONTROL = Fault("control", "ik.xml", "", "")
-# By how much the results differ at least, in newton metres or degrees.
+# Smallest difference of the results for each fault, in N m or degrees.
 SILENT = {
     144: ("InverseDynamicsTool", 50.0),
     "feet swapped": ("InverseDynamicsTool", 50.0),
@@ -30,7 +30,7 @@ SILENT = {
 
 
 def results(folder: Path, fault: Fault, tool: str) -> list[list[float]]:
-    """What a tool computes in a pipeline with a fault."""
+    """Return the rows of the table that an OpenSim tool writes for a pipeline with a fault."""
     folder.mkdir()
     for name, text in TEXTS.items():
         (folder / name).write_text(text)
@@ -44,7 +44,7 @@ def results(folder: Path, fault: Fault, tool: str) -> list[list[float]]:
 
 @pytest.fixture(scope="module")
 def control(tmp_path_factory):
-    """What the tools compute without a fault."""
+    """Return the results of the tools without a fault."""
     return {
         tool: results(tmp_path_factory.mktemp("control") / tool, CONTROL, tool) for tool in RESULTS
     }

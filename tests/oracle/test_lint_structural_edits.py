@@ -1,7 +1,9 @@
-"""Real models, edited at random: what OpenSim refuses has an error, and no error claims a refusal that does not come.
+"""Compare the linter's verdict on randomly edited corpus models with OpenSim's.
 
-A hundred edits by default; ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` asks for others, and waits for
-them. Models as published, of all versions of the format, and in OpenSim's own print of them.
+Models that OpenSim rejects must have an error, and no error may claim a rejection that does not
+happen. The models are tested as published, in all versions of the format, and as OpenSim prints
+them. A complete run has a hundred edits; ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` sets their number
+and the seed.
 """
 
 from __future__ import annotations
@@ -25,13 +27,14 @@ from tests.suite import choose
 pytestmark = pytest.mark.oracle
 
 WANTED = int(os.environ.get("OSIMLITE_EDITS", choose("20", "100")))
-# Of the hundred; whoever asks for more waits for them, and for the large models.
+# Time limit (s) and size limit (bytes) of the default number of edits. A larger number gets two
+# hours, and includes the large models.
 SECONDS = 60 if "OSIMLITE_EDITS" not in os.environ else 7200
 LARGEST = 150_000 if "OSIMLITE_EDITS" not in os.environ else 10_000_000
 
 
 def new_errors(report: Report, before: Counter[tuple[str, str]]) -> list[Finding]:
-    """The errors of an edited model that the model did not have."""
+    """Return the errors of an edited model that the original model does not have."""
     left, result = before.copy(), []
     for finding in report.errors:
         if left[finding.code, finding.message] > 0:
@@ -42,7 +45,10 @@ def new_errors(report: Report, before: Counter[tuple[str, str]]) -> list[Finding
 
 
 def victims(models: list[CorpusModel], folder: Path) -> list[Path]:
-    """Every model as it was published, and as OpenSim prints it, each in a folder with the files that it needs."""
+    """Write each model as published and as OpenSim prints it, with the files that it needs.
+
+    Each version has a folder of its own; the result lists the model files.
+    """
     result = []
     for model in models:
         texts = [model.path.read_bytes()]
@@ -79,7 +85,7 @@ def test_the_verdict_on_edited_models_is_that_of_opensim(corpus, opensim_says, t
         path.write_text(edit.text, encoding="utf-8")
         message = opensim_says(path)
         if message is not None and "killed by signal 14" in message:
-            # Neither taken nor refused: OpenSim is still at it.
+            # OpenSim neither accepted nor rejected the model: it was stopped by the time limit.
             continue
         counts["edits"] += 1
         counts["refused"] += message is not None

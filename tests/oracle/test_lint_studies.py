@@ -1,4 +1,4 @@
-"""Faults in studies of Moco: what the linter calls an error, OpenSim refuses."""
+"""Check that OpenSim rejects Moco studies with faults that the linter reports as errors."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ pytest.importorskip("opensim")
 pytestmark = pytest.mark.oracle
 
 CASES = [fault for fault in [*FAULTS, *STUDIES] if "slide" in fault.file]
-# Of these OpenSim makes a study that it solves, in another way than was meant.
+# OpenSim solves these studies, but other problems than the file describes.
 SOLVED = {310, 313, 317, 324}
-# The optimizer runs for ever.
+# The optimizer does not end for this study.
 ENDLESS = {322}
 PROGRAM = """
 import json, os, sys, opensim

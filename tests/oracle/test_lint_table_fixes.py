@@ -1,4 +1,4 @@
-"""Mends of tables: after them OpenSim reads the table that was meant."""
+"""Check that OpenSim reads the intended table after fixes of tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ opensim = pytest.importorskip("opensim")
 
 
 def read(path):
-    """What OpenSim reads: labels, times, all numbers, and whether they are degrees."""
+    """Return what OpenSim reads from a table: labels, times, rows, and its units.
+
+    The units are those of a .trc file, or whether a storage file is in degrees.
+    """
     opensim.Logger.setLevelString("Off")
     if path.suffix == ".trc":
         markers = opensim.TimeSeriesTableVec3(str(path))
@@ -33,8 +36,8 @@ def read(path):
 
 
 def strictly(path):
-    """The numbers that OpenSim's newer reader reads."""
-    # What Python does not hold is gone while its numbers are still looked at.
+    """Return the numbers that OpenSim's newer reader, TimeSeriesTable, reads."""
+    # Keep a reference to the table: otherwise Python frees its memory before the matrix is copied.
     table = opensim.TimeSeriesTable(str(path))
     matrix = table.getMatrix()
     return matrix.to_numpy().copy().tolist()
@@ -75,7 +78,7 @@ SETUP = """<OpenSimDocument Version="40600">
 
 
 def tool_in(path):
-    """What OpenSim's tool holds after it has read a setup."""
+    """Return the settings of an InverseKinematicsTool after OpenSim has read its setup."""
     tool = opensim.InverseKinematicsTool(str(path), False)
     tasks = tool.getIKTaskSet()
     weights = [

@@ -1,4 +1,7 @@
-"""Forms of XML that OpenSim's parser takes, and forms that it refuses: there is an error for those it refuses."""
+"""Compare the linter's verdict on unusual forms of XML with OpenSim's parser.
+
+There must be an error for each form that OpenSim rejects.
+"""
 
 from __future__ import annotations
 
@@ -96,7 +99,7 @@ REFUSED = {
     "white space in a name": changed(b'"x"', b'"x\ty"'),
 }
 OTHERWISE = {
-    # Taken, and read as something else than the text says.
+    # OpenSim accepts these texts but reads something else than they say.
     "no-break space": changed(b"0 -5", b"0\xc2\xa0-5"),
     "minus sign": changed(b"-5", b"\xe2\x88\x925"),
     "full-width digit": changed(b"-5", b"-\xef\xbc\x95"),
@@ -107,7 +110,7 @@ OTHERWISE = {
 @pytest.mark.parametrize("case", DOCTYPES)
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "latin-1"])
 def test_nothing_that_a_doctype_declares_is_read(case, encoding, tmp_path):
-    """The entity stands in the value of an attribute, where the parser puts its text in without a word."""
+    """Entities are used in an attribute too, where a parser inserts their text without a message."""
     text = (DOCTYPES[case] + ROOT.decode()).replace('"x"', '"&nm;&a9;"').replace("0 -5", "&nm;0 -5")
     path = tmp_path / "text.osim"
     path.write_bytes(text.encode(encoding))
@@ -117,7 +120,7 @@ def test_nothing_that_a_doctype_declares_is_read(case, encoding, tmp_path):
 
 
 def taken(path: Path) -> list[float] | None:
-    """The gravity that OpenSim reads, None if it refuses the file."""
+    """Return the gravity that OpenSim reads, or None if it rejects the file."""
     opensim = pytest.importorskip("opensim")
     opensim.Logger.setLevelString("Off")
     try:

@@ -1,4 +1,7 @@
-"""OpenSim says of the small models with one fault what their table says: it fails, or computes finite accelerations."""
+"""Compare OpenSim's verdict on small models with one fault with the table of verdicts.
+
+OpenSim must fail, or compute finite accelerations, as `tests/lint/verdict_cases.py` says.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +19,11 @@ pytestmark = pytest.mark.oracle
 opensim = pytest.importorskip("opensim")
 
 SECONDS = 60
-"""After this time a model that OpenSim never finishes counts as failed."""
+"""Time limit (s) after which a model that OpenSim does not finish counts as failed."""
 
 
 def verdict_of_opensim(path: Path) -> str:
-    """Return what OpenSim does with a file, asked in a process of its own."""
+    """Return OpenSim's verdict on a model file, which it examines in a child process."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:

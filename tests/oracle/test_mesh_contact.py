@@ -1,4 +1,4 @@
-"""ElasticFoundationForce at random states against a live OpenSim 4.6."""
+"""Compare ElasticFoundationForce with a live OpenSim 4.6 at random states."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_meshes_on_spheres_and_what_touches_nothing(model, tmp_path):
     )
     model.add(sphere, egg, plane)
     result = meshes(model, (".obj", ".vtp"), tmp_path)
-    # Neither the egg nor the two without a mesh touch anything in such a force.
+    # In an ElasticFoundationForce neither the ellipsoid nor surfaces without a mesh make contact.
     model.add(foundation("contact", (*result, sphere, egg), (1e4, 2e4, 0.0, 0.0)))
     model.add(foundation("nothing", (sphere, egg), (1e4, 0.0)))
     assert compare(model, tmp_path) > 0

@@ -1,4 +1,8 @@
-"""OpenSim's MocoTrajectory reads the solutions that are written here."""
+"""Compare osimlite's optimal control problems with OpenSim's Moco.
+
+MocoTrajectory must read the solutions. Objective terms and constraint violations at Moco's iterates
+and solutions must agree.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +64,10 @@ print(json.dumps([terms, missed[0].size, found.objective, found.success, found.p
 
 @pytest.mark.full
 def test_markers_controls_and_bounds_over_time(tmp_path):
-    """Moco's solution has Moco's costs here, with factors by which columns count, and ours costs no more."""
+    """Objective terms at Moco's solution agree, with weights of columns.
+
+    The objective of our own solution is not larger.
+    """
     osim = pytest.importorskip("opensim")
     model = osim.ModelFactory.createDoublePendulum()
     model.addMarker(osim.Marker("tip", model.getBodySet().get(1), osim.Vec3(0.1, 0.05, 0.02)))
@@ -128,7 +135,7 @@ print(json.dumps([terms, found.success, found.parameters["mass"], min(apart), ma
 
 @pytest.mark.full
 def test_frames_and_expressions(tmp_path):
-    """After one of its iterations Moco's costs of frames, steps and parameters are those that are found here."""
+    """Terms of frames, step asymmetry and parameters agree after one iteration of Moco."""
     osim = pytest.importorskip("opensim")
     model = osim.ModelFactory.createDoublePendulum()
     turn = osim.Vec3(0.0, 0.0, -np.pi / 2)
@@ -170,7 +177,8 @@ def test_frames_and_expressions(tmp_path):
     terms, success, mass, nearest, farthest = ours
     assert terms == pytest.approx(theirs, rel=1e-9)
     assert success
-    # The expression is least where its slope is zero, and nothing else depends on the mass.
+    # The only term that depends on the mass is the expression, so its derivative vanishes at the
+    # optimum.
     assert 2 * (mass - 0.7) == pytest.approx(1 / mass**2, abs=0.05)
     assert nearest > 0.2 - 1e-3 and 1.0 < farthest < 1.2 + 1e-3
 
@@ -217,7 +225,7 @@ print(json.dumps([terms, found.success, max(high)]))
 
 
 def test_outputs(tmp_path):
-    """After one of its iterations Moco's goals of outputs are those that are found here; bounds of outputs hold."""
+    """Terms of outputs agree after one iteration of Moco; bounds of outputs hold in our solution."""
     osim = pytest.importorskip("opensim")
     model = osim.ModelFactory.createDoublePendulum()
     model.addMarker(osim.Marker("tip", model.getBodySet().get(1), osim.Vec3(0.1, 0.05, 0.02)))
@@ -242,8 +250,9 @@ def test_outputs(tmp_path):
         for command in (["-m", "tests.oracle.moco_outputs"], ["-c", OUR_OUTPUTS])
     )
     terms, success, high = ours
-    # OpenSim says of values and speeds that they need no states, so that Moco takes those of an
-    # evaluation before.
+    # OpenSim declares that values and speeds as outputs need no stage of realization. Moco
+    # therefore uses those of an earlier evaluation, and the test computes them from the table
+    # instead.
     table = read_sto(tmp_path / "theirs.sto")
     q, u = (
         np.stack([table[f"/jointset/j{k}/q{k}/{what}"] for k in (0, 1)])
@@ -273,7 +282,7 @@ print(json.dumps(terms))
 
 @pytest.mark.parametrize("kind", ["implicit", "explicit", "constrained"])
 def test_loads(kind, tmp_path):
-    """After one of its iterations Moco's goals of loads of joints, coordinates, feet and tendons are found here."""
+    """Terms of joint reactions, generalized forces, contact and tendons agree after one iteration of Moco."""
     osim = pytest.importorskip("opensim")
     model = osim.ModelFactory.createDoublePendulum()
     turn = osim.Vec3(0.0, 0.0, -np.pi / 2)
@@ -286,7 +295,7 @@ def test_loads(kind, tmp_path):
         )
         model.addContactGeometry(sphere)
         model.addComponent(osim.SmoothSphereHalfSpaceForce(f"contact{number}", sphere, floor))
-    # A body that is welded to the second one, and one on a hinge of that.
+    # One more body is welded to the second one, and another hangs on a hinge of it.
     middle, inertia = osim.Vec3(0.01, 0.02, -0.03), osim.Inertia(0.01, 0.02, 0.03)
     load, last = osim.Body("load", 0.7, middle, inertia), osim.Body("last", 0.4, middle, inertia)
     at, turned = osim.Vec3(0.1, 0.2, 0.3), osim.Vec3(0.3, 0.2, 0.1)
@@ -360,7 +369,7 @@ def test_loads(kind, tmp_path):
 
 @pytest.mark.full
 def test_loads_of_a_motion_that_is_given(tmp_path):
-    """Likewise, of joints and coordinates, with what the constraints push."""
+    """Terms of joint reactions and generalized forces agree for a prescribed motion with a constraint."""
     pytest.importorskip("opensim")
     model = coupled(links("rigid", "implicit", count=3), "q1")
     motion = osimlite.PositionMotion(name="motion")
@@ -426,7 +435,10 @@ print(json.dumps([terms, find_violations(program, w, rows)[0].size, found.violat
 )
 @pytest.mark.full
 def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
-    """By Bordalba 2023: Moco's solution has its costs here and violates nothing, and ours costs no more."""
+    """Terms agree for the projection of Bordalba 2023.
+
+    Moco's solution fulfils the constraints, and the objective of our own solution is not larger.
+    """
     pytest.importorskip("opensim")
     model = coupled(links(count=3), "q1", "q2")
     for contact in list(model.components(osimlite.SmoothSphereHalfSpaceForce)):
@@ -437,8 +449,7 @@ def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
     terms, missed, left, objective, slack = ours
     assert terms == pytest.approx(theirs, rel=1e-9)
     assert missed < 1e-6 < slack
-    # The search can end where it finds no better step, within the tolerance that is asked of the
-    # constraints.
+    # The search may end where no better step exists, within the tolerance of the constraints.
     assert left < 1e-4
     assert objective <= sum(theirs.values()) * (1.0 + 1e-4)
 
@@ -479,7 +490,7 @@ print(json.dumps(solution.getStatus()))
     ],
 )
 def test_what_moco_takes_without_a_word(old, new, said, tmp_path):
-    """And is refused here with one sentence; the page says so."""
+    """Moco accepts these studies without a message; osimlite rejects them with one sentence."""
     pytest.importorskip("opensim")
     project("followed", tmp_path)
     study = tmp_path / "study.omoco"
@@ -487,7 +498,7 @@ def test_what_moco_takes_without_a_word(old, new, said, tmp_path):
     at = re.search(old, text, re.DOTALL).span(1)
     study.write_text(text[: at[0]] + new + text[at[1] :])
     assert _said(tmp_path, ["-c", TAKEN]) == "Maximum_Iterations_Exceeded"
-    # As CasADi and OpenSim cannot be loaded into one process, in another one.
+    # CasADi and OpenSim cannot be loaded into one process, therefore use another one.
     code = "import osimlite; osimlite.moco.solve('study.omoco')"
     done = run_script(code, folder=tmp_path, check=False, modules=CASADI)
     assert done.returncode == 1 and said in done.stderr.splitlines()[-1]
@@ -508,7 +519,7 @@ ended(study)
 
 
 def test_costs_of_scaled_variables(tmp_path):
-    """After two of its iterations Moco's costs of multipliers and accelerations are those that are found here."""
+    """Terms of multipliers and accelerations agree after two iterations of Moco."""
     pytest.importorskip("opensim")
     study_file(tmp_path, "squat-25")
     theirs, ours = (_said(tmp_path, ["-c", code]) for code in (SCALED, OUR_LOADS))
@@ -558,7 +569,7 @@ print(json.dumps(moco.evaluate(Program(problem), moco.MocoTrajectory.read("their
 
 @pytest.mark.full
 def test_tracked_markers(tmp_path):
-    """After five of its iterations Moco's costs are those that are found here."""
+    """Terms of tracked markers agree after five iterations of Moco."""
     osim = pytest.importorskip("opensim")
     model = osim.ModelFactory.createDoublePendulum()
     for name, body in (("tip", 1), ("elbow", 0)):
@@ -628,7 +639,7 @@ print(json.dumps(solution.getObjective()))
     ],
 )
 def test_columns_are_where_moco_looks_for_them(number, mode, tmp_path, corpus):
-    """Moco has of a guess, anywhere between the bounds, the objective and the violation that it has here."""
+    """Objective and violation agree at a random guess between the bounds, so that all variables correspond."""
     pytest.importorskip("opensim")
     entry = next(item for item in corpus if item.id == number)
     (tmp_path / "model.osim").write_bytes(gzip.decompress(entry.converted.read_bytes()))
@@ -636,7 +647,7 @@ def test_columns_are_where_moco_looks_for_them(number, mode, tmp_path, corpus):
     told = _record_iteration(tmp_path, ["-c", BEGUN])
     assert json.loads(told.splitlines()[-1]) == pytest.approx(objective, rel=1e-12)
     said = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", told)
-    # Accelerations of OpenSim's custom joints are not quite those that follow from their speeds.
+    # Accelerations of OpenSim's custom joints differ slightly from the derivatives of their speeds.
     assert float(said[1]) == pytest.approx(missed, rel=1e-9 if mode == "explicit" else 1e-5)
     ours, theirs = (read_sto(tmp_path / f"{name}.sto") for name in ("ours", "theirs"))
     assert ours.columns == theirs.columns
@@ -678,7 +689,7 @@ print(json.dumps(result))
 
 
 def test_values_of_coupled_coordinates(tmp_path):
-    """Also where the table has a column of the coordinate that another one determines."""
+    """Values of coupled coordinates agree, even if the table has a column of the dependent coordinate."""
     pytest.importorskip("opensim")
     osimlite.write(coupled(links(), "q1"), tmp_path / "model.osim")
     t = np.linspace(0.0, 1.0, 7)
@@ -690,16 +701,16 @@ def test_values_of_coupled_coordinates(tmp_path):
 
 
 def _said(folder, command):
-    """What a program prints last."""
+    """Return the last line that a program prints, read as JSON."""
     return json.loads(_record_iteration(folder, command).splitlines()[-1])
 
 
 def _record_iteration(folder, command):
-    """What a program prints."""
+    """Run a program in a process of its own and return what it prints."""
     first, code, *words = command
     if first == "-m":
         code = f"import runpy; runpy.run_module({code!r}, run_name='__main__', alter_sys=True)"
-    # One process cannot have both.
+    # OpenSim and CasADi cannot be loaded into one process.
     modules = OPENSIM if first == "-m" or re.search("import.*opensim", code) else CASADI
     done = run_script(code, *words, folder=folder, check=False, modules=modules)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -1,4 +1,4 @@
-"""Operators on models here and in OpenSim's ModelProcessor, live: the same models by meaning."""
+"""Compare operators on models with OpenSim's ModelProcessor: the resulting models must be equal."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ CASES: dict[str, list[Any]] = {
 
 
 def changed(folder: Path, model: Path, operators: list[Any]) -> list[Any]:
-    """How a model that was changed here differs from OpenSim's."""
+    """Apply operators here and in OpenSim and return the differences of the two models."""
     osimlite.write(osimlite.read(model), folder / "model.osim")
     processor = p.ModelProcessor(name="processor", filepath="model.osim", operators=operators)
     osimlite.write(processor, folder / "processor.xml")
@@ -95,7 +95,7 @@ TABLE = "push\nversion=1\nnRows=2\nnColumns=7\ninDegrees=no\nendheader\n" + "\n"
 
 
 def test_files_of_loads_and_paths_are_put_in_as_there(corpus: Any, tmp_path: Path) -> None:
-    """Paths that were fitted here are read there."""
+    """OpenSim reads the paths that osimlite has fitted."""
     path = next(item.path for item in corpus if item.id == "m0001")
     (tmp_path / "loads.xml").write_text(LOADS)
     (tmp_path / "push.sto").write_text(TABLE + "\n")
@@ -106,7 +106,7 @@ def test_files_of_loads_and_paths_are_put_in_as_there(corpus: Any, tmp_path: Pat
         p.ModOpReplacePathsWithFunctionBasedPaths(paths_file="paths.xml"),
         p.ModOpAddExternalLoads(filepath="loads.xml"),
     ]
-    # Here the whole path of the data, so that the model finds it from any folder.
+    # osimlite writes the absolute path of the data, so that the model finds it from any folder.
     (data,) = changed(tmp_path, path, operators)
     assert "what='datafile'" in data and f"old='{tmp_path / 'push.sto'}', new='push.sto'" in data
 
@@ -115,7 +115,7 @@ def test_files_of_loads_and_paths_are_put_in_as_there(corpus: Any, tmp_path: Pat
 def test_a_muscle_without_dynamics_keeps_the_minimum_that_it_was_read_with(
     tmp_path: Path, minimum: float
 ) -> None:
-    """OpenSim's activation model learns `minimum_activation` only while the muscle has dynamics."""
+    """OpenSim passes `minimum_activation` to the activation model only while the muscle has activation dynamics."""
     import opensim
 
     from osimlite.mechanics.multibody import build_mechanism

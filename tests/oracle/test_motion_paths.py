@@ -1,4 +1,4 @@
-"""Motions whose columns are paths, in each tool, here and by OpenSim, live."""
+"""Compare motions whose columns are named by paths with a live OpenSim, in each tool."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SPELLINGS = {"plain": "{0}", "value": "{1}/value", "path": "{1}", "old": "{2}/{0
 
 
 def lay_out_task(folder: Path) -> None:
-    """Lay out inverse kinematics of markers and of a coordinate from a file."""
+    """Write a setup of inverse kinematics with markers and a coordinate that follows a file."""
     copy_lab("locked", folder)
     motion = (folder / "walk.mot").read_bytes()
     copy_lab("unseen", folder)
@@ -34,7 +34,7 @@ def lay_out_task(folder: Path) -> None:
 
 
 def lay_out_placer(folder: Path) -> None:
-    """Lay out the placing of markers in a pose with a coordinate from a file."""
+    """Write a setup that places markers in a pose with a coordinate that follows a file."""
     copy_lab("locked", folder)
     motion = (folder / "walk.mot").read_bytes()
     lay_out_scaling(folder)
@@ -51,7 +51,8 @@ USERS = {
     "RRA": TOOLS["RRA"],
     "CMC": TOOLS["CMC"],
 }
-# `same`: both compute it. `both`: both refuse. `ours`: OpenSim computes with other values, as is told.
+# Consequence of each spelling. `same`: both programs compute the motion. `both`: both reject it.
+# `ours`: OpenSim computes with other values, and osimlite reports this.
 FATES = {
     "IK": "plain:same value:both path:both old:both",
     "placer": "plain:same value:both path:both old:both",
@@ -106,5 +107,5 @@ def test_columns_that_are_paths(
     if fate == "ours":
         assert apart > 1e-3
     else:
-        # OpenSim's fits of markers end at an accuracy, ours at the minimum.
+        # OpenSim stops fitting markers at its accuracy, osimlite at the minimum.
         assert apart < (0.2 if name in ("IK", "placer") else 1e-4)

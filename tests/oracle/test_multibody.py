@@ -1,4 +1,7 @@
-"""Kinematics and accelerations against OpenSim 4.6, live: reversed joints, locks, awkward inertias."""
+"""Compare kinematics and accelerations with a live OpenSim 4.6.
+
+The models have reversed joints, locked coordinates and unusual inertias.
+"""
 
 from __future__ import annotations
 
@@ -231,7 +234,7 @@ def test_a_rod_that_bends_evenly_ends_where_opensims_does(tmp_path):
 
 @pytest.mark.parametrize("angle", [0.0, 0.2])
 def test_a_constant_turn_before_another(angle: float, tmp_path: Path) -> None:
-    """OpenSim turns the body by the angle, but not the axis after it that the angular velocity is about."""
+    """OpenSim rotates the body by the constant angle, but not the following axis in its angular velocity."""
     model = osimlite.Model(name="m")
     body = model.add(
         osimlite.Body(

@@ -1,4 +1,7 @@
-"""Real models against OpenSim 4.6, live: poses, mass matrices and accelerations with all forces but gravity removed."""
+"""Compare poses, mass matrices and accelerations of corpus models with a live OpenSim 4.6.
+
+All forces but gravity are removed.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,16 @@ from tests.oracle.opensim_runs import put
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
-# Models in whose knees one coordinate drives several rotations.
+# Models whose knees have several rotations that depend on one coordinate.
 _SEVERAL_ROTATIONS = {"m0097", "m0116", "m0225", "m0954"}
 
 
 def _without_forces(path: Path) -> tuple[Any, Any]:
-    """The model at rest in its default pose, nothing acting on it but gravity and constraints."""
+    """Load a model in its default pose at rest, with no forces but gravity and constraints.
+
+    Returns:
+        OpenSim's model and state.
+    """
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(path))
     for part in ("ForceSet", "ControllerSet", "ProbeSet"):
@@ -125,5 +132,5 @@ def test_real_models_assemble_as_in_opensim(corpus_model: Any, tmp_path: Path) -
     theirs, ours = np.array([item.getValue(state) for item in coordinates]), mechanism.assemble(q)
     ends = [info.range for info in mechanism.coordinates if info.clamped]
     at_an_end = any(np.isclose(ours, end, atol=1e-9).any() for pair in ends for end in pair)
-    # OpenSim's optimizer stays off the ends of ranges a little.
+    # OpenSim's optimizer stays slightly off the ends of coordinate ranges.
     assert ours == pytest.approx(theirs, abs=1e-4 if at_an_end else 1e-8)

@@ -1,4 +1,4 @@
-"""MuscleAnalysis of all classes of muscles, here and by OpenSim, live: the same files, headers and labels."""
+"""Compare MuscleAnalysis of all muscle classes with a live OpenSim: files, headers, labels and numbers."""
 
 from __future__ import annotations
 
@@ -61,10 +61,15 @@ CLASSES: dict[str, tuple[type[Muscle], dict[str, Any]]] = {
 
 
 def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 5e-7) -> None:
-    """All files are there, with the same words, and numbers that differ by parts of the largest of their columns.
+    """Compare two output folders: same files, headers, labels and NaN, and nearly equal numbers.
 
-    Velocities of fibers are those that OpenSim's search leaves, up to 1e-10 of the strength; here
-    they are exact.
+    OpenSim iterates fiber velocities up to an error of 1e-10 of the strength; osimlite's are exact.
+
+    Args:
+        ours: output folder of osimlite.
+        theirs: output folder of OpenSim.
+        tolerance: largest difference relative to the largest number of the column.
+        small: absolute difference that is allowed in addition.
     """
     assert sorted(path.name for path in ours.iterdir()) == sorted(
         path.name for path in theirs.iterdir()
@@ -73,7 +78,7 @@ def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 5e
         one, two = (
             path.read_text().partition("endheader\n") for path in (file, theirs / file.name)
         )
-        # That a header says where NaN stands is ours alone.
+        # Only osimlite's headers say where the table contains NaN.
         header = re.sub(r"NaN stands .*\n", "", one[0])
         assert (header, one[2].partition("\n")[0]) == (two[0], two[2].partition("\n")[0]), file.name
         mine, known = read_sto(file).rows, read_sto(theirs / file.name).rows
@@ -120,7 +125,10 @@ def test_models_of_walking(
 
 
 def test_rajagopal(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Eighty muscles, patellas on couplers; OpenSim ends its search for equilibrium at 1e-8 of a strength."""
+    """A model with eighty muscles and patellae on couplers.
+
+    OpenSim ends its iteration for equilibrium at 1e-8 of a strength.
+    """
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(next(item.path for item in corpus if item.id == "m0954"))
     compare(

@@ -1,4 +1,4 @@
-"""Lengths, moment arms and forces of muscles over a coordinate, beside a live OpenSim 4.6."""
+"""Compare lengths, moment arms and forces of muscles over a coordinate with a live OpenSim 4.6."""
 
 from __future__ import annotations
 

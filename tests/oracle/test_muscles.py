@@ -1,4 +1,7 @@
-"""Muscles beside a live OpenSim 4.6: derivatives, records, energy, equilibrium, and motions with its steps."""
+"""Compare muscles with a live OpenSim 4.6.
+
+The tests compare derivatives, records, energy, equilibrium, and the steps of motions.
+"""
 
 from __future__ import annotations
 
@@ -95,7 +98,7 @@ def made(name):
 
 @pytest.fixture(params=list(MUSCLES))
 def both(request, tmp_path):
-    """The compiled engine, and OpenSim's model with a state, of one muscle that is excited by 0.4."""
+    """Return the compiled engine, OpenSim's model and its state, for one muscle with excitation 0.4."""
     osimlite.write(hung(made(request.param), [0.4, 0.4]), tmp_path / "model.osim")
     model = osimlite.read(tmp_path / "model.osim")
     mechanism = build_mechanism(model)
@@ -144,7 +147,7 @@ def test_a_start_derivatives_records_and_energy(both):
         assert engine.compute_derivative(0.0, y) == pytest.approx(expected, rel=1e-10, abs=1e-10)
         record = theirs.getForceSet().get(0).getRecordValues(state)
         assert engine.force_records(0.0, y) == pytest.approx([record.get(0)], rel=1e-10, abs=1e-9)
-        # OpenSim's integrals of curves are splines.
+        # OpenSim approximates the integrals of curves by splines, therefore the larger tolerance.
         stored = theirs.calcPotentialEnergy(state)
         assert engine.compute_energies(0.0, y)[2] == pytest.approx(stored, rel=1e-4, abs=1e-5)
 
@@ -170,7 +173,7 @@ def test_equilibrium(both):
 
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
 def test_the_steps_of_a_motion(both, engine, tmp_path):
-    """Of a stiff mass, every rounding has grown after some steps."""
+    """Stiff muscles with mass amplify every rounding error within a few steps, therefore the short motion."""
     _, theirs, start = both
     to = 0.01 if "Acceleration" in theirs.getForceSet().get(0).getConcreteClassName() else 0.3
     theirs.setStateVariableValue(start, "/jointset/slide/x/value", 0.27)
@@ -196,7 +199,11 @@ def test_the_steps_of_a_motion(both, engine, tmp_path):
 
 
 def test_a_step_to_where_there_is_no_solution_is_tried_smaller(tmp_path):
-    """Fibers that shorten so fast that the first steps would leave them shorter than the muscle is wide."""
+    """The integrator reduces steps that end where the muscle has no solution.
+
+    The fibers shorten so fast that the first steps would leave them shorter than the width of the
+    muscle.
+    """
     force = made("pennate mass")
     force.default_fiber_length, force.default_fiber_velocity = 0.028, -3.0
     model = hung(force, [0.4, 0.4])
@@ -230,7 +237,7 @@ WHOLE = (
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_whole_models(name, corpus):
-    """Equilibrium, derivatives at random states, and the steps of a motion with both engines."""
+    """Compare equilibrium, derivatives at random states, and the steps of a motion with both engines."""
     opensim.Logger.setLevelString("off")
     file = next(item.path for item in corpus if item.path.name == name)
     theirs = opensim.Model(str(file))

@@ -1,4 +1,8 @@
-"""Nimble, live: files of AddBiomechanics have its numbers, and rewritten models move in OpenSim as in Nimble."""
+"""Compare files of AddBiomechanics and rewritten models with a live nimblephysics.
+
+Files must have Nimble's numbers, and rewritten models must move in OpenSim as the originals in
+Nimble.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,7 @@ from tests.translate.test_nimble import CUSTOM, make_custom, make_ellipsoid
 pytestmark = [pytest.mark.full, pytest.mark.oracle]
 
 DATA = "OSIMLITE_NIMBLE_DATA"
-"""Variable with a checkout of nimblephysics, whose folder `data` has public models and a .b3d file."""
+"""Variable that names a checkout of nimblephysics, whose folder `data` has public models and a .b3d file."""
 
 STATES = 200
 
@@ -38,7 +42,10 @@ MODELS = (
 )
 
 REASONS = {0: "notMissingGRF", 2: "unmeasuredExternalForceDetected", 5: "notOverForcePlate"}
-"""Nimble's names of the reasons in the files; its own numbers are others than those of the format."""
+"""Nimble's names of the reasons in the files, by their numbers in the file format.
+
+Nimble's Python enumeration has other numbers.
+"""
 
 
 def find_data(name: str) -> Path:
@@ -74,14 +81,23 @@ def find_opensim_poses(path: Path, names: list[str], states: Any) -> list[dict[s
 
 
 def make_explicit(path: Path) -> Path:
-    """Write out what Nimble's reader cannot do without: the mass centres of the test models."""
+    """Write the mass centres of the test models explicitly, which Nimble's reader requires."""
     text = path.read_text().replace("<inertia>", "<mass_center>0 0 0</mass_center><inertia>")
     path.write_text(text)
     return path
 
 
 def compare_poses(source: Path, folder: Path, tolerance: float) -> float:
-    """Compare a rewritten model in OpenSim with the original one in Nimble; return the difference before."""
+    """Compare a rewritten model in OpenSim with the original one in Nimble.
+
+    Args:
+        source: original model.
+        folder: folder for the rewritten model.
+        tolerance: largest difference of poses (m, or entries of rotation matrices).
+
+    Returns:
+        The largest difference of the original model in OpenSim, before it was rewritten.
+    """
     model = osimlite.read(source)
     coordinates = list_coordinates(model)
     rng = np.random.default_rng(0)
@@ -110,10 +126,10 @@ def compare_poses(source: Path, folder: Path, tolerance: float) -> float:
 
 
 def measure_defect(pose: Any) -> float:
-    """Return how far the rotation of a pose of Nimble is from a rotation: the largest entry of R^T R - I.
+    """Return how far the rotation of a Nimble pose is from orthogonal: the largest entry of R^T R - I.
 
-    Nimble uses axes of rotation with the digits of the file, without making their lengths 1. OpenSim's
-    rotations are orthogonal, so that no joint of OpenSim is nearer than about half of this.
+    Nimble uses axes with the digits of the file and does not normalise them. OpenSim's rotations
+    are orthogonal, so that no joint of OpenSim can be nearer than about half of this.
     """
     turn = np.array(pose)[:3, :3]
     return float(np.abs(turn.T @ turn - np.eye(3)).max())
@@ -154,7 +170,7 @@ def compare_subject(path: Path) -> None:
         arrays = trial.read_arrays()
         names, positions = trial.read_markers()
         for frame, seen in enumerate(expected["markers"]):
-            # Nimble lists the markers that were seen; NaN are those that were not.
+            # Nimble lists the visible markers only; our tables have NaN for the others.
             for index, name in enumerate(names):
                 if name in seen and not np.isnan(seen[name]).any():
                     assert seen[name] == positions[frame, index].tolist()
@@ -192,7 +208,7 @@ def test_nimble_has_the_names_of_the_walker(tmp_path: Path) -> None:
 
 
 def make_mechanism_of_nimble(trial: B3dTrial, gravity: tuple[float, float, float]) -> Mechanism:
-    """Return the mechanism of a recorded trial as Nimble has it: without the mass of the patellae."""
+    """Return the mechanism of a recorded trial as Nimble computes it, with massless patellae."""
     model = trial.subject.read_model(0)
     model.gravity = gravity
     for body in model.components(osimlite.Body):
@@ -202,7 +218,13 @@ def make_mechanism_of_nimble(trial: B3dTrial, gravity: tuple[float, float, float
 
 
 def compute_moments(trial: B3dTrial, mechanism: Mechanism, *, with_ground_forces: bool) -> Any:
-    """Return inverse dynamics (frames, dofs) of the states in the first pass of a trial, N m and N."""
+    """Return inverse dynamics (frames, dofs) of the first pass of a trial (N m and N).
+
+    Args:
+        trial: recorded trial.
+        mechanism: mechanism of its model.
+        with_ground_forces: whether the recorded ground reactions are applied.
+    """
     arrays, columns = trial.read_arrays(0), trial.read_coordinates().columns
     names = [body.name.rpartition("/")[2] for body in mechanism.bodies]
     indices = [mechanism.coordinate_names.index(name) for name in columns]
@@ -220,7 +242,7 @@ def compute_moments(trial: B3dTrial, mechanism: Mechanism, *, with_ground_forces
             trial.subject.contact_bodies, wrenches.reshape(-1, 2, 3), strict=True
         ):
             origin = state.point(names.index(body), np.zeros(3))
-            # The torque of the file is about the origin of ground.
+            # The torque in the file is about the origin of ground.
             applied[body] = Wrench(force, torque - np.cross(origin, force))
         moments = mechanism.inverse_dynamics(
             q,
@@ -234,7 +256,10 @@ def compute_moments(trial: B3dTrial, mechanism: Mechanism, *, with_ground_forces
 
 @pytest.mark.parametrize("index", [0, 1])
 def test_moments_of_a_recorded_file_are_those_of_inverse_dynamics(index: int) -> None:
-    """The file has the gravity of Nimble's parser, along -z, and zeros in its first and last frame."""
+    """The file was computed with the gravity of Nimble's parser, along -z.
+
+    Its first and last frames are zero.
+    """
     trial = read_b3d(find_data("b3d/results.b3d")).trials[index]
     mechanism = make_mechanism_of_nimble(trial, (0.0, 0.0, -9.81))
     arrays, columns = trial.read_arrays(0), trial.read_coordinates().columns
@@ -242,8 +267,9 @@ def test_moments_of_a_recorded_file_are_those_of_inverse_dynamics(index: int) ->
         compute_moments(trial, mechanism, with_ground_forces=True) - arrays["moments"]
     )
     assert not arrays["moments"][[0, -1]].any()
-    # Above the pelvis everything is equal. The version of Nimble that wrote the file in 2023 had
-    # slightly other curves of the knees: its mass centre differs by 8 um, the present one's does not.
+    # Segments above the pelvis agree exactly. The version of Nimble that wrote the file in 2023 had
+    # slightly different curves of the knees: its mass centre differs by 8 um, that of the present
+    # version does not.
     above = columns.index("lumbar_extension")
     print(
         f"above the pelvis {difference[1:-1, above:].max():.1e}, all {difference[1:-1].max():.2f}"
@@ -251,7 +277,8 @@ def test_moments_of_a_recorded_file_are_those_of_inverse_dynamics(index: int) ->
     assert difference[1:-1, above:].max() < 2e-7
     assert difference[1:-1].max() < 1.0
     assert np.median(difference[1:-1]) < 1e-3
-    # The model's own gravity, along -y, gives quite other numbers.
+    # With the model's own gravity, along -y, the vertical force on the pelvis differs by the
+    # weight.
     upright = make_mechanism_of_nimble(trial, (0.0, -9.81, 0.0))
     residual = compute_moments(trial, upright, with_ground_forces=True) - arrays["moments"]
     weight = 9.81 * mechanism.total_mass

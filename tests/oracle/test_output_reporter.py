@@ -1,4 +1,7 @@
-"""Outputs along a motion against OpenSim's OutputReporter, live: every output of every class of component."""
+"""Compare outputs along a motion with a live OpenSim's OutputReporter.
+
+The tests cover the outputs of every class of components.
+"""
 
 from __future__ import annotations
 
@@ -28,19 +31,19 @@ MORE = """<output_precision>16</output_precision><initial_time>0.1</initial_time
     </objects></AnalysisSet>"""
 STIFF = ("fiber_stiffness", "fiber_stiffness_along_tendon", "muscle_stiffness", "tendon_stiffness")
 NOT_YET = {*STIFF, "passive_force_multiplier"}
-"""Outputs of muscles that are refused."""
+"""Outputs of muscles that osimlite rejects."""
 WITH_MASS = {
     "fiber_force_along_tendon",
     "tendon_force",
     *(name for name in LAW_OUTPUTS if name.startswith("passive")),
 }
-"""More of them for muscles with a mass."""
+"""Further outputs that osimlite rejects for muscles with a mass."""
 NEVER = {"PathWrapPoint", "PathWrap", "MovingPathPoint"}
-"""OpenSim's own analysis stops at the outputs of the first two, the last is refused here."""
+"""Classes that are not tested: OpenSim's analysis stops at the outputs of the first two, and osimlite rejects the last."""
 
 
 def outputs(model: Model) -> list[str]:
-    """Those of the first and the last component of each class that have a type which is reported."""
+    """Return the outputs of a reported type of the first and the last component of each class."""
     tree = model.tree()
     by_class: dict[str, list[Any]] = {"Model": [model]}
     for component in model.components():
@@ -67,7 +70,10 @@ def outputs(model: Model) -> list[str]:
 def test_every_output(
     corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """To parts of 1e-8 of the largest of a column; what is of another type is told."""
+    """Every output agrees to 1e-8 of the largest number of its column.
+
+    Outputs of other types are reported in a message.
+    """
     monkeypatch.chdir(tmp_path)
     model = (
         jumper()
@@ -91,9 +97,9 @@ def test_every_output(
         largest = np.nanmax(np.abs(wanted.rows), axis=0, initial=0.0)
         for index, column in enumerate(wanted.columns):
             apart = np.abs(mine.rows[:, index] - wanted.rows[:, index])
-            # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of
-            # a force; what fibers bear by their velocity as its search for that, which ends at
-            # 1e-10.
+            # OpenSim's equilibrium stops at 1e-8 of a force, which limits the energy of a stiff
+            # tendon. Its iteration for the fiber velocity stops at 1e-10, which limits the forces
+            # that depend on it.
             near = 1e-6 if column.endswith("potential_energy") else 1e-8
             small = max(near, 1e-6 if "fiber" in column else 0.0)
             assert apart.max() <= near * largest[index] + small, column
@@ -102,7 +108,10 @@ def test_every_output(
 def test_what_is_no_number_is_left_out_and_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """OpenSim does so, too; an alias is the label of its column."""
+    """Outputs that are not numbers are omitted with a message, as in OpenSim.
+
+    An alias becomes the label of its column.
+    """
     monkeypatch.chdir(tmp_path)
     asked = "/bodyset/pelvis|rotation bodyset/pelvis|position(here) |com_position"
     body = jumper().body_set.objects[0].name
@@ -131,7 +140,7 @@ def test_what_is_no_number_is_left_out_and_told(
 def test_what_is_not_there_is_told(
     tmp_path: Path, asked: str, error: type[Exception], words: str
 ) -> None:
-    """Before anything is written."""
+    """The error is raised before any file is written."""
     from tests.tools.support import tables
 
     model = jumper()

@@ -1,4 +1,8 @@
-"""Ranges of wraps that OpenSim never looks at, and muscles that it equilibrates before speeds fulfil constraints."""
+"""Compare ranges of path wraps and the initial muscle equilibrium with OpenSim.
+
+OpenSim never evaluates wraps whose range lies beyond the path. It equilibrates muscles before
+speeds fulfil the constraints.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,7 @@ def model(forces: str, *, more: str = "", ground: str = "") -> str:
 
 
 def answer(code: str, path: Path) -> list[list[float]] | None:
-    """What a piece of code says of a model in OpenSim, None if it fails there."""
+    """Run code on a model in OpenSim and return what it prints, or None if it fails."""
     head = (
         'import json, sys, opensim as o\no.Logger.setLevelString("Off")\nm = o.Model(sys.argv[1])\n'
     )
@@ -155,8 +159,8 @@ ELLIPSOID, TORUS = (
 )
 
 
-# Of a point a pair of numbers is the range of /jointset/b/b_x in which it counts; of a wrap a
-# missing surface is one that is not active.
+# A pair of numbers for a point is the range of /jointset/b/b_x in which the point is active. None
+# for the surface of a wrap stands for a wrap object that is not active.
 @pytest.mark.parametrize(
     ("force", "off", "points", "wraps"),
     [
@@ -268,7 +272,7 @@ def test_models_whose_ranges_leave_their_paths(
     for pose, length in zip(POSES, lengths, strict=True):
         assert length_in(pose) == (None if length is None else pytest.approx(length, abs=1e-13))
     assert moved() == (None if end is None else pytest.approx(end, abs=1e-8))
-    # What is an error stops OpenSim.
+    # A model with the error OSIM617 must not run in OpenSim.
     assert not (osimlite.validate(path, select="OSIM617").errors and end)
 
 
@@ -302,5 +306,5 @@ def test_muscles_are_in_equilibrium_at_speeds_that_break_constraints(tmp_path: P
         free = simulation.engine.equilibrate_muscles(0.0, y)
     assert y[2:4] == pytest.approx(theirs[1], abs=1e-6)
     assert y[-1] == pytest.approx(theirs[0][0], rel=1e-7)
-    # The equilibrium at the projected speeds is another.
+    # The equilibrium at the projected speeds has a different fiber length.
     assert free[-1] != pytest.approx(theirs[0][0], rel=1e-4)

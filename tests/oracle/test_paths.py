@@ -1,4 +1,4 @@
-"""Paths through points that move, or come and go, and around surfaces, against a live OpenSim 4.6."""
+"""Compare paths with moving points, conditional points and wrap objects with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ GROUND, B0, B1, B2, F1, F2, STUCK = (
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
 def model(request):
-    """A body is welded to another, and a third one is on a locked joint; coordinates leave their ranges."""
+    """Return a model with a welded body, a body on a locked joint, and small coordinate ranges.
+
+    The test states exceed these ranges.
+    """
     model = carrier(request.param)
     b1, b2 = (body for body in model.components(Body) if body.name in ("b1", "b2"))
     stuck = model.add(Body(name="stuck", mass=0.5, inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
@@ -152,7 +155,7 @@ def with_springs(model):
 
 
 def test_points_that_move_or_come_and_go(model, tmp_path):
-    # OpenSim counts no energy for these springs.
+    # OpenSim computes no potential energy of these springs.
     assert compare(with_springs(model), tmp_path, counted=0)
 
 
@@ -176,14 +179,14 @@ def test_lengths_speeds_and_moment_arms(model, coupled, tmp_path):
         )
         model.add(constraint)
     osimlite.write(model, tmp_path / "model.osim")
-    # Once it was asked for the moment arm of a locked coordinate, OpenSim forgets that this is
-    # locked.
+    # After computing the moment arm of a locked coordinate, OpenSim treats the coordinate as
+    # unlocked. Therefore compare only one pose.
     compare_paths(tmp_path / "model.osim", poses=1 if "locked" in coupled.values() else 4)
 
 
 @st.composite
 def wrapped(draw):
-    """A path through three bodies in a row and ground, around surfaces of these, with ranges of all kinds."""
+    """Draw a path through ground and a chain of three bodies, around surfaces of these."""
     model, body = Model(name="wrapped"), None
     place = st.tuples(*[st.floats(-0.12, 0.12)] * 3)
     for number in range(3):
@@ -200,7 +203,7 @@ def wrapped(draw):
         draw(st.lists(st.sampled_from(frames), min_size=2, max_size=5)), key=frames.index
     )
     for number, frame in enumerate(route):
-        # OpenSim crashes where all points are gone.
+        # OpenSim crashes if no point of a path is active.
         if 0 < number < len(route) - 1 and draw(st.booleans()):
             point = within(
                 -0.5, 0.6, draw(st.sampled_from(("j0/q0", "j1/q1", "j2/q2"))), frame, *draw(place)
@@ -211,7 +214,8 @@ def wrapped(draw):
         spring.geometry_path.path_point_set.objects.append(point)
     count = draw(st.integers(1, 3))
     for number in range(count):
-        # The tangent points of a cylinder that is not alone slide away, and magnify rounding.
+        # With several wrap objects the tangent points on a cylinder drift, and amplify rounding
+        # errors.
         kinds = (
             (WrapSphere, WrapEllipsoid) if count > 1 else (WrapCylinder, WrapEllipsoid, WrapTorus)
         )
@@ -266,7 +270,7 @@ def test_two_points_at_one_place_beside_a_torus(quadrant, tmp_path):
     "heights", [(0.11, 0.0), (0.02, 0.0), (0.02, 1e-16), (0.02, 1e-15), (0.0, 0.02), (0.0, 0.0)]
 )
 def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
-    """OpenSim takes the foot of the second end on the axis for a direction: there it is none."""
+    """OpenSim uses the projection of the second end onto the axis as a direction, which is zero here."""
     model = Model(name="level")
     first, second = heights
     cylinder = WrapCylinder(name="cylinder", quadrant=quadrant, radius=0.03, length=0.2)

@@ -1,6 +1,6 @@
-"""Lengths, speeds and moment arms of the paths of every real model, against a live OpenSim 4.6.
+"""Compare lengths, speeds and moment arms of all paths of corpus models with a live OpenSim 4.6.
 
-OSIMLITE_POSES is how many poses to take of each model.
+OSIMLITE_POSES sets the number of poses per model.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from tests.oracle.opensim_paths import compare_paths  # noqa: E402
 def test_real_paths(corpus_model, tmp_path, monkeypatch):
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
-    # Of old files OpenSim keeps six digits, which are in what it prints.
+    # OpenSim keeps six digits of the numbers of old files. Its print has the same digits for both
+    # programs.
     file = tmp_path / "model.osim"
     file.write_bytes(gzip.decompress(corpus_model.converted.read_bytes()))
     if not osimlite.paths(osimlite.read(file)).names:

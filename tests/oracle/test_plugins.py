@@ -1,4 +1,7 @@
-"""The script of the manual that asks OpenSim what classes are like: of OpenSim's own it must say what they are."""
+"""Check the manual's script that generates class declarations by asking OpenSim.
+
+Applied to OpenSim's own classes it must give the declarations of osimlite.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +49,7 @@ def test_what_opensim_declares_is_what_the_classes_are(tmp_path):
             if not isinstance(spec.kind, Reference):
                 assert type(result[tag].kind) is type(spec.kind), f"{name}/{tag}"
             if spec.factory is None and type(getattr(plain, spec.name)) is float:
-                # OpenSim says six digits.
+                # OpenSim prints six digits.
                 assert getattr(made, result[tag].name) == pytest.approx(
                     getattr(plain, spec.name), rel=1e-5, nan_ok=True
                 )

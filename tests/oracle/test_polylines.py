@@ -1,4 +1,4 @@
-"""Where paths run, beside what OpenSim draws of them."""
+"""Compare the polylines of paths with the lines that OpenSim draws."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ FAR = {
     "torus_x": 2e-3,
     "ellipsoid_x_hybrid": 1e-5,
 }
-"""How far our corners may be from the lines that OpenSim draws, m: it leaves out the last 2 mm of a helix.
+"""Largest distance (m) of our corners from OpenSim's lines; OpenSim leaves out the last 2 mm of a helix.
 
-On spheres it draws hardly any of the way, since it takes radians for degrees.
+On spheres OpenSim draws only a small part of the arc, because it mistakes radians for degrees.
 """
 NAMES = (*FAR, "sphere_x", "edge_far_cylinder_x", "cylinder_sphere_ellipsoid")
 
 
 def drawn(path, state) -> np.ndarray:
-    """The corners (k, 3) of the lines that OpenSim draws of a path."""
+    """Return the ends (k, 3) of the lines that OpenSim draws for a path."""
     result = []
 
     class Lines(opensim.DecorativeGeometryImplementation):  # type: ignore[misc]
@@ -37,7 +37,7 @@ def drawn(path, state) -> np.ndarray:
                 result.append([point.get(axis) for axis in range(3)])
 
         def implementSphereGeometry(self, _):
-            """A point of the path; it is an end of a line too."""
+            """Ignore a path point: it is the end of a line too."""
 
     shapes, reader = opensim.ArrayDecorativeGeometry(), Lines()
     path.generateDecorations(False, opensim.ModelDisplayHints(), state, shapes)
@@ -47,7 +47,7 @@ def drawn(path, state) -> np.ndarray:
 
 
 def distances(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Of points (k, 3) from a broken line through corners (n, 3)."""
+    """Return the distances (k,) of points (k, 3) from the polyline with corners (n, 3)."""
     start, way = line[:-1], np.diff(line, axis=0)
     square = np.maximum(np.sum(way * way, axis=1), 1e-300)
     part = np.clip(np.sum((points[:, None] - start) * way, axis=2) / square, 0.0, 1.0)
@@ -55,7 +55,7 @@ def distances(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def places(path, state) -> np.ndarray:
-    """Where the points (k, 3) are that a path runs through."""
+    """Return the positions (k, 3) in ground of the points of a path."""
     points = path.getCurrentPath(state)
     return np.array(
         [points.get(k).getLocationInGround(state).to_numpy() for k in range(points.getSize())]
@@ -83,7 +83,8 @@ def test_paths_run_where_opensim_has_them(name, tmp_path):
         if np.isnan(expected).any():
             continue
         if len(SETUPS[name]["objects"]) == 1:
-            # Of several wraps it has some points where they were before the last round.
+            # With several wrap objects OpenSim leaves some points where they were before its last
+            # iteration.
             assert np.linalg.norm(expected[:, None] - corners, axis=2).min(axis=1).max() < 1e-9
             length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
             assert -1e-3 < length / path.getLength(state) - 1.0 < 1e-12

@@ -1,4 +1,4 @@
-"""The walk that optimal control finds, driven in OpenSim with nothing but the excitations that were found."""
+"""Simulate a predicted walk in OpenSim with the excitations of the optimal control solution only."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ print(json.dumps(moco.evaluate(program, moco.MocoTrajectory.read("theirs.sto"))[
 
 @pytest.fixture
 def build(tmp_path, repo):
-    """Builds the model and its study with other settings of the solver; the file of the model."""
+    """Return a function that builds the model and its study with given solver settings.
+
+    The function returns the file of the model.
+    """
 
     def built(**settings):
         model = tmp_path / "human-walks.osim"
@@ -59,7 +62,7 @@ def build(tmp_path, repo):
 
 @pytest.mark.full
 def test_moco_has_the_same_costs(build, repo):
-    """Of the guess, as Ipopt moves it away from the bounds."""
+    """Objective terms agree at the guess, as Ipopt moves it away from the bounds."""
     model = build(num_mesh_intervals=4, optim_max_iterations=0)
     theirs, ours = (
         json.loads(
@@ -79,7 +82,10 @@ def test_moco_has_the_same_costs(build, repo):
 
 
 def test_opensim_walks_as_we_do(build):
-    """By the excitations of the guess, which are the same on all processors; until it has fallen a little."""
+    """Simulate the excitations of the guess in both programs, until the walker has fallen a little.
+
+    The guess is the same on all processors.
+    """
     model = build(num_mesh_intervals=16)
     stride, step = read_sto(model.with_name("human-walks_guess.sto")), 0.25
     opensim.Logger.setLevelString("Error")
@@ -100,7 +106,7 @@ def test_opensim_walks_as_we_do(build):
         name = f"{info.path}/value"
         off = np.abs(np.interp(times, ours.times, ours.values[:, k]) - theirs[name])
         assert off.max() < 1e-6, name
-        # What the coarse mesh was off has not grown much after half a step.
+        # The error of the coarse mesh has not grown much after half a step.
     half = len(times) // 2
     assert np.min(theirs["/jointset/ground_pelvis/pelvis_ty/value"][:half]) > 0.85
     way = theirs["/jointset/ground_pelvis/pelvis_tx/value"][half]

@@ -1,4 +1,4 @@
-"""Probes against a live OpenSim 4.6: what they read at any state, and what its ProbeReporter writes along a motion."""
+"""Compare probes with a live OpenSim 4.6: at random states, and with its ProbeReporter along a motion."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def opened(model, tmp_path):
 
 
 def compare(model, tmp_path, tolerance=1e-9):
-    """What all probes read at some states, auxiliary ones too."""
+    """Compare the outputs of all probes at random states, including auxiliary states."""
     theirs = opened(model, tmp_path)
     state = theirs.initSystem()
     mechanism = build_mechanism(model)
@@ -159,7 +159,7 @@ SMOOTH: tuple[dict[str, object], ...] = (
 def add_metabolics(
     model, names, kinds=(Umberger2010MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe)
 ):
-    """Probes with all switches on and off, of some muscles that differ."""
+    """Add metabolic probes with all switches on and off for muscles with different parameters."""
     for kind in kinds:
         is_umberger = kind is Umberger2010MuscleMetabolicsProbe
         parameter = (
@@ -192,7 +192,7 @@ def add_metabolics(
 def test_metabolic_powers(model, muscle, tmp_path):
     kind, more = MUSCLES[muscle]
     muscles = along(kind, **more)
-    # One that shortens where the other lengthens, each on its side of the optimal length.
+    # One muscle shortens while the other lengthens, on different sides of the optimal fiber length.
     muscles[0].optimal_fiber_length, muscles[1].optimal_fiber_length = 0.2, 2.0
     model.add(*muscles)
     drive(model, "along0", "along1")
@@ -240,7 +240,7 @@ def test_smooth_metabolic_powers(model, switches, tmp_path):
 
 
 def reported(model, tmp_path, to, accuracy):
-    """Labels, times and rows of OpenSim's ProbeReporter along a motion."""
+    """Return labels, times and rows of OpenSim's ProbeReporter along a motion."""
     theirs = opened(model, tmp_path)
     theirs.addAnalysis(opensim.ProbeReporter(theirs))
     state = theirs.initSystem()
@@ -259,10 +259,10 @@ def reported(model, tmp_path, to, accuracy):
 
 
 def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
-    """Steps, labels and all that probes report at the ends of the steps."""
+    """Compare the times of steps, the labels and the probe outputs at the ends of the steps."""
     labels, times, rows = reported(model, tmp_path, to, accuracy)
     if any(probe.probe_operation == "differentiate" for probe in model.probe_set.objects):
-        # Simbody takes the first rate from memory that nobody has set.
+        # Simbody computes the first rate from uninitialised memory.
         rows[0] = [0.0] * len(labels)
     with Simulation(model, "compiled") as ready:
         steps = []
@@ -278,7 +278,8 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
         result = np.array(list(compute_probe_rows(ready.engine, steps, steps)))
         assert list_probe_labels(ready.engine.probes) == labels
         assert [t for t, _ in steps] == pytest.approx(times, abs=1e-9)
-        # A rate of second order is twice a difference of neighbours, less the rate before.
+        # A second-order rate is twice a difference of neighbouring values minus the previous rate,
+        # so that rounding errors accumulate. Compare relative to the largest value of a column.
         scale = np.maximum(1.0, np.abs(rows).max(axis=0))
         assert np.abs((result - rows) / scale).max() <= 1e-9
         trajectory = ready.run(to, accuracy=accuracy)
@@ -289,7 +290,7 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
 
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_operations_along_a_motion(model, operation, tmp_path):
-    """The energy cannot be integrated here."""
+    """SystemEnergyProbe is left out for `integrate`, which OpenSim does not support for it."""
     model.add(
         *(CoordinateActuator(name=f"on_{name}", coordinate=name) for name in ("q0_0", "q1_0"))
     )
@@ -312,7 +313,7 @@ def test_operations_along_a_motion(model, operation, tmp_path):
 
 @pytest.mark.parametrize("operation", ["value", "integrate", "differentiate"])
 def test_metabolic_powers_along_a_motion(operation, tmp_path):
-    """Integrals are states, whose errors take part in the control of the steps."""
+    """Integrals are states, whose errors take part in the step size control."""
     numbers = {
         "max_isometric_force": 546.0,
         "optimal_fiber_length": 0.0535,

@@ -1,4 +1,4 @@
-"""Setups of laboratories, with their measured motions and loads, here and by OpenSim, live."""
+"""Compare public setups of laboratories, with measured motions and loads, with a live OpenSim."""
 
 from __future__ import annotations
 
@@ -81,5 +81,5 @@ def test_numbers_of_opensim(
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
     run_script(script)
     osimlite.run(tmp_path / "ours.xml")
-    # Tables of inverse dynamics have eight decimals.
+    # OpenSim writes inverse dynamics with eight decimals.
     compare(tmp_path / "ours", tmp_path / "theirs", 1e-8, 1e-6 if tool == "AnalyzeTool" else 1.5e-8)

@@ -1,8 +1,8 @@
-"""Whole projects with one fault at random: OpenSim runs the tools, and osimlite says what it says.
+"""Compare the linter's findings in projects with one random fault with what OpenSim's tools do.
 
-Twenty by default, ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others. What OpenSim refuses,
-or crashes on, must have a finding where the fault is; what it takes, with results of the same
-numbers, must not be told to be refused.
+Where OpenSim rejects the project or crashes, there must be a finding at the fault. Where it
+computes the same results, no finding may claim a rejection. The default are twenty faults;
+``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` sets their number and the seed.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ pytestmark = pytest.mark.oracle
 WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("6", "40")))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
 VERDICTS = ("hangs", "crashes", "raises", "false", "changes", "tells", "nothing")
-"""What OpenSim may do, the worst first."""
+"""What OpenSim may do with a fault, worst first."""
 
 UNSOLVED = re.compile("Optimizer could not find a solution")
-"""How a tool says that it has taken the project and finds no motion for it."""
+"""Message of a tool that accepts the project but finds no motion for it."""
 
 LOST = {
     "OSIM003": "a tool reads a file as the class that it wants, whatever its tag; OpenSim alone refuses the file",
@@ -49,14 +49,14 @@ LOST = {
     "OSIM806": "rows are lost; whether the times of the tool need them is not said in the table",
     "OSIM807": "a row is lost, as above, with its time",
 }
-"""Errors that tell that OpenSim loses what is written, and why they may stand where the results are equal."""
+"""Errors about content that OpenSim loses, and why they are right although the results are equal."""
 
 Ask = Callable[[Path, str, str], dict[str, Any]]
 
 
 @pytest.fixture(scope="session")
 def opensim_runs() -> Iterator[Ask]:
-    """Runs a tool in a folder, given its class and its setup."""
+    """Return a function that runs a tool in a folder, given its class and its setup file."""
     command = [sys.executable, "-W", "ignore", "-m", "tests.oracle.opensim_tools"]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -77,7 +77,7 @@ def opensim_runs() -> Iterator[Ask]:
 
 
 class Tools:
-    """The tools of a project, run by OpenSim; how each ends without a fault."""
+    """The tools of a project, run by OpenSim, with their results without a fault."""
 
     def __init__(self, path: Path, project: Project, ask: Ask) -> None:
         self.path, self.project, self.ask = path, project, ask
@@ -93,7 +93,12 @@ class Tools:
     def run(
         self, setup: str, texts: dict[str, str | None] | dict[str, str]
     ) -> tuple[dict[str, Any], dict[str, str]]:
-        """What OpenSim says, and the files that it writes."""
+        """Run a setup on the given files in an empty folder.
+
+        Returns:
+            The answer of `tests.oracle.opensim_tools`, and the texts of the files that OpenSim
+                wrote.
+        """
         for file in sorted(self.path.rglob("*"), reverse=True):
             file.rmdir() if file.is_dir() else file.unlink()
         for name, text in texts.items():
@@ -107,7 +112,11 @@ class Tools:
         return answer, {name: text for name, text in written.items() if texts.get(name) != text}
 
     def verdict(self, fault: Fault, draw: random.Random) -> tuple[str, str]:
-        """The worst that OpenSim does with a fault, and what it says to it."""
+        """Run up to two setups with a fault in OpenSim.
+
+        Returns:
+            The worst of the `VERDICTS`, and OpenSim's message.
+        """
         asked = [
             name
             for name in self.kinds
@@ -119,7 +128,7 @@ class Tools:
             before, results = self.faultless[setup]
             told = [line for line in answer["log"] if line not in before["log"]]
             end, said = answer["end"], answer["message"] or "; ".join(told)
-            # A solver that goes on has taken the project.
+            # A solver that is still iterating has accepted the project.
             if (end == "false" and UNSOLVED.search(said)) or (
                 end == "hangs" and self.kinds[setup] == "MocoStudy"
             ):
@@ -140,7 +149,7 @@ class Tools:
 
 
 def same_results(before: dict[str, str], after: dict[str, str]) -> bool:
-    """Whether files hold the same words and numbers, headers of tables left aside."""
+    """Return whether files hold the same words and numbers, ignoring the headers of tables."""
     return before.keys() == after.keys() and all(
         _same(before[name], after[name]) for name in before
     )

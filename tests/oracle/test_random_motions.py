@@ -1,4 +1,4 @@
-"""Random models in motion against a live OpenSim 4.6: the same steps, the same states, with either engine."""
+"""Compare motions of random models with a live OpenSim 4.6: same steps and states with either engine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 
-# The GimbalJoint of seed 20 runs into gimbal lock, where the steps shrink without end, OpenSim's
+# The GimbalJoint of seed 20 reaches gimbal lock, where the steps shrink without end, in OpenSim
 # too.
 @pytest.mark.parametrize("seed", [*range(20), *range(21, 25)])
 def test_states_and_steps(seed, tmp_path):
@@ -24,7 +24,7 @@ def test_states_and_steps(seed, tmp_path):
     theirs = simulated(path, 0.3, 1e-6)
     model = osimlite.read(path)
     for engine in ("compiled", "bullet"):
-        # OpenSim's derivatives are wrong where one coordinate drives several turns.
+        # OpenSim's derivatives are wrong where one coordinate drives several rotations.
         with Simulation(model, engine, opensim_derivatives=True) as simulation:
             trajectory = simulation.run(0.3, accuracy=1e-6, report_interval=0.3)
         trajectory.to_sto(tmp_path / "states.sto")

@@ -1,4 +1,4 @@
-"""Inverse dynamics of recorded motions against OpenSim's InverseDynamicsTool, live."""
+"""Compare inverse dynamics of recorded motions with a live OpenSim's InverseDynamicsTool."""
 
 from __future__ import annotations
 
@@ -23,7 +23,14 @@ pytestmark = pytest.mark.oracle
 
 
 def recorded(corpus: Any, name: str, times: Any, noise: float = 0.0) -> Any:
-    """The mechanism of a real model, and a motion of it that is written with the model into the current folder."""
+    """Write a corpus model and a motion of it into the current folder; return its mechanism.
+
+    Args:
+        corpus: models of the corpus.
+        name: identifier of the model.
+        times: times of the motion (s).
+        noise: standard deviation of noise on the coordinates (rad or m).
+    """
     converted = next(model.converted for model in corpus if model.id == name)
     text = gzip.decompress(converted.read_bytes()).decode()
     Path("model.osim").write_text(text)
@@ -55,7 +62,10 @@ def test_inverse_dynamics_of_real_models(
 
 
 def _pushed(model: Model) -> None:
-    """Put springs and stops, off and on, beside the muscles; the motion leaves coordinates that were locked free."""
+    """Add springs, a path spring and stops to a model, some of them disabled.
+
+    The motion nevertheless moves the coordinates that are locked.
+    """
     for index, coordinate in enumerate(model.components(Coordinate)):
         model.add(
             SpringGeneralizedForce(
@@ -79,7 +89,7 @@ def _pushed(model: Model) -> None:
 def test_inverse_dynamics_beyond_the_forces_of_the_model(
     corpus: Any, name: str, tmp_path: Path, monkeypatch: Any, capfd: Any
 ) -> None:
-    """As with the usual `forces_to_exclude` of OpenSim's setup files."""
+    """Only muscles are excluded, as OpenSim's setup files usually do by `forces_to_exclude`."""
     monkeypatch.chdir(tmp_path)
     recorded(corpus, name, np.linspace(0.0, 1.0, 60))
     model = osimlite.read("model.osim")
@@ -123,7 +133,7 @@ def test_inverse_dynamics_through_the_filter(
     capfd.readouterr()
     ours = RecordedMotion.read(mechanism, "motion.mot").lowpassed(cutoff).inverse_dynamics()
     assert ours.columns == theirs.columns
-    # Theirs go on into what the filter adds.
+    # OpenSim's table includes the times by which the filter extends the data.
     same = np.abs(theirs.times[:, None] - ours.times).argmin(axis=0)
     assert theirs.times[same] == pytest.approx(ours.times, abs=1e-8)
     # OpenSim prints eight decimals.

@@ -1,4 +1,4 @@
-"""What reflexes feel of bodies and muscles, beside what OpenSim says of the same states."""
+"""Compare the sensors of reflexes on bodies and muscles with OpenSim's values in the same states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STEP, OFFSET = 0.005, (0.1, -0.2, 0.3)
 
 
 def thrown() -> Model:
-    """A body that turns about all axes, and another that is fixed to it askew."""
+    """Return a model of a body that rotates about all axes, with a second one welded to it obliquely."""
     model = Model(name="thrown")
     whole, part = (
         model.add(Body(name=name, mass=1.0, inertia=(0.02, 0.03, 0.05, 0, 0, 0)))
@@ -41,7 +41,11 @@ def thrown() -> Model:
 
 
 def followed(model: Model, reflexes: dict[str, Any], folder: Any) -> tuple[Any, Any, Any]:
-    """A motion by reflexes, the model as OpenSim has it, and its states."""
+    """Simulate a model with reflexes.
+
+    Returns:
+        The controller, OpenSim's model, and an iterator over row numbers and OpenSim states.
+    """
     given = {"ReflexController": {"dual_sided": 0, **reflexes}}
     moved = osimlite.simulate(model, 0.3, controller=osimlite.Feedback(given), report_interval=STEP)
     osimlite.write(model, folder / "model.osim")
@@ -77,7 +81,7 @@ def test_bodies_are_felt_as_they_are(tmp_path) -> None:
     widest = 0.0
     for row, state in states:
         points, angles = [], []
-        # The left is mirrored.
+        # Sensors on the left side are mirrored.
         for name, sides in (("ball", (1.0, 1.0, 1.0)), ("fin_l", (-1.0, -1.0, 1.0))):
             body = model.getBodySet().get(name)
             for what in ("Location", "Velocity"):

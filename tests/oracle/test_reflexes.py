@@ -1,4 +1,4 @@
-"""A human who walks by reflexes, step by step beside OpenSim with the same excitations."""
+"""Compare a human walking by reflexes with OpenSim under the same excitations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.oracle
 
 
 def test_the_walk_is_opensim_s(tmp_path) -> None:
-    """Twenty control steps."""
+    """Compare all states after each of twenty control steps."""
     scenario = Scenario(write_scenario(tmp_path))
     steps = 20
     walked = scenario.walk(scenario.best(), duration=steps * scenario.step)
@@ -39,7 +39,8 @@ def test_the_walk_is_opensim_s(tmp_path) -> None:
         brain.addActuator(model.getMuscles().get(label))
         function = opensim.PiecewiseConstantFunction()
         for row, value in enumerate(walked.excitations[label][:steps].tolist()):
-            # As in SCONE, the derivative at the start of a step does not know of it.
+            # As in SCONE, the derivative at the start of a control step still uses the previous
+            # excitation.
             function.addPoint(row * scenario.step + 1e-12, value)
         brain.prescribeControlForActuator(label, function)
     state = model.initSystem()
@@ -53,5 +54,5 @@ def test_the_walk_is_opensim_s(tmp_path) -> None:
         state = manager.integrate(row * scenario.step)
         worst.append(off(row))
 
-    # OpenSim finds velocities of fibers to 1e-10.
+    # OpenSim iterates fiber velocities up to an error of 1e-10.
     assert max(worst) < 3e-9

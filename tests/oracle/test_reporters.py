@@ -1,4 +1,4 @@
-"""Analyses that report what a model has, here and by OpenSim, live: the same files, headers and labels, all digits."""
+"""Compare analyses that report quantities of a model with a live OpenSim: files, headers, labels, digits."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ FORWARD = """<OpenSimDocument Version="40600">
 
 
 def add_probes(model: Model) -> None:
-    """Of the actuators, with all operations, one of them off."""
+    """Add probes of actuators with all operations, a disabled one, and a probe of joint power."""
     for operation in OPERATIONS:
         more: dict[str, Any] = {"actuator_names": ("all",), "probe_operation": operation}
         model.add(
@@ -56,7 +56,7 @@ def add_probes(model: Model) -> None:
 def test_all_actuators_and_operations(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, joints: str
 ) -> None:
-    """In a motion that is known, an extreme is that of the moment and of 0, and rates are 0."""
+    """Along a prescribed motion, OpenSim's extremes compare only the present value with 0, and rates are 0."""
     monkeypatch.chdir(tmp_path)
     model = carrier(JOINTS[joints])
     add_actuators(model)
@@ -71,15 +71,15 @@ def test_real_models(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_along_a_forward_run(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Probes remember all steps, also those that have no row.
+    """Probes remember all steps of the integrator, also those without a row in the table.
 
-    The length of a step follows from an error that is a difference of nearly equal numbers:
-    rounding of 1e-16 in a state is 1e-8 s in a time, on another processor.
+    The step size follows from an error estimate that is a difference of nearly equal numbers: on
+    another processor, rounding of 1e-16 in a state changes a time by 1e-8 s.
     """
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(next(item.path for item in corpus if item.id == "m0001"))
     add_probes(model)
-    # Simbody takes the first rate from memory that nobody has set.
+    # Simbody computes the first rate from uninitialised memory.
     for probe in model.probe_set.objects:
         if probe.probe_operation == "differentiate":
             probe.enabled = False

@@ -1,4 +1,4 @@
-"""Setups of tools that are run here and by OpenSim, live: the same files, headers and columns, the same numbers."""
+"""Compare setups of tools with a live OpenSim: files, headers, columns and numbers."""
 
 from __future__ import annotations
 
@@ -73,13 +73,13 @@ def test_analyses(
         model.tree().path_of(model.joint_set.objects[-1].frames[0]),
     )
     more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body, frame=frame)
-    # Muscles in equilibrium hardly move their fibers: OpenSim's search for that leaves 1e-10 of a
-    # force.
+    # Fibers hardly move when muscles are in equilibrium. OpenSim's iteration leaves an error of
+    # 1e-10 of a force, which is large compared to their velocity.
     compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-6)
 
 
 def other_columns(folder: Path) -> None:
-    """Columns of the motion are called as in files of states of several ages, and the last is gone."""
+    """Name the columns of the motion as state files of several versions do, and drop the last column."""
     table = read_sto(folder / "motion.mot")
     first, second, *others = (
         info.path for info in osimlite.mechanism(osimlite.read(folder / "model.osim")).coordinates
@@ -133,7 +133,10 @@ def test_speeds_of_a_file(
     count: int,
     in_degrees: bool,
 ) -> None:
-    """By new and old names, in rad/s whatever the file says; zero without a column."""
+    """Speeds are found under new and old names, and are in rad/s whatever the file says.
+
+    The speed is zero without a column.
+    """
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))
     infos = osimlite.mechanism(model).coordinates[:count]
@@ -154,7 +157,10 @@ def test_speeds_of_a_file(
 def test_other_states_beside_speeds_count(
     corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Values do not, and a speed without a column is the default one."""
+    """Other states in the speeds file are used, except for values of coordinates.
+
+    A speed without a column has its default value.
+    """
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))
     first, second = model.components(Coordinate)
@@ -178,7 +184,7 @@ def test_other_states_beside_speeds_count(
 def test_speeds_of_other_times_are_told(
     corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As OpenSim does."""
+    """OpenSim and osimlite reject a speeds file without a row at a requested time."""
     monkeypatch.chdir(tmp_path)
     write_sto(
         tmp_path / "speeds.sto", "speeds", [0.0, 0.11, 0.5], ["r_shoulder_elev_u"], [[1.0]] * 3
@@ -222,8 +228,8 @@ def test_loads_at_joints(
     monkeypatch.chdir(tmp_path)
     model = jumper() if name == "jumper" else osimlite.read(real(corpus, name))
     if any(isinstance(joint, ScapulothoracicJoint) for joint in model.joint_set.objects):
-        # At rest: OpenSim takes the rates of its angles for the speeds. What is locked does not
-        # move in these motions.
+        # The joint is at rest, because OpenSim uses the rates of its angles as speeds. Locked
+        # coordinates do not move in these motions.
         for coordinate in model.components(Coordinate):
             coordinate.locked, coordinate.default_value = True, coordinate.default_value + 0.1
     ours, theirs = both(tmp_path, model, "InverseDynamicsTool", LOADS.format(joints=joints))
@@ -264,7 +270,10 @@ CHANGES: dict[str, list[tuple[str, str]]] = {
 def test_forward_with_opensims_steps(
     shared: Path, tmp_path: Path, changes: list[tuple[str, str]]
 ) -> None:
-    """As many steps, at the same times: rounding grows in steps of muscles out of equilibrium."""
+    """OpenSim takes the same number of steps at the same times.
+
+    Muscles far from equilibrium amplify rounding errors in the steps.
+    """
     case = shared / "oracle" / "tools" / "reference" / "forward_arm26"
     (tmp_path / "start").mkdir()
     (tmp_path / "start" / "arm26_states.sto").write_bytes((case / "arm26_states.sto").read_bytes())

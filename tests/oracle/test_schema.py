@@ -1,4 +1,7 @@
-"""OpenSim reads what we print, for every class with every property set, and prints the same text itself."""
+"""Check for every class that OpenSim reads osimlite's output and prints the same text.
+
+Every property of the class is set.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ OTHERS = [tag for tag, cls in KNOWN if not issubclass(cls, Component) and not cl
 
 
 def filled(cls: type[Object]) -> Object:
-    """An instance with a value of its own in every text and number; what it owns stays as it is."""
+    """Return an instance with a different value in every text and number; owned objects keep their defaults."""
     values: dict[str, Any] = {"name": "filled"}
     for number, spec in enumerate(get_field_specs(cls).values()):
         kind = spec.kind
@@ -43,8 +46,9 @@ def filled(cls: type[Object]) -> Object:
             }
             word: Any = kind.choices[-1] if kind.choices else scalars[kind.scalar]
             if kind.legacy and kind.shape == "list" and kind.scalar == "double":
-                word = float(f"{word:g}")  # OpenSim prints six digits of these
-            # A turned frame is printed by OpenSim from its matrix, not as it was read.
+                word = float(f"{word:g}")  # OpenSim prints six digits of these values
+            # OpenSim prints the rotation of a frame from its matrix, not as it was read. Therefore
+            # use zeros.
             word = 0.0 if kind.shape == "Transform" else word
             size = kind.size or kind.most or max(kind.least, 2)
             values[spec.name] = word if kind.shape in ("single", "optional") else (word,) * size

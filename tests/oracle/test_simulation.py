@@ -1,4 +1,4 @@
-"""Motion and result files against a live OpenSim 4.6."""
+"""Compare motions and result files with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -26,7 +26,15 @@ pytestmark = pytest.mark.oracle
 
 
 def opensim_run(path: Path, to, accuracy, folder: Path, start=None):
-    """OpenSim's states, and the forces of its ForceReporter, both as files."""
+    """Return OpenSim's table of states and that of its ForceReporter along a simulation.
+
+    Args:
+        path: model file.
+        to: final time (s).
+        accuracy: accuracy of the integrator.
+        folder: folder for the tables.
+        start: initial value and speed by the name of the coordinate; others have their defaults.
+    """
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(path))
     reporter = opensim.ForceReporter(model)
@@ -49,7 +57,7 @@ def opensim_run(path: Path, to, accuracy, folder: Path, start=None):
 
 
 def tumbling():
-    """A free body with three balls in one force, limits on what it carries, over a tilted floor."""
+    """Return a free body with three balls in one force and limited joints, above a tilted floor."""
     model = Model(name="tumbling")
     body = model.add(
         Body(
@@ -150,7 +158,7 @@ def test_opensim_takes_our_result_files(tmp_path):
     forces = opensim.TimeSeriesTable(str(tmp_path / "forces.sto"))
     assert forces.getNumColumns() == 80
     assert opensim.Storage(str(tmp_path / "forces.sto")).getSize() == 11
-    # A states file is what OpenSim replays.
+    # OpenSim can replay the states file.
     osimlite.write(dynamic_walker(), tmp_path / "model.osim")
     model = opensim.Model(str(tmp_path / "model.osim"))
     model.initSystem()
@@ -159,14 +167,14 @@ def test_opensim_takes_our_result_files(tmp_path):
 
 
 def test_same_steps_at_every_accuracy(tmp_path):
-    """The error control is OpenSim's, so the steps are."""
+    """The error control is the same as in OpenSim, and therefore the number of steps."""
     model = dynamic_walker()
     osimlite.write(model, tmp_path / "model.osim")
     for index, accuracy in enumerate((1e-3, 1e-5)):
         folder = tmp_path / str(index)
         folder.mkdir()
         states, _ = opensim_run(tmp_path / "model.osim", 1.0, accuracy, folder)
-        # One row is the start.
+        # The first row is the initial state, not a step.
         assert (
             osimlite.simulate(model, 1.0, accuracy=accuracy).summary["steps"]
             == len(states.times) - 1

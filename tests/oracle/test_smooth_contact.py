@@ -1,4 +1,4 @@
-"""Contact other than of spheres and meshes: smooth, of ellipsoids, of stations, against a live OpenSim 4.6."""
+"""Compare smooth contact, and contact of ellipsoids and stations, with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_ellipsoids_on_a_plane(model, carried, tmp_path):
                 )
             )
         model.add(force)
-    # Some of them touch, some do not.
+    # Some of the surfaces touch the plane in the test states, others do not.
     assert 0 < compare(model, tmp_path) < STATES * 3 * 12
 
 

@@ -1,4 +1,7 @@
-"""Splines through points are OpenSim's GCVSpline: few points, uneven ones, and what it is beyond them."""
+"""Compare splines through few or unevenly spaced points with OpenSim's GCVSpline.
+
+The comparison includes arguments beyond the points.
+"""
 
 from __future__ import annotations
 

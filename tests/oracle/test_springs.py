@@ -1,4 +1,4 @@
-"""Springs, formulas and bushings, between points and along paths, against a live OpenSim 4.6."""
+"""Compare springs, expression-based forces and bushings with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_spring_on_a_coordinate(model, tmp_path):
                 name=f"on_{name}", coordinate=name, stiffness=k, rest_length=0.2, viscosity=3
             )
         )
-    # OpenSim counts no energy for this spring.
+    # OpenSim computes no potential energy of this spring.
     compare(model, tmp_path, counted=0)
 
 
@@ -132,7 +132,8 @@ def test_forces_across_a_locked_coordinate(tmp_path):
         ExpressionBasedCoordinateForce(
             name="formula", coordinate="q1_0", expression="3*q + qdot/q"
         ),
-        # OpenSim takes the defaults of a document for those of all that it reads later.
+        # Set the value explicitly: OpenSim applies the defaults of a document to everything that it
+        # reads later.
         CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=1.0),
         PointToPointSpring(
             name="within",
@@ -155,7 +156,7 @@ def test_bushing(model, damping, tmp_path):
         "translational_stiffness": (50.0, 30.0, 20.0),
     }
     model.add(*between(BushingForce, **stiffness, **damping))
-    # Both OpenSim's component and Simbody's force behind it report the energy, and OpenSim adds
+    # OpenSim's component and Simbody's force behind it both report the energy, and OpenSim adds
     # them up.
     compare(model, tmp_path, counted=2)
 
@@ -182,14 +183,14 @@ def test_bushing_by_functions(model, tmp_path):
         ),
     }
     model.add(*between(FunctionBasedBushingForce, **functions, **DAMPING))
-    # OpenSim counts no energy for this bushing.
+    # OpenSim computes no potential energy of this bushing.
     compare(model, tmp_path, counted=0)
 
 
 @pytest.mark.parametrize("rest", [0.1, 2.0, 20.0])
 def test_springs_along_paths(model, rest, tmp_path):
     model.add(*along(PathSpring, resting_length=rest, stiffness=40.0, dissipation=0.3))
-    # OpenSim counts no energy for this spring, nor for the ligament.
+    # OpenSim computes no potential energy of this spring, nor of the ligament.
     compare(model, tmp_path, counted=0)
 
 

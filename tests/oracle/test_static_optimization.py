@@ -1,4 +1,7 @@
-"""Static optimization beside OpenSim, live: never more effort, and the motion is the one that was asked for."""
+"""Compare static optimization with a live OpenSim.
+
+The effort must never be larger, and the forces must give the accelerations of the motion.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ KEPT = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length", "p
 
 @pytest.fixture
 def arm(shared: Path, tmp_path: Path) -> Path:
-    """An arm with six muscles, whose controls are bounded; OpenSim's own test."""
+    """Return a folder with OpenSim's own test case: an arm with six muscles and bounded controls."""
     place = shared / "oracle" / "tools" / "reference" / "so_arm26_bounds"
     (tmp_path / "arm26_bounds.osim").write_bytes(
         gzip.decompress((place / "arm26_bounds.osim.gz").read_bytes())
@@ -40,7 +43,7 @@ def arm(shared: Path, tmp_path: Path) -> Path:
 
 
 def with_muscles(file: Path, kind: str) -> None:
-    """Have all muscles of a model be of another class, with the same sizes."""
+    """Replace all muscles of a model file by muscles of another class with the same parameters."""
     model = osimlite.read(file)
     for place, muscle in enumerate(model.force_set.objects):
         if isinstance(muscle, Muscle):
@@ -58,7 +61,7 @@ def with_muscles(file: Path, kind: str) -> None:
 
 
 def moved(model: osimlite.Model, file: Path, forces: osimlite.simulation.StoTable) -> np.ndarray:
-    """Accelerations (t, n) of OpenSim's model under forces along the motion of the setup, in the order of its file."""
+    """Return the accelerations (t, n) of OpenSim's model under given forces along the motion of the setup."""
     motion = osimlite.kinematics(model, file.parent / "arm26_InverseKinematics.mot", lowpass=6.0)
     theirs = opensim.Model(str(file))
     state = theirs.initSystem()
@@ -121,7 +124,7 @@ def test_an_arm_with_muscles_of_other_classes(
 
 
 def test_the_forces_give_the_accelerations_of_the_motion(arm: Path) -> None:
-    """OpenSim's own model moves so under them."""
+    """OpenSim's model has the accelerations of the motion under these forces."""
     file = arm / "arm26_bounds.osim"
     model = osimlite.read(file)
     found = osimlite.static_optimization(
@@ -139,7 +142,10 @@ def test_the_forces_give_the_accelerations_of_the_motion(arm: Path) -> None:
 
 
 def test_actuators_in_the_place_of_muscles(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two for one coordinate and one for the other: the answer is known but for OpenSim's tolerance."""
+    """Two actuators share one coordinate, a third one drives the other.
+
+    The solution is known analytically; OpenSim's differs from it within its tolerance.
+    """
     monkeypatch.chdir(arm)
     own = osimlite.ForceSet(name="own")
     sizes = ("a", "r_shoulder_elev", 10.0), ("b", "r_elbow_flex", 5.0), ("c", "r_elbow_flex", 2.0)
@@ -165,7 +171,7 @@ def test_actuators_in_the_place_of_muscles(arm: Path, monkeypatch: pytest.Monkey
 
 
 def test_an_elbow_that_follows_the_shoulder(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One coordinate is left to accelerate; poses of both programs fulfil the coupler to 1e-9 rad."""
+    """A coupler leaves one free coordinate; poses of both programs fulfil it within 1e-9 rad."""
     monkeypatch.chdir(arm)
     model = osimlite.read(arm / "arm26_bounds.osim")
     coupler = osimlite.CoordinateCouplerConstraint(

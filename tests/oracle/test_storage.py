@@ -1,4 +1,4 @@
-"""Storage files exchanged with a live OpenSim 4.6."""
+"""Compare reading and writing of storage files with a live OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_opensim_reads_what_we_write_and_back(kind, tmp_path):
     rng = np.random.default_rng(4)
     rows = rng.normal(size=(5, 2 * size))
     if kind == "Quaternion":
-        # OpenSim scales them to length 1.
+        # OpenSim normalises quaternions when it reads them.
         halves = rows.reshape(5, 2, 4)
         rows = (halves / np.linalg.norm(halves, axis=2, keepdims=True)).reshape(5, 8)
     times = [0.1 * k for k in range(5)]

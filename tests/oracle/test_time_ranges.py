@@ -1,4 +1,7 @@
-"""Time ranges that are empty, reversed, outside of the data or not numbers, in each tool, here and by OpenSim, live."""
+"""Compare unusual time ranges in each tool with a live OpenSim.
+
+The ranges are empty, reversed, outside of the data, or not numbers.
+"""
 
 from __future__ import annotations
 
@@ -32,14 +35,14 @@ FORWARD = """<OpenSimDocument Version="40600"><ForwardTool name="fw"><model_file
 
 
 class Tool(NamedTuple):
-    """A tool: how its files are laid out, its setup and class, its times, and a table that it writes."""
+    """Tool under test: function that writes its files, setup file, class, time range, and an output table."""
 
     lay_out: Callable[[Path], object]
     setup: str
     name: str
     times: tuple[str, str]
     table: str
-    number: int = 0  # of its time range in the setup
+    number: int = 0  # index of the tool's time range in the setup
 
 
 def lay_out_lab(name: str) -> Callable[[Path], object]:
@@ -52,7 +55,7 @@ def lay_out_dynamics(folder: Path) -> None:
 
 
 def lay_out_scaling(folder: Path) -> None:
-    """Lay out a trial in which the shank grows, so that each frame has another ratio."""
+    """Write a static trial in which the shank grows, so that each frame gives another scale factor."""
     copy_lab("one_frame", folder)
     model = (folder / "leg.osim").read_bytes()
     copy_lab("plugin", folder)
@@ -66,7 +69,7 @@ def lay_out_scaling(folder: Path) -> None:
 
 
 def lay_out_loop(folder: Path) -> None:
-    """Lay out a closed loop that moves for half a second."""
+    """Write a closed loop with a motion of half a second."""
     copy_lab("loop", folder)
     table = read_sto(folder / "walk.mot")
     rows = (table.times > 4.749) & (table.times < 5.251)
@@ -139,16 +142,16 @@ RANGES = {
     "CMC": "reversed:both before:both last:ours empty:both",
     "forward": "wider:same reversed:both before:both NaN:both last:ours empty:both",
 }
-"""For each tool its ranges and what becomes of them.
+"""Time ranges of each tool, and how both programs treat them.
 
-``same``: both run, with the same numbers. ``both``: both refuse. ``ours``: OpenSim writes what nobody
-wants, a table without rows or with the row nearest to the range, and only osimlite refuses.
+``same``: both run, with the same numbers. ``both``: both reject the range. ``ours``: OpenSim writes
+a useless table, without rows or with the row nearest to the range, and only osimlite rejects it.
 """
 CASES = [(tool, *case.split(":")) for tool, cases in RANGES.items() for case in cases.split()]
 
 
 def change_times(tool: Tool, folder: Path, case: str) -> None:
-    """Write the times of a case into the setup of a tool."""
+    """Write the time range of a case into the setup of a tool."""
     first, last = tool.times
     times = {
         "wider": ("-5", "500"),
@@ -188,7 +191,7 @@ def test_a_time_range(
         with pytest.raises(osimlite.OsimliteError) as refused:
             osimlite.run(ours / tool.setup)
         if fate == "ours":
-            # Nothing says that OpenSim refuses what it runs.
+            # No message may say that OpenSim rejects what it runs.
             errors = [item.message for item in validate(str(ours / tool.setup)).errors]
             for message in [*errors, refused.value.message]:
                 assert not re.search("OpenSim (fails|rejects|crashes)", message)
@@ -211,5 +214,5 @@ def test_a_time_range(
     mine, known = read_sto(ours / tool.table), read_sto(theirs / tool.table)
     assert mine.columns == known.columns
     assert mine.times == pytest.approx(known.times, abs=1e-8)
-    # OpenSim's fits of markers end at an accuracy, ours at the minimum.
+    # OpenSim stops fitting markers at its accuracy, osimlite at the minimum.
     assert np.abs(mine.rows - known.rows).max() < (0.2 if name == "IK" else 1e-4)

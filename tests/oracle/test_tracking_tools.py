@@ -1,4 +1,4 @@
-"""RRATool and CMCTool here and by OpenSim, live, on the start of a measured walk."""
+"""Compare RRATool and CMCTool with a live OpenSim on the beginning of a measured walk."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SETUP = """<OpenSimDocument Version="40600">
 
 @pytest.fixture
 def walk(shared: Path, tmp_path: Path) -> Path:
-    """A folder with the model of a subject, its walk, and what is tracked."""
+    """Return a folder with the model of a subject, its walk, loads and reserve actuators."""
     source = shared / "oracle" / "tools" / "reference"
     model = gzip.decompress((source / "models" / "gait10_subject01.osim.gz").read_bytes())
     (tmp_path / "model.osim").write_bytes(model)
@@ -62,7 +62,17 @@ def walk(shared: Path, tmp_path: Path) -> Path:
 def tracked(
     folder: Path, tool: str, more: str, limits: str = ""
 ) -> tuple[dict[str, StoTable], dict[str, StoTable]]:
-    """The tables of both."""
+    """Run a tracking tool with both programs.
+
+    Args:
+        folder: folder of `walk`.
+        tool: class of the tool.
+        more: further properties of the setup.
+        limits: further properties of each task.
+
+    Returns:
+        The tables of osimlite and those of OpenSim, by name.
+    """
     weights = {"pelvis_tilt": 700, "pelvis_tx": 500}
     tasks = (
         TASK.format(name=name, weight=weights.get(name, 250), more=limits) for name in COORDINATES
@@ -89,7 +99,7 @@ def tracked(
 
 
 def apart(mine: StoTable, known: StoTable) -> float:
-    """The largest difference of two tables, as part of the largest number of its column."""
+    """Return the largest difference of two tables, relative to the largest number of its column."""
     assert mine.times == pytest.approx(known.times, abs=1e-9)
     largest = np.abs(known.rows).max(axis=0)
     return float(
@@ -98,7 +108,7 @@ def apart(mine: StoTable, known: StoTable) -> float:
 
 
 def test_residual_reduction(walk: Path) -> None:
-    """All digits: the least squares of each window have one answer."""
+    """The tables agree in nearly all digits, because the least squares of each window have one solution."""
     more = """<final_time>0.64</final_time><replace_force_set>true</replace_force_set>
         <adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>
         <initial_time_for_com_adjustment>0.6</initial_time_for_com_adjustment>
@@ -107,7 +117,8 @@ def test_residual_reduction(walk: Path) -> None:
     limits = "<limit>0.0002</limit>"
     ours, theirs = tracked(walk, "RRATool", more.format("adjusted"), limits)
     for name, table in theirs.items():
-        # Errors of 1e-5 are differences of angles.
+        # Position errors of 1e-5 are differences of nearly equal coordinates and have fewer exact
+        # digits.
         assert apart(ours[name], table) < (1e-5 if name == "it_pErr.sto" else 1e-7), name
     words = [(walk / folder / "it_avgResiduals.txt").read_text() for folder in ("ours", "theirs")]
     assert words[0] == words[1]
@@ -120,7 +131,8 @@ def test_residual_reduction(walk: Path) -> None:
         )
         for model in (changed, known)
     ]
-    # Muscles are still there; OpenSim's run of the same name wrote the same model before.
+    # The adjusted model still has its muscles. OpenSim's run wrote a model of the same name
+    # earlier.
     assert (
         0.0 < np.abs(moved[0] - moved[1]).max() <= 0.1
         and len([*changed.components(osimlite.Force)]) > 10
@@ -146,12 +158,12 @@ def test_the_model_is_that_of_opensim(walk: Path) -> None:
 
 @pytest.mark.parametrize("fast", [True, False])
 def test_computed_muscle_control(walk: Path, fast: bool) -> None:
-    """As near as OpenSim's optimizer comes to its minimum: the same steps, and hardly other excitations."""
+    """Results agree as far as OpenSim's optimizer converges: same windows, and similar excitations."""
     more = f"""<final_time>{choose(0.645, 0.65)}</final_time><cmc_time_window>0.005</cmc_time_window>
         <optimization_convergence_tolerance>1e-5</optimization_convergence_tolerance>
         <use_fast_optimization_target>{str(fast).lower()}</use_fast_optimization_target>"""
     ours, theirs = tracked(walk, "CMCTool", more)
-    # Steps depend on the last digits of forces; windows end at the same times.
+    # The steps depend on the last digits of forces, but the time windows end at the same times.
     ends = 0.63 + 0.005 * np.arange(3)
     motions, controls = (
         [

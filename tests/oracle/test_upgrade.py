@@ -1,4 +1,4 @@
-"""OpenSim 4.6 makes the same of each small old document."""
+"""Compare osimlite's upgrade of small old documents with OpenSim 4.6's."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ REFUSED = {
     "set_levels": "could not find '../ground'",
     "transform_axes": "unsupported file format",
 }
-"""Documents that OpenSim cannot read or connect, and how it says so."""
+"""Documents that OpenSim cannot read or connect, with its message."""
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The names of states and the motions of coordinates, beside OpenSim's."""
+"""Compare the names of states and the motion types of coordinates with OpenSim's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OpenSim 4.6 reads what we write."""
+"""Check that OpenSim 4.6 reads a model that osimlite has written."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.oracle
 
 
 def printed_whole(source: Path, target: Path) -> bytes:
-    """OpenSim's own print of a file with every default written out."""
+    """Return OpenSim's print of a file with every default value written out."""
     opensim.Logger.setLevelString("error")
     model = opensim.Model(str(source))
     model.finalizeConnections()

@@ -1,8 +1,8 @@
-"""OpenSim 4.6 itself walks with the walkers that are shipped.
+"""Simulate the shipped walkers in OpenSim 4.6 and compare their walks with osimlite's.
 
-Foot strikes are counted from OpenSim's own contact forces: a step is the other foot touching down
-at least 5 cm ahead along the slope after at least 0.05 s in the air, any other touch-down is a
-scuff, and a hip or a knee on the slope ends the walk.
+Foot strikes are counted from OpenSim's own contact forces. A step is a touch-down of the other
+foot, at least 5 cm ahead along the slope and after at least 0.05 s in the air. Any other touch-down
+is a scuff. The walk ends when a hip or a knee touches the slope.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from tests.suite import choose
 pytestmark = [pytest.mark.oracle, pytest.mark.timeout(900)]
 
 MINUTE = 60.0 if "OSIMLITE_ALL_MODELS" in os.environ else choose(4.0, 12.0)
-"""How long they walk; OpenSim takes half a minute for a whole one, which is asked with OSIMLITE_ALL_MODELS=1."""
+"""Duration of a walk (s); OSIMLITE_ALL_MODELS=1 walks a minute, which takes OpenSim half a minute."""
 LONG = {"steady-walker": MINUTE, "human-walker": MINUTE, "furthest-walker": 5.0}
 ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}
-"""The human walker's knees stop so hard that OpenSim takes long at a finer one."""
+"""Accuracy of the integrators; at a finer one OpenSim is slow for the human walker's stiff knee stops."""
 
 
 @pytest.fixture(scope="module")
 def walks(fixtures):
-    """By name, OpenSim's walk and ours, from the same file."""
+    """Return OpenSim's walk and osimlite's from the same file, by the name of the walker."""
     requests = {
         name: WalkRequest(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy)
         for name, accuracy in ACCURACY.items()
@@ -62,7 +62,7 @@ def test_the_exercise_makes_four_steps(walks):
 
 @pytest.mark.parametrize("name", list(LONG))
 def test_ours_is_the_same_walk(walks, name):
-    """Steps at the same times, to what OpenSim's integrator goes on between the moments that it reports."""
+    """Steps have the same times, except for the time between the moments that OpenSim reports."""
     theirs, ours = walks[name]
     assert (theirs.ending, theirs.fell_on, len(theirs.scuffs)) == (
         ours.ending,
@@ -76,6 +76,6 @@ def test_ours_is_the_same_walk(walks, name):
         assert result == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), (
             field
         )
-    # In the middle of a step, where they end, the error of the integration is not yet in its strikes.
+    # The walk ends in the middle of a step, whose integration error is not yet part of its strikes.
     allowed = max(1e-5, 30.0 * ACCURACY[name])
     assert theirs.distance == pytest.approx(ours.distance, rel=5e-6, abs=allowed)
