@@ -135,7 +135,7 @@ def __getattr__(name: str) -> Any:
 
         module = MODULES.get(name, "")
     if not module:
-        near = ""
+        suggestion = ""
         if not name.startswith("_"):
             from importlib.util import find_spec
 
@@ -144,8 +144,8 @@ def __getattr__(name: str) -> Any:
             from osimlite.base.text import suggest_name
             from osimlite.schema.registry import MODULES
 
-            near = suggest_name(name, [*FUNCTIONS, *MODULES])
-        raise AttributeError(f"module 'osimlite' has no attribute '{name}'{near}")
+            suggestion = suggest_name(name, [*FUNCTIONS, *MODULES])
+        raise AttributeError(f"module 'osimlite' has no attribute '{name}'{suggestion}")
     return getattr(import_module(module), inner or name)
 
 

@@ -190,10 +190,10 @@ def doctor(
     _print_mesh_folders(model)
     say()
     say("shell completion: osimlite --install-completion")
-    broken = [package for package in result.values() if package.trouble]
-    for package in broken:
+    broken_packages = [package for package in result.values() if package.trouble]
+    for package in broken_packages:
         say(f"{package.name} {package.version} cannot be loaded: {package.trouble}")
-    if broken:
+    if broken_packages:
         raise SystemExit(1)
 
 

@@ -19,17 +19,17 @@ from osimlite.derivatives.symbols import (
     RecordedVector,
     casadi,
     combine_condition,
+    current_branch,
     is_symbol,
     merge_values,
     raise_interrupt,
     simplify_number,
-    where,
 )
 
 MAX_BRANCH_COMBINATIONS = 64
 """Maximum number of combinations of branches through one function."""
 
-Writes = dict[tuple[int, int], tuple[list[Any], int, Any]]
+BranchWrites = dict[tuple[int, int], tuple[list[Any], int, Any]]
 """Written cells by (identity of the list, index): the list, the index and the value."""
 
 
@@ -85,7 +85,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
     while True:
         run.frame = None
         run.failures = []
-        where.condition = None
+        current_branch.condition = None
         RecordedVector.journals.clear()
         try:
             return function()
@@ -100,16 +100,16 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
             run.widened.add(wider.part)
         finally:
             RecordedVector.journals.clear()
-            run.frame, where.condition = None, None
+            run.frame, current_branch.condition = None, None
 
 
-def _undo_writes() -> Writes:
+def _undo_writes() -> BranchWrites:
     """Undo the writes since the last journal began.
 
     Returns:
         The undone writes, which `_apply_writes` can repeat.
     """
-    undone: Writes = {}
+    undone: BranchWrites = {}
     for key, (cells, index, old_value) in RecordedVector.journals.pop().items():
         # Both sides of a branch must begin with the same vectors; the merge needs what this side wrote.
         undone[key] = cells, index, cells[index]
@@ -117,13 +117,15 @@ def _undo_writes() -> Writes:
     return undone
 
 
-def _apply_writes(writes: Writes) -> None:
+def _apply_writes(writes: BranchWrites) -> None:
     """Write values into their cells."""
     for cells, index, value in writes.values():
         RecordedVector(cells)[index] = value
 
 
-def _merge_writes(test: Any, true_writes: Writes, false_writes: Writes, code_part: Any) -> Writes:
+def _merge_writes(
+    test: Any, true_writes: BranchWrites, false_writes: BranchWrites, code_part: Any
+) -> BranchWrites:
     """Return the writes of two sides, merged by a test.
 
     Args:
@@ -132,7 +134,7 @@ def _merge_writes(test: Any, true_writes: Writes, false_writes: Writes, code_par
         false_writes: writes of the other side.
         code_part: part of the code, for messages and identity.
     """
-    result: Writes = {}
+    result: BranchWrites = {}
     for key in true_writes | false_writes:
         cells, index, _ = true_writes.get(key) or false_writes[key]
         # A cell that one side did not write keeps its value on that side.
@@ -170,17 +172,17 @@ class AssigningBranch:
         if not is_symbol(self.test):
             yield bool(self.test)
             return
-        outer_condition = where.condition
-        writes_by_side: list[Writes] = []
+        outer_condition = current_branch.condition
+        writes_by_side: list[BranchWrites] = []
         for is_true_side in (True, False):
-            where.condition = outer_condition
-            where.condition = combine_condition(
+            current_branch.condition = outer_condition
+            current_branch.condition = combine_condition(
                 self.test if is_true_side else casadi.logic_not(self.test)
             )
             RecordedVector.journals.append({})
             yield is_true_side
             writes_by_side.append(_undo_writes())
-        where.condition = outer_condition
+        current_branch.condition = outer_condition
         _apply_writes(_merge_writes(self.test, writes_by_side[0], writes_by_side[1], self.part))
 
     @property
@@ -223,7 +225,7 @@ def decide(code_part: str, test: Any) -> bool:
         frame.sides.append(True)
         frame.tests.append(test)
     is_true_side = frame.sides[number]
-    where.condition = combine_condition(test if is_true_side else casadi.logic_not(test))
+    current_branch.condition = combine_condition(test if is_true_side else casadi.logic_not(test))
     return is_true_side
 
 
@@ -263,7 +265,7 @@ def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: A
     """
     raise_interrupt()
     outer_frame = run.frame
-    condition = where.condition
+    condition = current_branch.condition
     # The caller runs the combinations of a widened part, as if its branches were the caller's own.
     if code_part in run.widened and outer_frame is not None:
         return function(*arguments)
@@ -279,10 +281,10 @@ def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: A
                 {key: writes[key] for key in writes if key not in RecordedVector.journals[-1]}
             )
         run.frame = outer_frame
-        where.condition = condition
+        current_branch.condition = condition
         return result
 
-    def run_others(fixed_count: int, result: Any) -> tuple[Any, Writes]:
+    def run_others(fixed_count: int, result: Any) -> tuple[Any, BranchWrites]:
         """Merge a run with those of the combinations that agree in the first branches.
 
         Args:
@@ -309,7 +311,7 @@ def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: A
                 raise NoFormula(
                     f"{code_part} has more than {MAX_BRANCH_COMBINATIONS} combinations of branches"
                 )
-            where.condition = condition
+            current_branch.condition = condition
             RecordedVector.journals.append({})
             other_result, other_writes = run_others(k + 1, function(*arguments))
             result = merge_values(tests[k], result, other_result, code_part)
@@ -318,7 +320,7 @@ def run_all_branches(code_part: str, function: Callable[..., Any], *arguments: A
 
     result, merged_writes = run_others(0, result)
     run.frame = outer_frame
-    where.condition = condition
+    current_branch.condition = condition
     _apply_writes(merged_writes)
     return result
 

@@ -183,7 +183,7 @@ class _ActiveCondition:
     condition: Any = None
 
 
-where = _ActiveCondition()
+current_branch = _ActiveCondition()
 """The only active condition."""
 
 
@@ -200,12 +200,12 @@ def simplify_number(value: Any) -> Any:
 @contextmanager
 def restrict_condition(test: Any) -> Iterator[None]:
     """Restrict the active condition by a test within a block."""
-    outer_condition = where.condition
-    where.condition = combine_condition(test)
+    outer_condition = current_branch.condition
+    current_branch.condition = combine_condition(test)
     try:
         yield
     finally:
-        where.condition = outer_condition
+        current_branch.condition = outer_condition
 
 
 def combine_condition(test: Any) -> Any:
@@ -214,7 +214,11 @@ def combine_condition(test: Any) -> Any:
     Args:
         test: the test, a symbol.
     """
-    return test if where.condition is None else casadi.logic_and(where.condition, test)
+    return (
+        test
+        if current_branch.condition is None
+        else casadi.logic_and(current_branch.condition, test)
+    )
 
 
 def guard_value(value: Any, instead: float = 1.0) -> Any:
@@ -224,7 +228,11 @@ def guard_value(value: Any, instead: float = 1.0) -> Any:
         value: symbol.
         instead: number for which the next operation is defined.
     """
-    return value if where.condition is None else casadi.if_else(where.condition, value, instead)
+    return (
+        value
+        if current_branch.condition is None
+        else casadi.if_else(current_branch.condition, value, instead)
+    )
 
 
 def merge_values(test: Any, a: Any, b: Any, code_part: Any) -> Any:
@@ -349,7 +357,7 @@ def _evaluate_logical(tests: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
         The combined test.
     """
     combined: Any = None
-    outer_condition = where.condition
+    outer_condition = current_branch.condition
     try:
         for compute_test in tests:
             value = simplify_number(compute_test())
@@ -362,9 +370,9 @@ def _evaluate_logical(tests: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
                 if combined is None
                 else (casadi.logic_or if stop else casadi.logic_and)(combined, value)
             )
-            where.condition = combine_condition(casadi.logic_not(value) if stop else value)
+            current_branch.condition = combine_condition(casadi.logic_not(value) if stop else value)
     finally:
-        where.condition = outer_condition
+        current_branch.condition = outer_condition
     return (not stop) if combined is None else combined
 
 

@@ -146,7 +146,7 @@ class WrappedPaths:
         if not wrapped_forces:
             return
         self._order = list(order)
-        self._still = np.zeros(len(mechanism.coordinates))
+        self._zero_speeds = np.zeros(len(mechanism.coordinates))
         self._default = np.array([info.default_value for info in mechanism.coordinates])
         self._system = PathSystem(
             mechanism.without_constraints(),
@@ -236,7 +236,7 @@ class WrappedPaths:
         """
         pose = self._default.copy()
         pose[self._order] = q
-        lengths = self._system.measure_paths(pose, self._still, PATH_WORK.LENGTH)
+        lengths = self._system.measure_paths(pose, self._zero_speeds, PATH_WORK.LENGTH)
         (arms,) = self._system.compute_pulls(pose[None])
         speeds = self._measure_speeds(pose)
         measures = zip(lengths, arms, speeds, self.symbolic_paths, strict=True)

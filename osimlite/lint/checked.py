@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from osimlite.schema.base import Object
 
 
-class Where(TypedDict, total=False):
+class LocationArguments(TypedDict, total=False):
     """Arguments that locate a finding; see :meth:`Subject.position`."""
 
     tag: str | None
@@ -71,7 +71,9 @@ class CheckTarget:
         """Return the absolute path of the component that an object belongs to."""
         return ""
 
-    def position(self, item: Object | None, **where: Unpack[Where]) -> Position | None:
+    def position(
+        self, item: Object | None, **location: Unpack[LocationArguments]
+    ) -> Position | None:
         """Return the position of something in the text."""
         return None
 

@@ -20,7 +20,7 @@ from osimlite.lint.faults import RuleFault, parse_faults
 
 if TYPE_CHECKING:
     from osimlite.io.document.source import Position
-    from osimlite.lint.checked import CheckTarget, Where
+    from osimlite.lint.checked import CheckTarget, LocationArguments
     from osimlite.schema.base import Object
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
@@ -74,7 +74,7 @@ class FindingCollector:
         suggestion: str | None = None,
         certain: bool = False,
         fix: Fix | None = None,
-        **where: Unpack[Where],
+        **location: Unpack[LocationArguments],
     ) -> None:
         """Add a finding at a position, which is given by `at` or as in :meth:`Subject.position`.
 
@@ -100,14 +100,14 @@ class FindingCollector:
             return
         # Severities in the settings do not change the consequence in OpenSim.
         severity = severity or rule.severity_in(subject.version)
-        if at is None and (item is not None or where.get("number") is not None):
-            at = subject.position(item, **where)
+        if at is None and (item is not None or location.get("number") is not None):
+            at = subject.position(item, **location)
         line, column, length = at if at is not None else (None, None, 1)
         # Fixes of rules on models are made by the rules, which know what to rename; the others
         # replace the text at the position.
         if rule.fixes and rule.about != "model" and suggestion is not None and at is not None:
-            named = where.get("word") or (
-                item and getattr(item, where.get("attribute") or where.get("tag") or "name")
+            named = location.get("word") or (
+                item and getattr(item, location.get("attribute") or location.get("tag") or "name")
             )
             fix = fix or subject.make_replacement(at, named, suggestion, certain=certain)
         elif subject.upgraded:

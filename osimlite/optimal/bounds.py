@@ -34,12 +34,12 @@ class Bounds:
     """Bounds of one variable, in the unit of the variable.
 
     Attributes:
-        within: bounds over the whole motion.
+        overall: bounds over the whole motion.
         first: bounds at the start.
         last: bounds at the end.
     """
 
-    within: Range
+    overall: Range
     first: Range
     last: Range
 
@@ -195,7 +195,7 @@ def find_state_bounds(
             and phase.bound_activation_from_excitation
         ):
             default = (
-                controls[path].within
+                controls[path].overall
                 if path in controls
                 else (component.min_control, component.max_control)
             )

@@ -52,7 +52,7 @@ class Hessian:
             np.unique(program._jacobian_columns[program._jacobian_rows == program._row_count + k])
             for _, k in self._mixed
         ]
-        self._far = integral_columns
+        self._integral_columns = integral_columns
         # Each pair is sorted, as an entry of the upper triangle has its row before its column.
         mixed_entries = [
             np.sort([np.full(len(column_indices), program.end_columns[i]), column_indices], axis=0)
@@ -113,7 +113,7 @@ class Hessian:
         if self._mixed:
             integrals = program._compute_slopes(w)[3]
             for (end_index, integral_index), integral_columns in zip(
-                self._mixed, self._far, strict=True
+                self._mixed, self._integral_columns, strict=True
             ):
                 # The product rule gives both (i, j) and (j, i); on the diagonal both are one entry.
                 factor_of_diagonal = np.where(

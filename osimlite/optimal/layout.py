@@ -100,7 +100,7 @@ class VariableLayout:
         size = self.shared
         end = len(grid.fractions) - 1
         limits = {
-            kind: np.array([[b.within, b.first, b.last] for b in group_bounds])
+            kind: np.array([[b.overall, b.first, b.last] for b in group_bounds])
             for kind, group_bounds in self.bounds.items()
         }
         for point in range(len(grid.fractions)):
@@ -167,7 +167,7 @@ class VariableLayout:
         ]
         for kind in VARIABLE_KINDS:
             for column, bounds in zip(self.indices[kind].T, self.bounds[kind], strict=True):
-                indexed_ranges.append((column[column >= 0], bounds.within))
+                indexed_ranges.append((column[column >= 0], bounds.overall))
         for indices, (lower, upper) in indexed_ranges:
             scale[indices], shift[indices] = compute_scaling(lower, upper)
         return scale, shift

@@ -75,12 +75,13 @@ def remove_component(model: Model, component: Component) -> None:
     """
     tree = model.tree()
     path = _get_path(model, component)
-    doomed = {id(item) for item in component.walk()}
+    removed_ids = {id(item) for item in component.walk()}
     users = sorted(
         {
             tree.path_of(use.owner) or use.owner.name
             for use in tree.uses()
-            if id(use.holder) not in doomed and _is_at_or_below(_find_target_path(tree, use), path)
+            if id(use.holder) not in removed_ids
+            and _is_at_or_below(_find_target_path(tree, use), path)
         }
     )
     if users:

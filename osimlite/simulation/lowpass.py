@@ -102,10 +102,10 @@ def _resample_evenly(times: Array, values: Array) -> tuple[Array, Array, float]:
     if span / (len(times) - 1) - step > np.finfo(float).eps:
         step = max(step, span / MAX_SAMPLES)
         # OpenSim adds the steps one by one; their rounding decides whether there is a last sample.
-        even = np.add.accumulate(np.r_[times[0], np.full(int(span / step) + 1, step)])
-        even = even[even <= times[-1]]
-        (values,) = derivatives_of_samples(times, values, even, (0,))
-        times = even
+        even_times = np.add.accumulate(np.r_[times[0], np.full(int(span / step) + 1, step)])
+        even_times = even_times[even_times <= times[-1]]
+        (values,) = derivatives_of_samples(times, values, even_times, (0,))
+        times = even_times
     return times, values, step
 
 

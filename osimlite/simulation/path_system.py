@@ -199,7 +199,7 @@ class PathSystem(System):
         rows = self.read_work_vector(
             poses,
             offsets,
-            cleared=[passage.length[1] for passage in passages if passage.length[1] >= 0],
+            zeroed_offsets=[passage.length[1] for passage in passages if passage.length[1] >= 0],
         )
         for passage in passages:
             lengths = self._compute_length_on(
@@ -277,7 +277,7 @@ class PathSystem(System):
         poses: Array,
         offsets: Sequence[int],
         paths: Sequence[int] | None = None,
-        cleared: Sequence[int] = (),
+        zeroed_offsets: Sequence[int] = (),
     ) -> Array:
         """Return entries of the work vector in many poses.
 
@@ -285,7 +285,7 @@ class PathSystem(System):
             poses: values of all coordinates (k, n).
             offsets: offsets in the work vector (m,).
             paths: index of the only path that is computed, for each pose; all paths if None.
-            cleared: offsets that are set to 0 before each pose.
+            zeroed_offsets: offsets that are set to 0 before each pose.
 
         Returns:
             Numbers (k, m); NaN in a pose in which the paths cannot be computed.
@@ -294,7 +294,9 @@ class PathSystem(System):
         result = np.empty((len(poses), len(offsets)))
         states[:, : len(self.order)] = poses[:, self.order]
         path_indices = np.full(len(poses), ALL_PATHS) if paths is None else paths
-        request = np.array([len(offsets), len(cleared), *offsets, *cleared], dtype=np.int64)
+        request = np.array(
+            [len(offsets), len(zeroed_offsets), *offsets, *zeroed_offsets], dtype=np.int64
+        )
         self._run_watch(states, request, np.array(path_indices, dtype=np.int64), result)
         return result
 

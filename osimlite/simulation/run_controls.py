@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.multibody.functions import (
     Arguments,
     ConstantValue,
-    Evaluated,
+    FunctionDerivatives,
     ScaledFunction,
     SmoothFunction,
     make_zero_derivatives,
@@ -42,7 +42,7 @@ class PythonFunction(SmoothFunction):
     function: Callable[[float], float]  # the function
     name: str  # name of the control, for messages
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value at a time, with zero derivatives."""
         x = float(arguments[0])
         value = float(self.function(x))

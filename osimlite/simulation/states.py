@@ -87,7 +87,7 @@ class StateLayout:
         # sorted() is stable: within both groups the order of the forces stays.
         self.variables = tuple(sorted(result, key=attrgetter("is_simbody")))
         self.size = 2 * len(self.order) + len(self.variables)
-        self._still = [info.default_value for info in mechanism.coordinates]
+        self._default_values = [info.default_value for info in mechanism.coordinates]
 
     # ------------------------------------------------------------------------------------------------ names
     @property
@@ -218,12 +218,12 @@ class StateLayout:
 
     def values(self, y: Sequence[float]) -> list[float]:
         """Return the values of all coordinates in the mechanism's order."""
-        return self.spread_to_all(y[: len(self.order)], self._still)
+        return self.spread_to_all(y[: len(self.order)], self._default_values)
 
     def speeds(self, y: Sequence[float]) -> list[float]:
         """Return the generalized speeds of all coordinates in the mechanism's order."""
         count = len(self.order)
-        return self.spread_to_all(y[count : 2 * count], [0.0] * len(self._still))
+        return self.spread_to_all(y[count : 2 * count], [0.0] * len(self._default_values))
 
     def auxiliary(self, y: Sequence[float]) -> Sequence[float]:
         """Return the auxiliary states, the last part of a state (y,)."""
@@ -240,10 +240,10 @@ class StateLayout:
         """
         rows = np.array(states, dtype=float).reshape(len(states), self.size)
         count = len(self.order)
-        values = np.empty((len(states), len(self._still)))
-        speeds = np.zeros((len(states), len(self._still)))
+        values = np.empty((len(states), len(self._default_values)))
+        speeds = np.zeros((len(states), len(self._default_values)))
         # Locked coordinates rest at their default values, and their speeds at 0.
-        values[:] = self._still
+        values[:] = self._default_values
         values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]
         return values, speeds
 

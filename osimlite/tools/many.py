@@ -303,7 +303,7 @@ class _Journal:
 
     def __init__(self, folder: Path, resume: bool, *, is_saved: bool) -> None:
         self.path = folder / JOURNAL
-        self.noted = dict[str, RunRecord]()
+        self.records = dict[str, RunRecord]()
         self._saved = time.monotonic()
         self._is_saved = is_saved
         lines: list[bytes] = []
@@ -312,11 +312,11 @@ class _Journal:
             lines = read_file(self.path).splitlines() if resume else []
         for line in lines:
             if (trial := read_record(line)) is not None:
-                self.noted[trial.setup] = trial
+                self.records[trial.setup] = trial
 
     def find_finished(self, setup: Path) -> RunRecord | None:
         """Return the record of a finished run; None if its inputs or results have changed."""
-        trial = self.noted.get(str(setup))
+        trial = self.records.get(str(setup))
         # A tool that ran and reported a failure (NO) would report it again.
         if trial is None or trial.status not in (DONE, NO) or trial.digest != compute_digest(setup):
             return None
@@ -328,7 +328,7 @@ class _Journal:
 
     def record_run(self, trial: RunRecord) -> None:
         """Add a record, and save the journal from time to time."""
-        self.noted[trial.setup] = trial
+        self.records[trial.setup] = trial
         if time.monotonic() - self._saved > SAVE_INTERVAL_S:
             # The runs continue if the journal cannot be written, for example in a read-only
             # folder.
@@ -338,9 +338,9 @@ class _Journal:
     def save(self) -> None:
         """Write the journal, unless it is empty."""
         self._saved = time.monotonic()
-        if self._is_saved and self.noted and self.path.parent.is_dir():
+        if self._is_saved and self.records and self.path.parent.is_dir():
             lines = (
-                json.dumps({**vars(trial), "was_done": False}) for trial in self.noted.values()
+                json.dumps({**vars(trial), "was_done": False}) for trial in self.records.values()
             )
             write_into(self.path.parent, self.path.name, "".join(f"{line}\n" for line in lines))
 
@@ -530,8 +530,10 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
             if setup not in ordered and ordered.issuperset(needs_by_setup[setup])
         ]
         if not ready:
-            stuck = next(setup for setup in setups if setup not in ordered)
-            needs_by_setup[stuck] = [need for need in needs_by_setup[stuck] if need in ordered]
-            ready = [stuck]
+            blocked_setup = next(setup for setup in setups if setup not in ordered)
+            needs_by_setup[blocked_setup] = [
+                need for need in needs_by_setup[blocked_setup] if need in ordered
+            ]
+            ready = [blocked_setup]
         ordered.update(ready)
     return needs_by_setup

@@ -25,14 +25,14 @@ def find_files(pattern: str) -> list[str]:
         OsimliteError: the search would read more than `MAX_ENTRIES` entries.
     """
     drive, path_pattern = os.path.splitdrive(pattern)
-    rooted = path_pattern.startswith(("/", os.sep))
+    is_absolute = path_pattern.startswith(("/", os.sep))
     name_patterns = [
         name_pattern
         for name_pattern in path_pattern.replace(os.sep, "/").split("/")
         if name_pattern
     ]
     search = _FileSearch(pattern)
-    paths = [drive + os.sep if rooted else drive]
+    paths = [drive + os.sep if is_absolute else drive]
     for name_pattern in name_patterns:
         paths = list(dict.fromkeys(search.match_part(paths, name_pattern)))
     return sorted(filter(os.path.isfile, paths))

@@ -77,7 +77,7 @@ def list_completions(
                 last_readable,
                 cursor,
                 field_type,
-                cursor.around[-2] if len(cursor.around) > 1 else None,
+                cursor.enclosing[-2] if len(cursor.enclosing) > 1 else None,
             )
         ]
     return []

@@ -42,7 +42,7 @@ class Cursor(NamedTuple):
 
     kind: TextType
     # enclosing elements, outermost first; without the element itself if the cursor is in its tag
-    around: tuple[Element, ...]
+    enclosing: tuple[Element, ...]
     # offset of the start of the word: a tag, an attribute value or a word of text
     start: int
     end: int  # offset after the word
@@ -53,7 +53,7 @@ class Cursor(NamedTuple):
     @property
     def inner(self) -> Element | None:
         """Innermost enclosing element."""
-        return self.around[-1] if self.around else None
+        return self.enclosing[-1] if self.enclosing else None
 
     @property
     def subject(self) -> Element | None:

@@ -39,7 +39,9 @@ def describe_cursor(analysis: DocumentAnalysis, offset: int) -> types.Hover | No
             paragraphs.insert(0, _find_path(analysis, element))
     elif element.spec is not None:
         enclosing = (
-            cursor.around[-2:] if cursor.kind in ("text", "closing tag") else cursor.around[-1:]
+            cursor.enclosing[-2:]
+            if cursor.kind in ("text", "closing tag")
+            else cursor.enclosing[-1:]
         )
         paragraphs.append(_describe_property(element.spec, enclosing[0].cls if enclosing else None))
     text = "\n\n".join(paragraph for paragraph in paragraphs if paragraph)

@@ -65,7 +65,9 @@ def find_name_reference(cursor: Cursor) -> Reference | None:
     # For some classes the property that holds them, or the set they are in, declares what their
     # name refers to.
     property_references = (
-        element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None
+        element.spec.names
+        for element in reversed(cursor.enclosing[-2:])
+        if element.spec is not None
     )
     declared = next(filter(None, property_references), None)
     class_references = (_NAMED_AFTER[name] for name in get_class_names(cls) if name in _NAMED_AFTER)

@@ -21,8 +21,8 @@ from osimlite.schema.model import Model
 from osimlite.schema.registry import cache_by_tags, find_class
 from osimlite.schema.specs import FieldSpec, get_defaults, get_field_specs
 
-Read = TypeVar("Read", bound=Object)
-Included = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
+ReadObject = TypeVar("ReadObject", bound=Object)
+IncludeResult = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
 """Function that reads the object of a class from a file.
 
 It returns the object, the include and notes, or the reason why the file is not read, such as
@@ -99,13 +99,13 @@ def _make_default_object(spec: FieldSpec, values: Mapping[str, Any]) -> Any:
 class _ExtraContent:
     """Content of an element beyond its properties; most elements have none."""
 
-    __slots__ = ("before", "late", "pending", "raw")
+    __slots__ = ("before", "deferred_notes", "pending", "raw")
 
     def __init__(self) -> None:
         self.pending: list[Remark] = []
         self.before: dict[str | None, list[Remark]] = {}
         self.raw: dict[str, tuple[Any, str]] = {}
-        self.late: list[_PendingNote] = []
+        self.deferred_notes: list[_PendingNote] = []
 
     def attach_pending(self, tag: str | None) -> None:
         """Attach the collected remarks to the position before the property `tag`."""
@@ -125,14 +125,14 @@ class ObjectReader:
         home: link to the model that the objects will belong to.
     """
 
-    def __init__(self, read_include: Included | None = None) -> None:
+    def __init__(self, read_include: IncludeResult | None = None) -> None:
         self.count = 0
         self.notes: list[Note] = []
         self.defaults: dict[type[Object], Object] = {}
         self.read_include = read_include
         self.home = Home()
 
-    def read_top(self, element: etree._Element, cls: type[Read]) -> Read:
+    def read_top(self, element: etree._Element, cls: type[ReadObject]) -> ReadObject:
         """Read the object of a document; only it may have a ``<defaults>`` block.
 
         Args:
@@ -162,10 +162,10 @@ class ObjectReader:
     def read_object(
         self,
         element: etree._Element,
-        cls: type[Read],
+        cls: type[ReadObject],
         name: str | None = None,
         skip: etree._Element | None = None,
-    ) -> Read:
+    ) -> ReadObject:
         """Read one element as an object.
 
         Args:
@@ -187,7 +187,9 @@ class ObjectReader:
             else:
                 extra = extra or _ExtraContent()
                 kind: NoteKind = "include" if key == "file" else "unknown-attribute"
-                extra.late.append((kind, number, decode_name(str(key)), None, str(attribute)))
+                extra.deferred_notes.append(
+                    (kind, number, decode_name(str(key)), None, str(attribute))
+                )
         if name:
             values["name"] = name
             present.add("name")
@@ -227,10 +229,12 @@ class ObjectReader:
             if extra is not None:
                 extra.attach_pending(spec.tag)
             if action != _TEXT:
-                values[field_name], late = self._read_object_field(child, cls, step, values)
-                if late:
+                values[field_name], deferred_notes = self._read_object_field(
+                    child, cls, step, values
+                )
+                if deferred_notes:
                     extra = extra or _ExtraContent()
-                    extra.late += late
+                    extra.deferred_notes += deferred_notes
                 continue
             # Most elements are values, so they are read here to save a call for each.
             number = self.count
@@ -263,7 +267,7 @@ class ObjectReader:
         # An unreadable text gives the default, a readable beginning that part.
         value = self._get_default(cls, spec.name) if is_absent else unclean.value
         extra.raw[spec.name] = (value, text)
-        extra.late.append(
+        extra.deferred_notes.append(
             (unclean.trouble, number, unclean.word, spec, None if is_absent else value)
         )
         return value
@@ -280,33 +284,33 @@ class ObjectReader:
         spec, number = step.spec, self.count
         if step.action == _ONE:
             return self._read_object_or_include(element, spec.accepts), []
-        members, late = self._read_members(element, spec)
+        members, deferred_notes = self._read_members(element, spec)
         if step.action == _LIST:
-            return members, late
+            return members, deferred_notes
         # OpenSim takes the first object of a property that holds one.
-        late += [
+        deferred_notes += [
             ("duplicate-tag", left_out._index, left_out.tag, spec, None) for left_out in members[1:]
         ]
         if isinstance(spec.kind, ObjectField) and spec.kind.form == "optional":
-            return (members[0] if members else None), late
+            return (members[0] if members else None), deferred_notes
         if not members:
             replace = getattr(cls, "replace_empty_function", None)
             if replace is None:
-                late.append(("empty", number, "", spec, None))
-            return (replace or _make_default_object)(spec, values), late
+                deferred_notes.append(("empty", number, "", spec, None))
+            return (replace or _make_default_object)(spec, values), deferred_notes
         # OpenSim gives the object the name of its property, also in the long form.
         members[0].__dict__["name"] = spec.tag
         members[0].model_fields_set.add("name")
-        return members[0], late
+        return members[0], deferred_notes
 
-    def _add_extra_content(self, built: Read, extra: _ExtraContent) -> Read:
+    def _add_extra_content(self, built: ReadObject, extra: _ExtraContent) -> ReadObject:
         """Add the content beyond properties to an object, and make the pending notes final."""
         extra.attach_pending(None)
         if extra.before:
             get_layout(built).before = extra.before
         if extra.raw:
             get_layout(built).raw = extra.raw
-        for kind, number, word, spec, value in extra.late:
+        for kind, number, word, spec, value in extra.deferred_notes:
             # Unknown attributes stay with the object, so that writing keeps them.
             if kind in ("include", "unknown-attribute"):
                 get_layout(built).attributes[word] = value
@@ -317,7 +321,7 @@ class ObjectReader:
         self, element: etree._Element, spec: FieldSpec, extra: _ExtraContent
     ) -> None:
         """Keep a repeated property as an unknown element at the end, where OpenSim ignores it again."""
-        extra.late.append(("duplicate-tag", self.count, spec.tag, spec, None))
+        extra.deferred_notes.append(("duplicate-tag", self.count, spec.tag, spec, None))
         extra.before.setdefault(None, []).append(Remark(format_element(element), True))
         self.count += count_elements(element)
 
@@ -363,7 +367,7 @@ class ObjectReader:
         """Read the objects inside ``<objects>`` or another wrapper; return them and notes."""
         self.count += 1
         members: list[Any] = []
-        late: list[_PendingNote] = []
+        deferred_notes: list[_PendingNote] = []
         pending: list[Remark] = []
         accepts = spec.accepts
         assert accepts is not None
@@ -383,7 +387,7 @@ class ObjectReader:
             elif is_element(child):
                 tag = decode_name(child.tag)
                 known_class = find_class(tag)
-                late.append(
+                deferred_notes.append(
                     (
                         "unknown-class" if known_class is None else "wrong-class",
                         self.count,
@@ -403,7 +407,7 @@ class ObjectReader:
             members.append(member)
         if pending and members:
             get_layout(members[-1]).after.extend(pending)
-        return ObjectList(members), late
+        return ObjectList(members), deferred_notes
 
     def _read_unknown_tag(
         self,
@@ -437,7 +441,7 @@ class ObjectReader:
                 extra.attach_pending(spec.tag)
                 values[spec.name] = self._read_object_or_include(child, accepted_class, spec.tag)
                 return
-            extra.late.append(
+            extra.deferred_notes.append(
                 (
                     "unknown-class" if tagged_class is None else "wrong-class",
                     self.count,
@@ -450,7 +454,7 @@ class ObjectReader:
             self._keep_duplicate(child, spec, extra)
             return
         else:
-            extra.late.append(("unknown-tag", self.count, tag, None, tagged_class))
+            extra.deferred_notes.append(("unknown-tag", self.count, tag, None, tagged_class))
         # Unread elements are kept as text, so that writing loses nothing.
         extra.pending.append(Remark(format_element(child), True))
         self.count += count_elements(child)
@@ -469,7 +473,7 @@ class ObjectReader:
         """Return the text of a value element that contains comments or, by mistake, elements."""
         child_elements = [node for node in element if is_element(node)]
         if child_elements:
-            extra.late.append(
+            extra.deferred_notes.append(
                 ("child-in-value", number, decode_name(child_elements[0].tag), spec, None)
             )
             self.count += sum(count_elements(node) for node in child_elements)
@@ -482,7 +486,7 @@ class ObjectReader:
             # Two pieces of text mean that a comment stands in the middle of a value.
             > 1
         ):
-            extra.late.append(("child-in-value", number, "!--", spec, None))
+            extra.deferred_notes.append(("child-in-value", number, "!--", spec, None))
         return "".join([element.text or "", *(node.tail or "" for node in element)])
 
     def _read_defaults(self, block: etree._Element) -> list[Object]:

@@ -26,7 +26,7 @@ from osimlite.errors import (
 from osimlite.io.document.names import decode_name
 from osimlite.io.document.notes import Note
 from osimlite.io.document.objects import (
-    Included,
+    IncludeResult,
     ObjectReader,
     add_comment,
     count_elements,
@@ -417,7 +417,7 @@ def _read_top(
 
 def _make_include_reader(
     source: Source, around: tuple[str, ...] = (), read: list[int] | None = None
-) -> Included | None:
+) -> IncludeResult | None:
     """Return a function that reads objects named by ``file`` attributes, from files relative to the text's.
 
     A text without a file includes nothing. As in OpenSim, a file that cannot be read, has another

@@ -92,7 +92,7 @@ def measure_model(
         isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
     )
     # The same paths along geodesics, which are the reference for OpenSim's wrapping.
-    around = paths.rewrap_paths(model, GEODESIC, code) if has_surfaces else None
+    geodesic_paths = paths.rewrap_paths(model, GEODESIC, code) if has_surfaces else None
     _check_loop_count(paths.mechanism)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
@@ -128,7 +128,9 @@ def measure_model(
             name: tuple(index for index, is_moving in flags_by_coordinate.items() if is_moving[k])
             for k, name in enumerate(paths.names)
         },
-        [*compare_wrappings(around, paths, start, sweeps)] if around is not None else [],
+        [*compare_wrappings(geodesic_paths, paths, start, sweeps)]
+        if geodesic_paths is not None
+        else [],
         [*find_jumps(paths, sweeps)],
         [*_find_bad_surface_lengths(paths, start, sweeps)],
         [*measure_moving_points(paths)],

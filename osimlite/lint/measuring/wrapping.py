@@ -45,10 +45,10 @@ def compare_wrappings(
     for geodesic_index, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
         route = paths.routes[name]
         excess = excesses[:, geodesic_index]
-        around = tuple(
+        surface_names = tuple(
             surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law
         )
-        if not around:
+        if not surface_names:
             continue
         moving_sweeps = [sweep for sweep in free_sweeps if sweep.is_moving[path]]
 
@@ -75,14 +75,14 @@ def compare_wrappings(
 
         # Try the poses from the largest excess downwards until one is not a rounding error.
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
-        certain = (
+        certain_poses = (
             k
             for k in order
             if _is_certain(geodesic, paths, geodesic_index, path, excess[k], describe_pose(k)[1])
         )
-        worst = next(certain, order[-1])
+        worst = next(certain_poses, order[-1])
         yield WrappingError(
-            name, around, float(excess[0]), float(excess[worst]), describe_pose(worst)[0]
+            name, surface_names, float(excess[0]), float(excess[worst]), describe_pose(worst)[0]
         )
 
 

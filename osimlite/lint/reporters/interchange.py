@@ -143,12 +143,12 @@ def render_sarif(report: Report) -> str:
     # The rules are imported here: reports without findings need none of them.
     from osimlite.lint.registry import all_rules
 
-    broken = [rule for rule in all_rules() if rule.code in report.codes]
-    rule_indices = {rule.code: index for index, rule in enumerate(broken)}
+    reported_rules = [rule for rule in all_rules() if rule.code in report.codes]
+    rule_indices = {rule.code: index for index, rule in enumerate(reported_rules)}
     driver = {
         "name": "osimlite",
         "version": __version__,
-        "rules": [_describe_rule(rule) for rule in broken],
+        "rules": [_describe_rule(rule) for rule in reported_rules],
     }
     run = {
         "tool": {"driver": driver},

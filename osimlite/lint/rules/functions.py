@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         SimmSpline,
     )
 
-    Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
+    TabulatedFunction = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 
 
 @rule("OSIM601", "unsorted-abscissae", severity=ERROR, consequences=(REFUSES, FAILS, RUNS))
@@ -486,10 +486,10 @@ def _describe_refusal(subject: Subject, function: Object) -> tuple[str, Conseque
     )
 
 
-def _find_tabulated(subject: Subject) -> Iterator[Tabulated]:
+def _find_tabulated(subject: Subject) -> Iterator[TabulatedFunction]:
     """Yield the functions given by points, without those that the reader has added."""
     for name in ("SimmSpline", "GCVSpline", "PiecewiseLinearFunction", "PiecewiseConstantFunction"):
         for function in subject.find_by_class(name):
             # Functions that the reader adds by default have no element in the text.
             if function._index is not None or subject.source is None:
-                yield cast("Tabulated", function)
+                yield cast("TabulatedFunction", function)

@@ -206,7 +206,7 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
                 force.lower_limit - start,
             ),
         ):
-            acts = excess > abs(force.transition)
+            acts_at_limit = excess > abs(force.transition)
             # A range of many turns stands for none, or is in degrees; so does a limit that is not
             # given.
             widest = math.degrees(subject.config.value_of(UNLIMITED))
@@ -228,12 +228,12 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
                     + ("; is it in radians?" if radians else "")
                     + (
                         f"; it acts in the default pose, {format_quantity(start, unit)}"
-                        if acts
+                        if acts_at_limit
                         else ""
                     ),
                     force,
                     tag=tag,
-                    severity=WARNING if acts or radians else None,
+                    severity=WARNING if acts_at_limit or radians else None,
                     suggestion=f"{in_degrees:.6g}" if radians else None,
                 )
 

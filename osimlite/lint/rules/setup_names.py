@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.checked import Where
+from osimlite.lint.checked import LocationArguments
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.words import describe_object, find_nearest_name
@@ -139,7 +139,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         )
         consequence, severity = _CONSEQUENCES["left out" if is_lost else kind.consequence]
         hint = "; write it in lower case" if text.lower() in kind.words else ""
-        position: Where = {"tag": use.spec.tag, "word": text}
+        position: LocationArguments = {"tag": use.spec.tag, "word": text}
         if use.spec.tag == "@name":
             position = {"attribute": "name"}
             # Names that other objects of this class use already are no likely spelling.

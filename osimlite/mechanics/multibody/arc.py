@@ -8,7 +8,12 @@ from collections.abc import Sequence
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constant_curvature import evaluate_arc
 from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
-from osimlite.mechanics.multibody.functions import Arguments, Evaluated, SmoothFunction, make_floats
+from osimlite.mechanics.multibody.functions import (
+    Arguments,
+    FunctionDerivatives,
+    SmoothFunction,
+    make_floats,
+)
 
 # 16 terms are exact in double precision for angles up to half a turn.
 _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n in range(16)]
@@ -41,7 +46,7 @@ class ArcPoint(SmoothFunction):
             *_SERIES,
         ]
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, the gradient (2,) and the Hessian (2, 2) at the two angles (rad)."""
         first_angle, second_angle = (
             float(angle + start) for angle, start in zip(arguments, self.neutral, strict=True)

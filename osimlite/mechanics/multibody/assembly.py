@@ -209,7 +209,9 @@ class _Search:
         self, mechanism: Mechanism, target: Array, time: float, fixed_values: Mapping[int, float]
     ) -> None:
         self.mechanism, self.target, self.time = mechanism, target, time
-        self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
+        self.coordinate_weights = np.array(
+            [0.0 if info.yielding else 1.0 for info in mechanism.coordinates]
+        )
         self.free = [index for index in range(len(target)) if index not in fixed_values]
         self.start = target.copy()
         self.start[list(fixed_values)] = list(fixed_values.values())
@@ -226,22 +228,24 @@ class _Search:
                 if (
                     isinstance(item, Coupler)
                     and item.dependent in self.free
-                    and not self.counted[item.dependent]
+                    and not self.coordinate_weights[item.dependent]
                 ):
                     self.start[item.dependent] = item.function.evaluate(
                         self.start[list(item.independent)]
                     )[0]
-        self.ease = np.where(self.assembled | (self.counted[self.free] > 0.0), 1.0, _EASE)
+        self.ease = np.where(
+            self.assembled | (self.coordinate_weights[self.free] > 0.0), 1.0, _EASE
+        )
 
     def compute_cost(self, q: Array) -> float:
         """Return half the sum of squared changes of the coordinates that count."""
-        return 0.5 * float(np.sum(self.counted * (q - self.target) ** 2))
+        return 0.5 * float(np.sum(self.coordinate_weights * (q - self.target) ** 2))
 
     def compute_step(self, q: Array) -> Array:
         """Return Newton's step (n,) along the surface, with the curvature of the constraints."""
         rows = self._compute_rows(self._compute_state(q))
-        gradient = (self.counted * (q - self.target))[self.free]
-        weights = self.counted[self.free]
+        gradient = (self.coordinate_weights * (q - self.target))[self.free]
+        weights = self.coordinate_weights[self.free]
         # Multipliers by least squares, so that redundant constraints do no harm.
         multipliers = np.asarray(
             np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64

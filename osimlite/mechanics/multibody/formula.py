@@ -89,13 +89,13 @@ class Formula:
     steps: tuple[FormulaStep, ...]  # each fills the next register; the last one gives the result
 
     @classmethod
-    def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:
+    def parse(cls, text: str, variables: Sequence[str], description: str) -> Formula:
         """Read a formula.
 
         Args:
             text: the formula.
             variables: names that it may use.
-            where: path and property of the formula, for messages.
+            description: path and property of the formula, for messages.
 
         Raises:
             UnknownVariableError: the formula needs an unknown variable.
@@ -115,7 +115,7 @@ class Formula:
             error_class = (
                 UnknownVariableError if isinstance(wrong, UnknownNameError) else ModelError
             )
-            raise error_class(f"{where} is '{text}': {wrong}") from None
+            raise error_class(f"{description} is '{text}': {wrong}") from None
         return cls(tuple(variables), steps)
 
     def derivative(self, variable: int) -> Formula:

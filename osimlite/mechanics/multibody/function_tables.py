@@ -12,62 +12,62 @@ from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.multibody import functions as f
 
 
-def function_table(function: f.SmoothFunction, where: str) -> list[float]:
+def function_table(function: f.SmoothFunction, description: str) -> list[float]:
     """Return the table of a function of coordinates.
 
     Args:
         function: the function.
-        where: description of the function, for messages.
+        description: description of the function, for messages.
 
     Raises:
         UnsupportedError: the kernels cannot evaluate it.
     """
-    return _has_table(f.table_at_knots(function), function, where)
+    return _has_table(f.table_at_knots(function), function, description)
 
 
-def _has_table(table: list[float], function: f.SmoothFunction, where: str) -> list[float]:
+def _has_table(table: list[float], function: f.SmoothFunction, description: str) -> list[float]:
     """Return a table, or raise UnsupportedError if it is empty.
 
     Args:
         table: table of the function.
         function: function.
-        where: description of the function, for messages.
+        description: description of the function, for messages.
     """
     if not table:
         name = type(function).__name__
         raise UnsupportedError(
-            f"{where} is a {name}, which osimlite cannot compute; use another function"
+            f"{description} is a {name}, which osimlite cannot compute; use another function"
         )
     return table
 
 
-def table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
+def table_of_one(function: f.SmoothFunction, description: str) -> list[float]:
     """Return the table of a function of one number, for `functions.evaluate_function`.
 
     Args:
         function: the function.
-        where: description of the function, for messages.
+        description: description of the function, for messages.
 
     Raises:
         ModelError: a number of the function is not finite.
         UnsupportedError: the kernels cannot evaluate it.
     """
-    table = _table_of_one(function, where)
+    table = _table_of_one(function, description)
     # The sum of finite numbers may overflow, hence the second test.
     if not isfinite(sum(table)) and not all(map(isfinite, table)):
-        raise ModelError(f"{where} has a number that is not finite; give one that is")
+        raise ModelError(f"{description} has a number that is not finite; give one that is")
     return table
 
 
-def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
+def _table_of_one(function: f.SmoothFunction, description: str) -> list[float]:
     """Return the table of a function of one number, whose numbers are not checked.
 
     Args:
         function: function.
-        where: description of the function, for messages.
+        description: description of the function, for messages.
     """
     if isinstance(function, f.ScaledFunction):
-        function_type, factor, *remainder = _table_of_one(function.function, where)
+        function_type, factor, *remainder = _table_of_one(function.function, description)
         return [function_type, function.scale * factor, *remainder]
     if isinstance(function, f.WeightedSum):
         # Functions of several numbers are written as polynomials of one.
@@ -81,4 +81,4 @@ def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
             FUNCTION_TYPE.PIECES_OF_OPENSIM if function.opensim_derivatives else function_type,
             *remainder,
         ]
-    return _has_table([*function.table], function, where)
+    return _has_table([*function.table], function, description)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 else:
     # The linter evaluates without arrays.
     Arguments = Sequence
-Evaluated = tuple[float, list[float], list[list[float]]]
+FunctionDerivatives = tuple[float, list[float], list[list[float]]]
 """Value, gradient (k,) and Hessian (k, k) of a function of k numbers."""
 
 
@@ -36,7 +36,7 @@ class SmoothFunction(ABC):
     """Twice differentiable function of one or several numbers."""
 
     @abstractmethod
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, the gradient (k,) and the Hessian (k, k) at `arguments` (k,)."""
 
     @property
@@ -61,7 +61,7 @@ class Univariate(SmoothFunction):
     def table(self) -> Sequence[float]:
         """Numbers by which the kernels evaluate the function."""
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, the first and the second derivative at the one argument."""
         value, first, second = self.derivatives(float(arguments[0]))
         return value, [first], [[second]]
@@ -92,7 +92,7 @@ class Multivariate(SmoothFunction):
     def table(self) -> Sequence[float]:
         """Numbers by which the kernels evaluate the function."""
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, the gradient (k,) and the Hessian (k, k).
 
         The kernel gives second derivatives by time for rates of the arguments; each entry of the
@@ -133,7 +133,7 @@ def make_floats(numbers: Arguments | bytes) -> Any:
     return memoryview(array("d", numbers))
 
 
-def make_zero_derivatives(size: int, value: float = 0.0) -> Evaluated:
+def make_zero_derivatives(size: int, value: float = 0.0) -> FunctionDerivatives:
     """Return the value and zero derivatives of a function of `size` constant arguments.
 
     Args:
@@ -156,7 +156,7 @@ class ConstantValue(SmoothFunction):
 
     value: float
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, and zeros for the derivatives."""
         return make_zero_derivatives(len(arguments), self.value)
 
@@ -302,7 +302,7 @@ class MultivariatePolynomial(Multivariate):
         powers = (float(power) for exponents in self.powers for power in exponents)
         return [function_type, 1.0, float(len(self.powers)), *self.coefficients, *powers]
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, the gradient (k,) and the Hessian (k, k)."""
         value, gradient, hessian = super().evaluate(arguments)
         return (
@@ -321,7 +321,7 @@ class ScaledFunction(SmoothFunction):
     scale: float
     function: SmoothFunction
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return `scale` times value, gradient and Hessian of the function."""
         value, gradient, hessian = self.function.evaluate(arguments)
         scale = self.scale

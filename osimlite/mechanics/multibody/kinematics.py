@@ -75,7 +75,7 @@ class MechanismKinematics:
         return self.mechanism.program
 
     @cached_property
-    def _unmoved(self) -> Vectors:
+    def _initial_vectors(self) -> Vectors:
         data, y, f = self.program.state(self.q, self.u)
         data[WORK.TIME] = self.time
         return data, y, f
@@ -83,7 +83,7 @@ class MechanismKinematics:
     @cached_property
     def vectors(self) -> Vectors:
         """Work vector, state and rates after the links have been moved; NaN where that fails."""
-        model, reals, (data, y, f) = self.program.model, self.program.reals, self._unmoved
+        model, reals, (data, y, f) = self.program.model, self.program.reals, self._initial_vectors
         with check_finite(data):
             place_links(model, reals, data, y, f)
             move_links(model, reals, data, y, f)
@@ -116,7 +116,7 @@ class MechanismKinematics:
             # Raises an error where the rates of its coordinates are not defined.
             ball.rate_matrix(self.q[list(ball.coordinates)])
         # Constraints on coordinates only do not need the links.
-        data, y, f = self.vectors if balls or program.on_bodies else self._unmoved
+        data, y, f = self.vectors if balls or program.on_bodies else self._initial_vectors
         if program.constraints:
             with check_finite(data):
                 evaluate_constraints(program.model, program.reals, data, y, f)

@@ -340,12 +340,12 @@ class Mechanism(MechanismStructure):
         """
         # Without gravity and accelerations, the forces that are missing are the velocity-dependent
         # ones.
-        return dynamics.missing_forces(self.at(q, u), self._still, np.zeros(3))
+        return dynamics.missing_forces(self.at(q, u), self._zeros, np.zeros(3))
 
     def gravity_forces(self, q: Values) -> Array:
         """Return the generalized forces of gravity (n,)."""
         # At rest the forces that are missing balance gravity.
-        return -dynamics.missing_forces(self.at(q), self._still, self.gravity)
+        return -dynamics.missing_forces(self.at(q), self._zeros, self.gravity)
 
     def generalized_forces(self, q: Values, body_wrenches: Mapping[str, Wrench]) -> Array:
         """Return the generalized forces (n,) of wrenches on bodies or frames.

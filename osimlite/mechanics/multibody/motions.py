@@ -23,7 +23,7 @@ from osimlite.mechanics.multibody.functions import (
     IDENTITY,
     Arguments,
     ConstantValue,
-    Evaluated,
+    FunctionDerivatives,
     SmoothFunction,
     make_zero_derivatives,
 )
@@ -189,7 +189,7 @@ class AccelerationErrorAngle(SmoothFunction):
     argument_indices: tuple[int, ...]  # indices of its arguments among the coordinates of the joint
     component: int  # component of the error, 0, 1 or 2
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return zero and zero derivatives; the acceleration does not follow from derivatives."""
         return make_zero_derivatives(len(arguments))
 
@@ -276,7 +276,7 @@ class EllipsoidPoint(SmoothFunction):
     component: int  # 0, 1 or 2
     radius: float  # half axis along this component, m
 
-    def evaluate(self, arguments: Arguments) -> Evaluated:
+    def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
         """Return the value, the gradient (3,) and the Hessian (3, 3) at the three angles."""
         # The point is r times the outgoing Z axis, (sin b, -sin a cos b, cos a cos b).
         a = float(arguments[0])

@@ -71,13 +71,15 @@ class MechanismStructure:
                 f"the joints of '{self.name}' do not share out its coordinates one by one"
             )
         # Locked and prescribed coordinates are constraints like any others.
-        holds: list[ConstraintEquations] = []
+        coordinate_constraints: list[ConstraintEquations] = []
         for index, info in enumerate(self.coordinates):
             if info.locked:
-                holds.append(Lock(index, info.path))
+                coordinate_constraints.append(Lock(index, info.path))
             elif info.prescribed is not None:
-                holds.append(PrescribedCoordinate(index, info.prescribed, info.path))
-        object.__setattr__(self, "constraints", (*holds, *self.constraints))
+                coordinate_constraints.append(
+                    PrescribedCoordinate(index, info.prescribed, info.path)
+                )
+        object.__setattr__(self, "constraints", (*coordinate_constraints, *self.constraints))
 
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -159,7 +161,7 @@ class MechanismStructure:
         return tuple(info.default_speed for info in self.coordinates)
 
     @cached_property
-    def _still(self) -> Array:
+    def _zeros(self) -> Array:
         return np.zeros(len(self.coordinates))
 
     @cached_property

@@ -355,8 +355,10 @@ class _Columns:
             return f"exactly three columns must begin with it, and '{file}' has {result}"
         # Labels without their last letter are the possible identifiers.
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
-        near = find_nearest(identifier, starts) or find_nearest(identifier, labels)
-        hint = f"; did you mean '{near}'?" if near else f"; its columns are {join_words(labels)}"
+        nearest = find_nearest(identifier, starts) or find_nearest(identifier, labels)
+        hint = (
+            f"; did you mean '{nearest}'?" if nearest else f"; its columns are {join_words(labels)}"
+        )
         return f"no column of '{file}' begins with it{hint}"
 
 

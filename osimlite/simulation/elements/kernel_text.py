@@ -212,7 +212,7 @@ class KernelText:
         for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
             table_offsets[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
         count = len(first.curves)
-        asks = [
+        requests = [
             f"request_value(reals, lanes, asked + {k}, {table_offsets[curve]}, {record_texts[name]})"
             for k, (curve, name) in enumerate(first.curves.items())
         ]
@@ -223,7 +223,7 @@ class KernelText:
                     *force_type.geometry.setup_code,
                     *self._write_record(inputs),
                     begin,
-                    *asks,
+                    *requests,
                     f"asked += {count}",
                 ]
             ),

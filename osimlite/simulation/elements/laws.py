@@ -64,11 +64,11 @@ def list_library_laws(directions: int = 0) -> list[str]:
     if not directions:
         return names
     # Kernels of responses compute derivatives themselves; equilibrium is not differentiated.
-    without = EQUILIBRIUM, RESPONSE, BATCHED
+    undifferentiated_forms = EQUILIBRIUM, RESPONSE, BATCHED
     return [
         f"{name}{ALONG}{directions}"
         for name in names
-        if name not in WITHOUT_DERIVATIVES and not name.endswith(without)
+        if name not in WITHOUT_DERIVATIVES and not name.endswith(undifferentiated_forms)
     ]
 
 

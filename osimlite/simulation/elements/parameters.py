@@ -85,13 +85,13 @@ class Parameter(ABC):
         return {}
 
     @abstractmethod
-    def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, value: Any, tail: Tail, owner: str) -> tuple[Sequence[int], Sequence[float]]:
         """Return the integers and numbers of a value; data of variable length goes into the tail.
 
         Args:
             value: result of `read`.
             tail: receives data of variable length.
-            where: the force, for messages.
+            owner: the force, for messages.
 
         Returns:
             Integers and numbers of fixed position.
@@ -129,7 +129,7 @@ class Number(Parameter):
         """Return the expression that reads the number from the record."""
         return [f"p[{number}]"]
 
-    def pack(self, value: float, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, value: float, tail: Tail, owner: str) -> tuple[Sequence[int], Sequence[float]]:
         """Return no integer and the number itself.
 
         Returns:
@@ -147,7 +147,7 @@ class NumbersParameter(Parameter):
     """Parameter whose value is a sequence of numbers of fixed position."""
 
     def pack(
-        self, value: Sequence[float], tail: Tail, where: str
+        self, value: Sequence[float], tail: Tail, owner: str
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return no integers and the values.
 
@@ -279,14 +279,14 @@ class Curve(Parameter):
         return [f"at(p, i[{head}])"]
 
     def pack(
-        self, value: SmoothFunction, tail: Tail, where: str
+        self, value: SmoothFunction, tail: Tail, owner: str
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the offset of the table, which goes into the tail.
 
         Returns:
             Integers and numbers of fixed position.
         """
-        return (tail.append_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
+        return (tail.append_numbers(table_of_one(value, f"the {self.name} of {owner}")),), ()
 
 
 @dataclass(frozen=True)
@@ -322,14 +322,14 @@ class ParameterGroup(Parameter):
         """
         return {self.type.__name__: self.type}
 
-    def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, value: Any, tail: Tail, owner: str) -> tuple[Sequence[int], Sequence[float]]:
         """Return the integers and numbers of all its parameters, one after another.
 
         Returns:
             Integers and numbers of fixed position.
         """
         packed = [
-            term.pack(item, tail, where) for term, item in zip(self.terms, value, strict=True)
+            term.pack(item, tail, owner) for term, item in zip(self.terms, value, strict=True)
         ]
         return [integer for ints, _ in packed for integer in ints], [
             x for _, numbers in packed for x in numbers
@@ -353,7 +353,7 @@ class Expression(Parameter):
         """Return the pointers to steps, constants and registers."""
         return [f"at(i, i[{head}])", f"at(p, i[{head + 1}])", f"at(record, i[{head + 2}])"]
 
-    def pack(self, value: Formula, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, value: Formula, tail: Tail, owner: str) -> tuple[Sequence[int], Sequence[float]]:
         """Return the offsets of the steps (after their count), the constants and the registers.
 
         Returns:
@@ -396,7 +396,7 @@ class Expressions(Parameter):
         return [f"at(i, i[{head}])", "p", f"at(record, i[{head + 1}])"]
 
     def pack(
-        self, value: Sequence[Formula], tail: Tail, where: str
+        self, value: Sequence[Formula], tail: Tail, owner: str
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the offsets of the steps and of the registers.
 
@@ -428,7 +428,7 @@ class Control(Parameter):
         """Return one expression for each control, which reads it from the work vector."""
         return [f"data[model[MODEL.WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
 
-    def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, value: Any, tail: Tail, owner: str) -> tuple[Sequence[int], Sequence[float]]:
         """Return the index and no numbers.
 
         Returns:
@@ -461,7 +461,7 @@ class ReflexControl(Control):
         return {"add_reflex": add_reflex}
 
     def pack(
-        self, value: tuple[int, float], tail: Tail, where: str
+        self, value: tuple[int, float], tail: Tail, owner: str
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the index and the gain.
 

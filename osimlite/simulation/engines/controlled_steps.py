@@ -272,17 +272,23 @@ class ControlledSteps(Stepper):
         size = len(self._engine.order)
         # The derivative may not exist after this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])
-        off = [
+        relative_errors = [
             # As in the kernels, errors of values count absolutely, and those of other states
             # relative to their size.
             abs(e) * (error_weight(y) if k >= size else 1.0)
             for k, (e, y) in enumerate(zip(errors, y0, strict=True))
         ]
-        index = max(range(len(off)), key=lambda k: off[k] if isfinite(off[k]) else inf)
-        if not isfinite(off[index]):
+        index = max(
+            range(len(relative_errors)),
+            key=lambda k: relative_errors[k] if isfinite(relative_errors[k]) else inf,
+        )
+        if not isfinite(relative_errors[index]):
             fault = f"leaves the range of numbers in {self._get_state_name(index)}"
-        elif off[index] > self._accuracy:
-            fault = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._get_state_name(index)}"
+        elif relative_errors[index] > self._accuracy:
+            fault = (
+                f"misses the accuracy {relative_errors[index] / self._accuracy:.3g} times, "
+                f"most of all in {self._get_state_name(index)}"
+            )
         elif self._engine.structure[MODEL.CONSTRAINED]:
             fault = "ends too far from the constraints"
         else:

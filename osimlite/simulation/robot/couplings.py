@@ -240,7 +240,7 @@ class Composition(f.SmoothFunction):
     outer: f.SmoothFunction
     inner: f.SmoothFunction
 
-    def evaluate(self, arguments: f.Arguments) -> f.Evaluated:
+    def evaluate(self, arguments: f.Arguments) -> f.FunctionDerivatives:
         """Return value, gradient and Hessian, by the chain rule.
 
         Args:

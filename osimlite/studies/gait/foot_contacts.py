@@ -23,11 +23,11 @@ class FootContacts:
 
     Attributes:
         feet: contacts of each foot, by the names of the engine.
-        falls: contacts that end the walk.
+        fall_contacts: contacts that end the walk.
     """
 
     feet: tuple[tuple[str, ...], ...]
-    falls: tuple[str, ...]
+    fall_contacts: tuple[str, ...]
 
     @property
     def foot_of(self) -> dict[str, int]:
@@ -99,8 +99,10 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             )
     else:
         named_feet = _find_feet(engine.mechanism, soles)
-    falls = tuple(name for name in sole_contacts if not any(name in foot for foot in named_feet))
-    return FootContacts(named_feet, falls)
+    fall_contacts = tuple(
+        name for name in sole_contacts if not any(name in foot for foot in named_feet)
+    )
+    return FootContacts(named_feet, fall_contacts)
 
 
 def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tuple[str, ...], ...]:

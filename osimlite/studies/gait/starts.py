@@ -223,5 +223,7 @@ def _compute_contact_centres(
 
 def _list_contacts(engine: BatchEngine, foot_contacts: FootContacts) -> Ints:
     """Return the indices in the engine of the contacts of feet, and of those that mean a fall."""
-    names = [name for foot in foot_contacts.feet for name in foot] + list(foot_contacts.falls)
+    names = [name for foot in foot_contacts.feet for name in foot] + list(
+        foot_contacts.fall_contacts
+    )
     return np.array([engine.contacts.index(name) for name in names])

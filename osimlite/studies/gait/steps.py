@@ -107,7 +107,10 @@ class WalkerSteps:
 
 def make_fall_watches(footing: FootContacts) -> list[Watch]:
     """Return watches that stop a run at a fall."""
-    return [Watch(f"{FALL_PREFIX}{contact}", contact=contact, stops=1) for contact in footing.falls]
+    return [
+        Watch(f"{FALL_PREFIX}{contact}", contact=contact, stops=1)
+        for contact in footing.fall_contacts
+    ]
 
 
 def estimate_event_count(to: float) -> int:
@@ -194,7 +197,9 @@ def extract_walks(
     moments = np.concatenate([starts, *runs.event_states])
     rows = np.concatenate([row_of, np.repeat(row_of, counts)]).astype(np.int64)
     positions, depths = measure_along_slope(engine, moments, vectors, rows)
-    fatal = np.array([engine.contacts.index(contact) for contact in footing.falls], dtype=np.int64)
+    fatal = np.array(
+        [engine.contacts.index(contact) for contact in footing.fall_contacts], dtype=np.int64
+    )
     # Events of all runs follow the initial states in one array, so that one call locates all
     # contacts.
     event_ends = np.cumsum([len(starts), *counts])
@@ -203,7 +208,7 @@ def extract_walks(
         events_of_run = slice(event_ends[k], event_ends[k + 1])
         # A contact that begins before the start raises no event.
         if (depths[k, fatal] > 0.0).any():
-            contact = footing.falls[int(np.argmax(depths[k, fatal]))]
+            contact = footing.fall_contacts[int(np.argmax(depths[k, fatal]))]
             result.append(WalkerSteps(0.0, "fell", contact))
             continue
         walk = follow_events(
@@ -253,7 +258,7 @@ def follow_events(
     lift_times = [0.0] * len(feet)
     last_foot, first_position = -1, None
     for (time, name, begins), state, contact_positions in zip(events, states, reached, strict=True):
-        if name.startswith(FALL_PREFIX) or (begins and name in footing.falls):
+        if name.startswith(FALL_PREFIX) or (begins and name in footing.fall_contacts):
             walk.end = time
             walk.ending = "fell"
             walk.fell_on = name.removeprefix(FALL_PREFIX)

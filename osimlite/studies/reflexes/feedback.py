@@ -143,16 +143,16 @@ class Feedback:
         self, model: Model, engine: Any
     ) -> tuple[SensedModel, Reflexes, Parameters]:
         """Read the controller for a model; return the sensors, the reflexes and the parameters."""
-        sensed = SensedModel(model, engine, 1, self.step, self._legs)
+        sensed_model = SensedModel(model, engine, 1, self.step, self._legs)
         parameters = Parameters(self._values)
-        reflexes = Reflexes(self._node, self._class_name, sensed, parameters)
+        reflexes = Reflexes(self._node, self._class_name, sensed_model, parameters)
         for name in self._values:
             # The file of `init` may have more parameters than the controller uses.
             if name not in parameters.requested and name not in self._initial:
                 raise SettingError(
                     f"the controller has no parameter '{name}'{suggest_or_list(name, parameters.requested)}"
                 )
-        return sensed, reflexes, parameters
+        return sensed_model, reflexes, parameters
 
     def compile_for(self, model: Model, engine: Any) -> KernelController:
         """Return the controller as the kernels take it.
@@ -165,25 +165,25 @@ class Feedback:
             OsimliteError: the model lacks something that a reflex names, or a value belongs to no
                 parameter.
         """
-        sensed, reflexes, parameters = self._read_controller(model, engine)
+        sensed_model, reflexes, parameters = self._read_controller(model, engine)
         plan, numbers = reflexes.pack()
         # Controls without reflexes are left to other sources, unless there is base noise, which acts
         # on all controls. Proportional noise of a control that is 0 is 0.
-        all_controls = np.arange(len(sensed.names))
+        all_controls = np.arange(len(sensed_model.names))
         is_noisy = numbers[0, LIMITS.CONTROL_NOISE] > 0.0
         targets = [term.ints[TERM.TARGET] for term in reflexes.terms]
         unused_controls = np.setdiff1d(all_controls, all_controls if is_noisy else targets)
         # With bounds of 0 the kernels add nothing to a control.
-        first_bound = SENSOR_NUMBERS.HEAD + 2 * len(sensed.muscles)
-        sensor_numbers = sensed.sensor_numbers.copy()
+        first_bound = SENSOR_NUMBERS.HEAD + 2 * len(sensed_model.muscles)
+        sensor_numbers = sensed_model.sensor_numbers.copy()
         sensor_numbers[first_bound + unused_controls] = sensor_numbers[
-            first_bound + len(sensed.names) + unused_controls
+            first_bound + len(sensed_model.names) + unused_controls
         ] = 0.0
         return KernelController(
-            tuple(sensed.paths),
+            tuple(sensed_model.paths),
             self.step,
             tuple(source.name for source in reflexes.sources),
-            sensed.sensor_plan,
+            sensed_model.sensor_plan,
             sensor_numbers,
             plan,
             numbers,

@@ -81,19 +81,19 @@ class ReflexType(NamedTuple):
     refused: tuple[str, ...] = ()
 
 
-def _list_muscles(sensed: SensedModel) -> list[str]:
+def _list_muscles(sensed_model: SensedModel) -> list[str]:
     """Return the names of the muscles, in the order of their indices."""
-    return sensed.names[: len(sensed.muscles)]
+    return sensed_model.names[: len(sensed_model.muscles)]
 
 
-def _list_coordinates(sensed: SensedModel) -> list[str]:
+def _list_coordinates(sensed_model: SensedModel) -> list[str]:
     """Return the names of the coordinates, in the order of their indices."""
-    return sensed.coordinates
+    return sensed_model.coordinates
 
 
-def _list_bodies(sensed: SensedModel) -> list[str]:
+def _list_bodies(sensed_model: SensedModel) -> list[str]:
     """Return the names of the bodies, in the order of their indices."""
-    return [body.name for body in sensed.mechanism.bodies]
+    return [body.name for body in sensed_model.mechanism.bodies]
 
 
 def _select_muscle_factory(quantity: str, offset_index: int) -> SourceFactory:
@@ -104,24 +104,29 @@ def _select_muscle_factory(quantity: str, offset_index: int) -> SourceFactory:
         offset_index: index in `SENSES` of the offset of this quantity in the sensor row.
     """
 
-    def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+    def make_source(sensed_model: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
-            f"{sensed.paths[number].removeprefix('/')}.{quantity}",
+            f"{sensed_model.paths[number].removeprefix('/')}.{quantity}",
             SOURCE_TYPE.IN_ROW,
-            int(sensed.sensor_plan[offset_index]) + number,
+            int(sensed_model.sensor_plan[offset_index]) + number,
         )
 
     return make_source
 
 
-def _make_spindle_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+def _make_spindle_source(
+    sensed_model: SensedModel, node: SettingNode, number: int, side: str
+) -> Source:
     """Return the sensor of the firing rate of a muscle's spindles, from fiber length and velocity."""
     length, speed = (
-        int(sensed.sensor_plan[offset_index]) + number
+        int(sensed_model.sensor_plan[offset_index]) + number
         for offset_index in (SENSES.LENGTHS, SENSES.VELOCITIES)
     )
     return Source(
-        f"{sensed.paths[number].removeprefix('/')}.spindle", SOURCE_TYPE.SPINDLE, length, speed
+        f"{sensed_model.paths[number].removeprefix('/')}.spindle",
+        SOURCE_TYPE.SPINDLE,
+        length,
+        speed,
     )
 
 
@@ -133,11 +138,11 @@ def select_coordinate_factory(quantity: str, offset_index: int) -> SourceFactory
         offset_index: index in `SENSES` of the offset of this quantity in the sensor row.
     """
 
-    def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+    def make_source(sensed_model: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
-            f"{sensed.coordinates[number]}.{quantity}",
+            f"{sensed_model.coordinates[number]}.{quantity}",
             SOURCE_TYPE.IN_ROW,
-            int(sensed.sensor_plan[offset_index]) + number,
+            int(sensed_model.sensor_plan[offset_index]) + number,
         )
 
     return make_source
@@ -149,17 +154,17 @@ SPEED_SOURCE = select_coordinate_factory("speed", SENSES.SPEEDS)
 """Factory of sensors of the speed of a coordinate (rad/s or m/s)."""
 
 
-def make_load_source(sensed: SensedModel, leg: int) -> Source:
+def make_load_source(sensed_model: SensedModel, leg: int) -> Source:
     """Return the sensor of the ground reaction force on a leg over the body weight.
 
     Args:
-        sensed: model with its legs.
+        sensed_model: model with its legs.
         leg: index of the leg.
     """
     return Source(
-        f"leg{sensed.legs[leg].side}.load",
+        f"leg{sensed_model.legs[leg].side}.load",
         SOURCE_TYPE.IN_ROW,
-        int(sensed.sensor_plan[SENSES.LOADS]) + leg,
+        int(sensed_model.sensor_plan[SENSES.LOADS]) + leg,
     )
 
 
@@ -176,17 +181,17 @@ def _select_point_factory(quantity: str, source_type: int) -> SourceFactory:
         source_type: kind of sensor, `SOURCE_TYPE.POSITION` or `SOURCE_TYPE.VELOCITY`.
     """
 
-    def make_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+    def make_source(sensed_model: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         """Return the sensor of the position or velocity of a point along a direction."""
         offset = node.vector("offset", "0 0 0")
         direction = node.vector("direction")
         if not direction.any():
             raise node.error("'direction' is 0 0 0, along which nothing is sensed")
         # The offset is in the frame of the body, the kernels know its link only.
-        link, frame = sensed.engine.placements[number]
+        link, frame = sensed_model.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
         return Source(
-            f"{_list_bodies(sensed)[number]}.{quantity}{_format_vectors(offset, direction)}",
+            f"{_list_bodies(sensed_model)[number]}.{quantity}{_format_vectors(offset, direction)}",
             source_type,
             link,
             0,
@@ -196,7 +201,7 @@ def _select_point_factory(quantity: str, source_type: int) -> SourceFactory:
     return make_source
 
 
-def _read_axis(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Array:
+def _read_axis(sensed_model: SensedModel, node: SettingNode, number: int, side: str) -> Array:
     """Return the unit vector (3,) of a reflex on the rotation of a body.
 
     On the left side x and y change sign, so that one setting serves both sides: a mirror image in
@@ -208,7 +213,9 @@ def _read_axis(sensed: SensedModel, node: SettingNode, number: int, side: str) -
     if not axis.any():
         raise node.error("'axis' has no direction")
     # A body with a side counts as of this side, else the side of the reflex decides.
-    body_side = next((end for end in SIDES if _list_bodies(sensed)[number].endswith(end)), side)
+    body_side = next(
+        (end for end in SIDES if _list_bodies(sensed_model)[number].endswith(end)), side
+    )
     return (
         axis
         / np.linalg.norm(axis)
@@ -216,25 +223,33 @@ def _read_axis(sensed: SensedModel, node: SettingNode, number: int, side: str) -
     )
 
 
-def _make_angle_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
+def _make_angle_source(
+    sensed_model: SensedModel, node: SettingNode, number: int, side: str
+) -> Source:
     """Return the sensor of the rotation of a body about one of the axes x, y and z of ground."""
-    axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
+    axis, (link, frame) = (
+        _read_axis(sensed_model, node, number, side),
+        sensed_model.engine.placements[number],
+    )
     # A rotation about a general axis has no angle that is a function of the orientation alone.
     if np.count_nonzero(axis) != 1:
         raise node.error(
             "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"
         )
-    name = f"{_list_bodies(sensed)[number]}.angle{_format_vectors(axis)}"
+    name = f"{_list_bodies(sensed_model)[number]}.angle{_format_vectors(axis)}"
     return Source(name, SOURCE_TYPE.ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))
 
 
 def _make_angular_velocity_source(
-    sensed: SensedModel, node: SettingNode, number: int, side: str
+    sensed_model: SensedModel, node: SettingNode, number: int, side: str
 ) -> Source:
     """Return the sensor of the angular velocity of a body about an axis."""
-    axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
+    axis, (link, frame) = (
+        _read_axis(sensed_model, node, number, side),
+        sensed_model.engine.placements[number],
+    )
     return Source(
-        f"{_list_bodies(sensed)[number]}.turn{_format_vectors(axis)}",
+        f"{_list_bodies(sensed_model)[number]}.turn{_format_vectors(axis)}",
         SOURCE_TYPE.TURN,
         link,
         0,

@@ -111,10 +111,12 @@ def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int)
     paths = Paths(model)
     if not paths.names:
         raise ModelError(f"'{model.name}' has no muscles or other paths to compare")
-    loaded = _MujocoModel(mujoco, mj_model, paths)
+    mujoco_model = _MujocoModel(mujoco, mj_model, paths)
     # MuJoCo knows names, not paths.
     owners = {name.rpartition("/")[2]: name for name in paths.names}
-    tendons = {name: index for name in owners if (index := loaded.find_tendon(name)) is not None}
+    tendons = {
+        name: index for name in owners if (index := mujoco_model.find_tendon(name)) is not None
+    }
     if not tendons:
         raise ModelError(
             f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners))}'",
@@ -122,7 +124,7 @@ def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int)
         )
     sampled_poses, samples_by_path = draw_poses(paths, poses, seed)
     lengths, moment_arms, body_positions = zip(
-        *(loaded.measure_tendons(q) for q in sampled_poses.q), strict=True
+        *(mujoco_model.measure_tendons(q) for q in sampled_poses.q), strict=True
     )
     result = []
     for name, tendon in tendons.items():
@@ -131,10 +133,10 @@ def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int)
         arm_errors = measure_arm_errors(
             paths.mechanism, np.array(moment_arms)[:, tendon], path_samples
         )
-        by_coordinate = {loaded.names[index]: error for index, error in arm_errors.items()}
+        by_coordinate = {mujoco_model.names[index]: error for index, error in arm_errors.items()}
         muscle = model.tree().by_path[owners[name]]
         strength_errors = (
-            loaded.measure_strength(name, muscle, path_samples.lengths)
+            mujoco_model.measure_strength(name, muscle, path_samples.lengths)
             if isinstance(muscle, Muscle)
             else {}
         )
@@ -144,8 +146,12 @@ def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int)
     return Check(
         tuple(result),
         tuple(name for name in owners if name not in tendons),
-        tuple(loaded.names[index] for index in loaded.free if index not in loaded.joints),
-        _compare_bodies(loaded, sampled_poses.origins, body_positions),
+        tuple(
+            mujoco_model.names[index]
+            for index in mujoco_model.free
+            if index not in mujoco_model.joints
+        ),
+        _compare_bodies(mujoco_model, sampled_poses.origins, body_positions),
     )
 
 
@@ -285,18 +291,18 @@ class _MujocoModel:
 
 
 def _compare_bodies(
-    loaded: _MujocoModel, origins: Array, positions: Sequence[Array]
+    mujoco_model: _MujocoModel, origins: Array, positions: Sequence[Array]
 ) -> Error | None:
     """Return the error of body positions after the best rigid motion in each pose.
 
     The rotation is computed by Kabsch's algorithm.
     """
     # Fewer than three points do not determine a rigid motion.
-    if len(loaded.bodies) < 3:
+    if len(mujoco_model.bodies) < 3:
         return None
     distances = []
     for pose, result in enumerate(positions):
-        expected = origins[list(loaded.bodies), pose]
+        expected = origins[list(mujoco_model.bodies), pose]
         measured_offsets, expected_offsets = result - result.mean(0), expected - expected.mean(0)
         left_vectors, _, right_vectors = np.linalg.svd(measured_offsets.T @ expected_offsets)
         # The sign avoids a reflection.

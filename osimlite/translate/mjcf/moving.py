@@ -93,24 +93,24 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
 
     # The inner quartic is scaled to [-1, 1], so that its bends are its only free numbers.
     # The inner quartic must reach -1 and 1, so that the outer one uses its complete range.
-    def make_inner(bends: Array) -> Array:
-        bent = np.array((0.0, 1.0, *bends))
-        reached = monomials @ bent
+    def make_inner(variables: Array) -> Array:
+        coefficients = np.array((0.0, 1.0, *variables))
+        reached = monomials @ coefficients
         middle = 0.5 * (reached.max() + reached.min())
         half = 0.5 * (reached.max() - reached.min())
-        bent[0] -= middle
-        return bent / half
+        coefficients[0] -= middle
+        return coefficients / half
 
-    def fit_outer(bends: Array) -> tuple[Array, Array]:
+    def fit_outer(variables: Array) -> tuple[Array, Array]:
         # For given bends the outer quartics follow by linear least squares (variable projection).
-        basis = np.polynomial.chebyshev.chebvander(monomials @ make_inner(bends), DEGREE)
+        basis = np.polynomial.chebyshev.chebvander(monomials @ make_inner(variables), DEGREE)
         result: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         return result, (basis @ result - values).ravel()
 
     search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
     # 1e3 lets the search end at a sensible relative change.
     best = min(
-        (search(lambda bends: 1e3 * fit_outer(bends)[1], start) for start in INITIAL_BENDS),
+        (search(lambda variables: 1e3 * fit_outer(variables)[1], start) for start in INITIAL_BENDS),
         key=lambda search_result: search_result.cost,
     )
     return make_inner(best.x), fit_outer(best.x)[0]

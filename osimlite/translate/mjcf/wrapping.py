@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 """Turn (rad) below which a tendon does not turn at all, instead of by a complete revolution."""
 
 
-class Bends(NamedTuple):
+class TendonCourse(NamedTuple):
     """Course of a tendon around each of S surfaces in P poses, in each of C ways.
 
     Attributes:
@@ -60,7 +60,7 @@ def bend_tendon(
     side_sites: Array | None,
     owners: NDArray[np.intp],
     version: int,
-) -> Bends:
+) -> TendonCourse:
     """Bend a tendon around surfaces.
 
     Args:
@@ -129,7 +129,7 @@ def bend_tendon(
             np.einsum("spij,cspi->cspj", plane_axes, passage) for passage in (at_p, at_q)
         )
     touch_mask = touches[..., None]
-    return Bends(
+    return TendonCourse(
         touches,
         np.where(touch_mask, first_points, second),
         np.where(touch_mask, second_points, first),

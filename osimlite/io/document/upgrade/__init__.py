@@ -149,7 +149,7 @@ class UpgradeResult:
             Index of the property by the index of its owner and its present tag.
         """
         result: dict[tuple[int, str], int] = {}
-        for element in self._draft.touched:
+        for element in self._draft.changed_elements:
             parent = element.getparent()
             if parent is not None:
                 key = (self._draft.numbers[parent], decode_name(element.tag))
@@ -188,4 +188,4 @@ def rename_old_classes(root: Element) -> UpgradeResult | None:
     draft = Draft(root, CURRENT_VERSION)
     draft.step = _load_step(*STEP_TABLE[0])
     rename_classes(draft)
-    return UpgradeResult(draft) if draft.touched else None
+    return UpgradeResult(draft) if draft.changed_elements else None

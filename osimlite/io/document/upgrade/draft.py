@@ -108,7 +108,7 @@ class Draft:
     Attributes:
         root: root element.
         version: format version of the old document.
-        touched: elements that steps created, renamed or moved, in this order.
+        changed_elements: elements that steps created, renamed or moved, in this order.
         step: step that is running.
         refusals: elements over which OpenSim's upgrade fails.
     """
@@ -116,7 +116,7 @@ class Draft:
     def __init__(self, root: Element, version: int) -> None:
         self.root = root
         self.version = version
-        self.touched: dict[Element, None] = {}
+        self.changed_elements: dict[Element, None] = {}
         self.step: UpgradeStep | None = None
         self.refusals: list[Refusal] = []
         self._changes: list[tuple[UpgradeStep, Element, Element, str | None]] = []
@@ -246,7 +246,7 @@ class Draft:
             new.set("name", name)
         self.numbers[new] = self.numbers[source]
         self._register_tag(tag)
-        self.touched[new] = None
+        self.changed_elements[new] = None
         return new
 
     def rename(self, element: Element, tag: str) -> None:
@@ -258,7 +258,7 @@ class Draft:
         """
         element.tag = tag
         self._register_tag(tag)
-        self.touched[element] = None
+        self.changed_elements[element] = None
 
     def move(self, element: Element, parent: Element) -> None:
         """Move an element to the end of `parent`.
@@ -270,7 +270,7 @@ class Draft:
         # The text behind an element is layout, and would move with it.
         element.tail = None
         parent.append(element)
-        self.touched[element] = None
+        self.changed_elements[element] = None
 
     def remove(self, element: Element) -> None:
         """Remove an element from its parent."""

@@ -59,13 +59,13 @@ def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, tens
     # The law reads the direction before; now the record becomes the report.
     apply_force(model, data, g[1], vector(work, 6), back)
     store_vector(work, 0, pull)
-    # OpenSim reports these points in the frames that the force names, and acts at others: see `Ends`.
+    # OpenSim reports these points in the frames that the force names, and acts at others: see `EndPoints`.
     store_vector(work, 3, station(model, data, g[0], vector(gp, 6)))
     store_vector(work, 6, back)
     store_vector(work, 9, station(model, data, g[1], vector(gp, 9)))
 
 
-class Ends(NamedTuple):
+class EndPoints(NamedTuple):
     """Ends of a line.
 
     OpenSim uses the points as stations of the base bodies, even where a force names other frames;
@@ -105,7 +105,7 @@ class BetweenPoints(ForceGeometry):
     apply_code = ("pull_ends(model, data, g, gp, work, tension)",)
     called_functions = (measure_line, pull_ends)
 
-    def read(self, builder: ElementBuilder, force: Any) -> Ends:
+    def read(self, builder: ElementBuilder, force: Any) -> EndPoints:
         """Return the ends of a force's line."""
         builder.check_finite(force, (*force.point1, *force.point2))
         words = [getattr(force, field) for field in self.fields]
@@ -123,9 +123,9 @@ class BetweenPoints(ForceGeometry):
             to_triple(frame[:3, :3] @ point + frame[:3, 3])
             for frame, point in zip((first, second), points, strict=True)
         )
-        return Ends((names[0], names[1]), (one, two), points, (first_point, second_point))
+        return EndPoints((names[0], names[1]), (one, two), points, (first_point, second_point))
 
-    def pack(self, location: Ends, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(self, location: EndPoints, link_map: LinkMap) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the ends, and points and reported points in them.
 
         Returns:
@@ -138,7 +138,7 @@ class BetweenPoints(ForceGeometry):
         ]
         return [link for link, _ in stations[:2]], [x for _, point in stations for x in point]
 
-    def record_size(self, location: Ends) -> int:
+    def record_size(self, location: EndPoints) -> int:
         """Return the size of force and point of both ends."""
         return 12
 

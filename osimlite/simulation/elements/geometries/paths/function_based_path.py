@@ -195,18 +195,18 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
     )
 
 
-def _read_function(function: Any, arguments: int, where: str) -> SmoothFunction | Formula:
+def _read_function(function: Any, arguments: int, description: str) -> SmoothFunction | Formula:
     inner = function
     while isinstance(inner, MultiplierFunction):
         inner = inner.function
     if isinstance(inner, Constant):
         raise ModelError(
-            f"{where} is a Constant, which has no arguments in OpenSim; use a LinearFunction"
+            f"{description} is a Constant, which has no arguments in OpenSim; use a LinearFunction"
         )
     if isinstance(function, ExpressionBasedFunction):
         if len(function.variables) != arguments:
             raise ModelError(
-                f"{where} has {len(function.variables)} variables and gets {arguments}; name as many"
+                f"{description} has {len(function.variables)} variables and gets {arguments}; name as many"
             )
-        return Formula.parse(function.expression, function.variables, where)
-    return convert_function(function, arguments, where)
+        return Formula.parse(function.expression, function.variables, description)
+    return convert_function(function, arguments, description)

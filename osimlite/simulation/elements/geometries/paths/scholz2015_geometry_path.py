@@ -358,14 +358,14 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
                 f"the contact_hint of the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is in the "
                 "middle of the surface, so that no point of it is nearest; move it off the middle"
             )
-        near = _find_nearest_point(surface, hint)
+        nearest_point = _find_nearest_point(surface, hint)
         for end in (GEODESIC.START, GEODESIC.END):
             begin[
                 OBSTACLE_WORK.CURVE + end + END_NUMBERS.POINT : OBSTACLE_WORK.CURVE
                 + end
                 + END_NUMBERS.POINT
                 + 3
-            ] = near
+            ] = nearest_point
     begin[OBSTACLE_WORK.CURVE + GEODESIC.STEP] = FIRST_STEP
     return CableObstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
 
