@@ -1,4 +1,7 @@
-"""Every class of forces, joints and constraints as functions of CasADi: values and derivatives are the kernels' own."""
+"""Tests of all classes of forces, joints and constraints as CasADi functions.
+
+Values, Jacobians and Hessians are compared with those of the kernels on numbers that carry derivatives (`jets.py`).
+"""
 
 from __future__ import annotations
 
@@ -51,11 +54,14 @@ REFUSED = {
     "ellipsoids on each other and a sphere": "contact points of ellipsoids are found by a search",
 }
 SEARCHED = {"path around surfaces": 1e-8}
-"""Their derivatives are differences."""
+"""Cases whose Jacobian has a larger tolerance, because derivatives of their paths are finite differences."""
 GEODESICS = "path over obstacles"
-"""The search for these takes Python half a minute."""
+"""Case that is left out where kernels run as Python: the search for its geodesics would take half a minute."""
 LEFT = {"ElasticFoundationForce", "ExternalForce"}
-"""The former is refused (meshes), the latter is no more than functions of time, as a PrescribedForce."""
+"""Classes without a case of their own.
+
+Meshes (ElasticFoundationForce) are refused; an ExternalForce only adds functions of time, as a PrescribedForce does.
+"""
 EXACT = 1e-11
 CASES = FORCES | {
     "activation": lambda: ActivationCoordinateActuator(
@@ -98,7 +104,7 @@ def test_forces(name):
 
 @pytest.mark.parametrize("case", CONFIGURATIONS)
 def test_muscles(case, monkeypatch):
-    # The kernels stop where OpenSim does.
+    # OpenSim's tolerance of the velocity iteration, which the kernels have, would dominate the difference.
     monkeypatch.setattr(millard2012_equilibrium, "VELOCITY_TOLERANCE", 1e-14)
     model = hung(muscle(case), (0.4, 0.6))
     model["/jointset/slide/x"].default_value = 0.322
@@ -135,7 +141,7 @@ def test_every_kernel_is_written_for_symbols():
 
 
 def test_probes():
-    """Every class that the kernels compute, of a muscle and a motor that move a block."""
+    """Compare all probes that the kernels compute, on a muscle and a motor that move a block."""
     model = hung(muscle("millard_damped"), (0.4, 0.6))
     model["/jointset/slide/x"].default_value = 0.322
     model.add(CoordinateActuator(name="motor", coordinate="x", optimal_force=3.0))
@@ -171,7 +177,7 @@ def test_probes():
     for seed in range(4):
         rng = np.random.default_rng(seed)
         x = functions.x + 0.01 * rng.normal(size=len(functions.x))
-        # Integrals are states of the engine, after those of the functions.
+        # Integrals of probes are states of the engine, after the states of the functions.
         y = [*x, *[0.0] * (len(engine.get_derivative()) - len(x))]
         engine.compute_derivative(0.3, y)
         found = functions.outputs(0.3, x, engine.read_controls(), functions.p)[place]
@@ -237,6 +243,5 @@ def test_trees_of_joints(held, seed):
     scale = 1.0 + np.abs(value).max()
     assert off(got[0][:, 0], value, scale) < 1e-9
     assert off(got[1], jacobian, scale) < 1e-9
-    # Where equations follow from others, only where they hold: there is no one second derivative
-    # across that.
+    # Dependent equations hold on the constraint manifold only, and second derivatives across it are not unique.
     assert len(equations) < count or off(got[2][:, 0], bends @ way, scale) < 1e-8

@@ -1,4 +1,4 @@
-"""Functions of CasADi compute what machine code does, and their derivatives are those of it."""
+"""Tests of CasADi functions of models: values and derivatives are compared with machine code and the kernels."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_nothing_is_left_of_the_equations_of_a_motion(name):
         kept = f.constraints(both.t, x, xdot, f.p)
         g = matrix(kept[3])
         scale = 1.0 + np.abs(xdot).max()
-        # What constraints push is all that is missing.
+        # The residual without multipliers contains exactly the constraint forces.
         rows = slice(both.size, 2 * both.size)
         multipliers = np.linalg.lstsq(g.T, -left[rows], rcond=None)[0] if len(g) else np.zeros(0)
         left = matrix(f.residual(both.t, x, xdot, u, f.p, multipliers)).ravel()
@@ -214,7 +214,7 @@ def test_parameters_stay_symbols():
 
 
 def test_constraints_of_welded_bodies_do_not_depend_on_what_is_a_parameter():
-    """With parameters welded bodies are links of their own, here behind one that a hinge carries."""
+    """With parameters, welded bodies remain separate links; here one of them follows a body on a hinge."""
     model = osimlite.Model(name="welded")
     inertia = (0.1, 0.2, 0.3, 0.0, 0.0, 0.0)
     joints = [
@@ -316,7 +316,7 @@ def test_a_linearization_is_that_of_the_functions():
         return np.array(f.dynamics(0.0, near.x + h * change, near.u, f.p)).ravel()
 
     assert np.abs(slope(along, 1e-3) - near.A[:, 0]).max() < 1e-8 * np.abs(near.A[:, 0]).max()
-    # Through the activation of a muscle, or at once.
+    # The control acts through the activation of a muscle or directly.
     assert near.B[:, 0].any() and near.B.shape[1] == len(f.controls)
     with pytest.raises(osimlite.OsimliteError, match="has no control 'knee'"):
         osimlite.linearize(f, None, {"knee": 1.0})

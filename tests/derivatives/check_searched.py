@@ -1,4 +1,4 @@
-"""Paths around surfaces and curves of muscles that are searched on, as functions of CasADi."""
+"""Tests of CasADi functions whose values come from searches: paths around surfaces and curves of muscles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GAIT = CORPUS / "m0005"
 
 
 def kernel_of(model, functions):
-    """The derivative of the state by the kernels, in the order of the functions."""
+    """Return a function that computes the state derivative by the kernels, in the order of the CasADi functions."""
     simulation = osimlite.simulation.Simulation(model, "compiled")
 
     def derivative(x, u):
@@ -38,7 +38,13 @@ def kernel_of(model, functions):
 
 
 def states_near(functions, seed, count):
-    """States and controls near the start."""
+    """Yield random states and controls near the initial state.
+
+    Args:
+        functions: the CasADi functions.
+        seed: seed of the random numbers.
+        count: number of states.
+    """
     rng, n = np.random.default_rng(seed), len(functions.coordinates)
     for _ in range(count):
         x = functions.x.copy()
@@ -50,7 +56,11 @@ def states_near(functions, seed, count):
 
 @pytest.mark.parametrize("number", ["m0161", "m0163"])
 def test_shoulders_in_motion(number):
-    """Past tori and ellipsoids OpenSim's speeds are not those of the moment arms; rates of a scapula are no speeds."""
+    """Compare state derivatives on shoulder models.
+
+    Around tori and ellipsoids, OpenSim's lengthening speeds differ from moment arms times speeds; rates of a scapula's
+    coordinates are not its generalized speeds.
+    """
     for path in (CORPUS / number).glob("*.osim"):
         both = Beside(osimlite.read(path))
         assert max(off(both.xdot(x), both.derivative(x)) for x in map(both.state, range(3))) < 1e-9

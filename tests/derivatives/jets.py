@@ -1,7 +1,7 @@
-"""Exact derivatives of the kernels as they are, run as Python on numbers that carry theirs (R. E. Wengert, 1964).
+"""Exact first and second derivatives of the kernels by automatic differentiation (R. E. Wengert, 1964).
 
-Nothing of how CasADi is given the kernels takes part: branches are taken as machine code takes
-them.
+The kernels run as Python on numbers that carry their derivatives. This is independent of the way in which CasADi traces
+the kernels: branches are taken as in machine code.
 """
 
 from __future__ import annotations
@@ -21,7 +21,14 @@ from osimlite.simulation.engines.linking import PYTHON_CODE, Program
 
 
 class Jet:
-    """A number v with its derivatives: g by everything (n,), a along one direction, h that of g along it."""
+    """Number with its derivatives.
+
+    Attributes:
+        v: value.
+        g: gradient (n,).
+        a: derivative along one direction.
+        h: derivative of the gradient along that direction (n,).
+    """
 
     __array_ufunc__ = None
     __slots__ = "a", "g", "h", "v"
@@ -30,7 +37,7 @@ class Jet:
         self.v, self.g, self.a, self.h = v, g, a, h
 
     def through(self, f: float, slope: float, bend: float) -> Jet:
-        """A function of it, of which the value and two derivatives are given."""
+        """Return a function of this number, given its value and its first and second derivatives."""
         return Jet(f, slope * self.g, slope * self.a, slope * self.h + (bend * self.a) * self.g)
 
     def __add__(self, b: Any) -> Jet:
@@ -134,7 +141,7 @@ SLOPES: dict[str, Callable[[float, float], tuple[float, float]]] = {
     "erfc": lambda x, f: (-_bell(x), 2.0 * x * _bell(x)),
     "sqrt": lambda x, f: (0.5 / f, -0.25 / (f * x)) if x > 0.0 else (0.0, 0.0),
 }
-"""Of a function at x, where its value is f, the first and second derivatives."""
+"""First and second derivatives of functions at x, where their value is f."""
 
 
 def _of_one(name: str) -> Callable[[Any], Any]:
@@ -152,18 +159,17 @@ def _of_one(name: str) -> Callable[[Any], Any]:
 def _angle(y: Any, x: Any) -> Any:
     if not (isinstance(x, Jet) or isinstance(y, Jet)):
         return math.atan2(y, x)
-    # The smaller over the larger one has the same derivatives.
+    # The quotient with the smaller magnitude avoids a division by zero; its arctangent has the same derivatives.
     part = MATHEMATICS["atan"](y / x) if abs(x) > abs(y) else -MATHEMATICS["atan"](x / y)
     return part + (math.atan2(float(y), float(x)) - part.v)
 
 
 def _copy_sign(x: Any, y: float) -> Any:
-    """Return x with the sign of y; at x = 0 its slope is the one that `SLOPES` of `dual_numbers.py` has there."""
+    """Return x with the sign of y; the slope at x = 0 is that of `SLOPES` in `dual_numbers.py`."""
     if not isinstance(x, Jet):
         return math.copysign(x, y)
     value = math.copysign(x.v, y)
-    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless the
-    # sign is changed.
+    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless its sign changes.
     same_sign = (x.v < 0.0) == (value < 0.0)
     return x.through(value, 1.0 if same_sign else -1.0, 0.0)
 
@@ -193,14 +199,14 @@ def _is_exact_zero(number: Any) -> bool:
 
 
 SAID = {differentiate_root: _differentiate_root, is_exact_zero: _is_exact_zero}
-"""What laws say of derivatives."""
+"""Functions that laws call to define derivatives, and their counterparts for jets."""
 OURS = "osimlite.mechanics.laws", "osimlite.mechanics.kernels", "osimlite.simulation.elements"
-"""Where kernels and laws are."""
+"""Packages that contain kernels and laws."""
 
 
 @contextmanager
 def _carried(functions: list[Any]) -> Iterator[None]:
-    """While the mathematics of functions, and of all that they call, is that of jets."""
+    """Replace the mathematics of functions, and of all functions that they call, by that of jets."""
     done: dict[int, Any] = {}
     changed: list[tuple[dict[str, Any], str, Any]] = []
     while functions:
@@ -234,14 +240,18 @@ def _carried(functions: list[Any]) -> Iterator[None]:
 def carried(
     packed: Any, t: float, y: list[float], controls: list[float], along: Any
 ) -> tuple[Any, Any, Any]:
-    """The derivative (n,) of a state y (n,), its own by the state (n, n), and the derivative of that along a direction.
+    """Compute the state derivative with its first and second derivatives.
 
     Args:
-        packed: the model.
-        t: time, s.
-        y: in the order of the packed model.
-        controls: of its actuators.
-        along: the direction (n,).
+        packed: the packed model.
+        t: time (s).
+        y: state (n,) in the order of the packed model.
+        controls: controls of the actuators.
+        along: direction (n,) of the second derivative.
+
+    Returns:
+        State derivative (n,), its Jacobian by the state (n, n), and the derivative of the Jacobian along the
+        direction (n, n).
     """
     program = Program(packed, PYTHON_CODE)
     s = program.ints

@@ -1,4 +1,4 @@
-"""Machine code beside the functions of CasADi: states of random numbers, derivatives, differences."""
+"""Comparison of CasADi functions with machine code and with the kernels: random states, derivatives, differences."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.derivatives.jets import carried
 
 
 class Beside:
-    """A model as functions of CasADi, and as machine code that takes the same states."""
+    """Model as CasADi functions, and as machine code that takes the same states."""
 
     def __init__(self, model: Any, **choices: Any) -> None:
         self.functions = osimlite.casadi(model, **choices)
@@ -28,23 +28,28 @@ class Beside:
         ] + engine.state.paths
         self.places = [own.index(name) for name in self.functions.states]
         self.size = len(self.functions.coordinates)
-        # What drives the machine code is what the functions are given.
+        # Time at which both are evaluated.
         self.t = 0.3
         self._made: Any = None
 
     def state(self, seed: int, change: float = 0.1) -> np.ndarray:
-        """A random state near the first one."""
+        """Return a random state near the initial state.
+
+        Args:
+            seed: seed of the random numbers.
+            change: standard deviation of the changes of coordinates.
+        """
         rng, x = np.random.default_rng(seed), self.functions.x.copy()
         x[: self.size] += change * rng.normal(size=self.size)
         x[self.size : 2 * self.size] += rng.normal(size=self.size)
         auxiliary = x[2 * self.size :]
         auxiliary *= rng.uniform(0.9, 1.1, len(auxiliary))
-        # Zero is where much begins.
+        # Many internal states start at zero, where derivatives are special.
         auxiliary[auxiliary == 0.0] = rng.uniform(0.05, 0.3, np.count_nonzero(auxiliary == 0.0))
         return x
 
     def kept(self, x: np.ndarray) -> np.ndarray:
-        """A state near x in which the constraints hold."""
+        """Return a state near x that fulfils the constraints."""
         infos, order = self.engine.mechanism.coordinates, self.engine.order
         values, speeds = (
             np.array([getattr(i, f"default_{what}") for i in infos]) for what in ("value", "speed")
@@ -59,7 +64,7 @@ class Beside:
         return y[self.places]
 
     def derivative(self, x: np.ndarray) -> np.ndarray:
-        """By machine code."""
+        """Compute the state derivative by machine code."""
         y = np.zeros(len(x))
         y[self.places] = x
         return np.array(self.engine.compute_derivative(self.t, y.tolist()))[self.places]
@@ -76,10 +81,13 @@ class Beside:
         return np.array(f.dynamics(self.t, x, self.controls(x), f.p)).ravel()
 
     def errors(self, x: np.ndarray, seed: int = 0) -> dict[str, float]:
-        """How far value, Jacobian and Hessian by the state are from the kernels' own, with random controls.
+        """Compare value, Jacobian and Hessian by the state with those of the kernels, at random controls.
 
-        Each is relative to the numbers that it is made of, or to one. The Hessian is that of a
-        random combination, along a random direction; functions that are no expressions have none.
+        The Hessian is that of a random combination of the rows, along a random direction. Functions that are no SX
+        expressions have none.
+
+        Returns:
+            Largest differences of "value", "jacobian" and "hessian", relative to the size of the terms or to one.
         """
         f, rng, n = self.functions, np.random.default_rng(seed), len(x)
         u, push, along = (
@@ -102,7 +110,7 @@ class Beside:
 
     def _derivatives(self, *given: np.ndarray) -> list[np.ndarray]:
         if self._made is None:
-            # In a process with OpenSim, which cannot load it, others take what is beside this.
+            # Import CasADi here: processes with OpenSim cannot load it, but use the rest of this module.
             import casadi
 
             n, made = len(self.functions.states), self.functions.dynamics
@@ -122,14 +130,20 @@ class Beside:
 
 
 def slope(function: Callable[[float], np.ndarray], h: float) -> np.ndarray:
-    """Derivative at zero by central differences, extrapolated twice."""
+    """Differentiate a function at zero by central differences with two Richardson extrapolations."""
     rows = [(function(h / 2**k) - function(-h / 2**k)) / (2 * h / 2**k) for k in range(3)]
     rows = [(4 * b - a) / 3 for a, b in pairwise(rows)]
     return (16 * rows[1] - rows[0]) / 15
 
 
 def off(a: np.ndarray, b: np.ndarray, sizes: np.ndarray | None = None) -> float:
-    """The largest difference, each relative to the size of the number, or to one."""
+    """Return the largest difference, relative to the magnitude of each number or to one.
+
+    Args:
+        a: numbers to check.
+        b: reference.
+        sizes: magnitudes; by default those of the reference.
+    """
     return float(
         np.max(np.abs(a - b) / np.maximum(1.0, np.abs(b) if sizes is None else sizes), initial=0.0)
     )

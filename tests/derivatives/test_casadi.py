@@ -1,4 +1,4 @@
-"""What is said where functions of CasADi cannot be made; `check_*.py` test the functions themselves."""
+"""Tests of error messages where CasADi functions cannot be created; `check_*.py` test the functions themselves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derivatives of objectives are those of differences of runs, and searches that go by them arrive."""
+"""Tests of gradients of objectives: they equal finite differences of simulations, and gradient searches converge."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.derivatives.support import human, pendulum
 
 
 def swing(run):
-    """The angle that is reached, and what it cost."""
+    """Return a measure of the angle at the end, the speeds, and the parameter `angle`."""
     return (
         (run.end["angle"] - 2.0) ** 2
         + 1e-3 * float(np.sum(run.history("angle/speed") ** 2))
@@ -30,7 +30,15 @@ def steps(run):
 
 
 def both(made, values):
-    """Derivatives of the first measure, and extrapolated differences of runs."""
+    """Differentiate the first measure.
+
+    Args:
+        made: plan of the search.
+        values: values of its variables.
+
+    Returns:
+        Gradient, and extrapolated central differences of simulations.
+    """
     free, runner, name = list(range(len(values))), Runner(made), get_measure_name(made.measures[0])
 
     def moved(place, by):
@@ -83,7 +91,7 @@ def test_muscles_with_tendons_that_start_in_equilibrium():
 
 @pytest.mark.full
 def test_a_search_arrives(tmp_path):
-    """The motor lifts the rod with the least effort."""
+    """The motor must lift the rod with minimal effort."""
     vary = {f"motor/control@{t:g}": (-20.0, 20.0) for t in (0.0, 0.2, 0.4)}
     cost = "100*(end(angle) - 1.2)^2 + 100*end(angle/speed)^2 + 0.01*integral(motor/control^2)"
     made = plan(pendulum(), vary, measures=(), to=0.4, accuracy=1e-8)

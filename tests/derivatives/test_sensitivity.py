@@ -1,4 +1,4 @@
-"""The derivatives of motions are those of differences of runs."""
+"""Tests of sensitivities of motions against extrapolated differences of simulations."""
 
 from __future__ import annotations
 
@@ -30,7 +30,19 @@ def states_of(trajectory, names):
 
 
 def difference(model, found, number, by, to, **choices):
-    """The derivative (n, x) of the states of runs by a number, extrapolated twice."""
+    """Differentiate the states of simulations by central differences with two extrapolations.
+
+    Args:
+        model: the model.
+        found: sensitivities, for names and initial values.
+        number: path of a state or of a property.
+        by: largest step of the differences.
+        to: end time (s).
+        choices: further options of the simulation.
+
+    Returns:
+        Derivatives (n, x) of all states at all times.
+    """
 
     def moved(h):
         changed, initial = model.copy_deep(), dict(choices.get("initial", {}))
@@ -51,7 +63,17 @@ def difference(model, found, number, by, to, **choices):
 
 
 def off(model, parameters, states, by, to, accuracy=1e-10, **choices):
-    """By number, how far its derivatives are from differences, over the largest."""
+    """Return the largest error of the sensitivities by each number, relative to the largest derivative.
+
+    Args:
+        model: the model.
+        parameters: paths of properties.
+        states: states whose initial value is varied.
+        by: step of the differences for each number.
+        to: end time (s).
+        accuracy: accuracy of the integrator.
+        choices: further options of the simulation.
+    """
     found = osimlite.sensitivity(model, parameters, to, states=states, accuracy=accuracy, **choices)
     assert found.derivatives.shape == (len(found.times), len(found.states), len(by))
     result = {}
@@ -105,7 +127,7 @@ def test_muscles_around_surfaces():
 
 
 def test_bends_are_narrowed_down(monkeypatch):
-    """Where a spring begins to push, the motion is accurate and its derivative would not be."""
+    """Without short steps where the force of a stop begins, the motion is accurate but its derivative is not."""
     model, mass = pendulum(), "/bodyset/rod/mass"
     stop = osimlite.CoordinateLimitForce(
         name="stop", coordinate="angle", upper_limit=180.0, upper_stiffness=5.0
@@ -167,7 +189,7 @@ def test_what_is_not_there_is_refused():
 
 @pytest.mark.parametrize("name", ["four_bars", "patella", "rod", "welded", "half_locked"])
 def test_constraints_go_with_a_motion(name):
-    """From a state where they hold; a state that is changed is the nearest one then."""
+    """Start from a state that fulfils the constraints; a changed state is projected to the nearest one that does."""
     model, to = MODELS[name](), 0.2
     first = osimlite.sensitivity(model, to=0.01)
     start = dict(zip(first.states, first.motion[0].tolist(), strict=True))
@@ -184,7 +206,7 @@ def test_constraints_go_with_a_motion(name):
 
 @pytest.mark.parametrize("held", [False, True])
 def test_a_start_that_is_bound_goes_with_a_number(held):
-    """How long a rod is tells where the motion starts, but for what was given."""
+    """The length of a rod determines the initial angle, unless that angle is prescribed."""
     model, number, angle = (
         MODELS["rod"](),
         "/constraintset/rod/constant_distance",

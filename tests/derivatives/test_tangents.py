@@ -1,4 +1,4 @@
-"""Machine code whose numbers carry derivatives finds those that Python's numbers with derivatives find."""
+"""Tests of tangents by machine code: they are compared with those of Python numbers that carry derivatives."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ from tests.derivatives.jets import Jet, _carried, carried
 from tests.derivatives.machine import off, slope
 
 WAYS = 3
-"""Directions in the tests of single functions."""
+"""Number of directions in the tests of single functions."""
 
 
 def either(a: float, b: float) -> float:
-    """Several ways out, and tuples of numbers with and without derivatives."""
+    """Return a number; the function has several return statements and swaps tuples with and without derivatives."""
     if a > b:
         return 1.0
     low, high = (a, 2.0) if a <= 0.0 else (b, a)
@@ -66,7 +66,7 @@ def either(a: float, b: float) -> float:
 
 
 def rules(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
-    """All that is done with numbers."""
+    """Apply every operation and function that kernels may apply to numbers."""
     a, b = y[0], y[1]
     found = at(f, 1)
     f[0], found[0], found[1] = a + b, a - b, 2.0 - a
@@ -94,7 +94,7 @@ rules.__module__ = either.__module__ = "osimlite.canary"
 
 
 def searched(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
-    """A root of r r = a, which a search has found in so many steps, and what is left out where it is nothing."""
+    """Compute a root of r r = a by `count` Newton steps, and terms that depend on zero tests."""
     root = x[0]
     for _ in range(count):
         root -= (root * root - y[0]) / (2.0 * root)
@@ -121,7 +121,7 @@ def machine_code(function):
 
 
 def strange(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
-    """A function that no law has."""
+    """Call a function that no law calls."""
     f[0] = math.lgamma(y[0])
     return count
 
@@ -137,7 +137,7 @@ def test_what_has_no_rule_is_refused_by_name():
 numbers = st.floats(-3.0, 3.0), st.floats(0.05, 4.0)
 
 
-# Where a function has a corner, the values themselves decide, and the sign of a zero.
+# At a corner of a function the values themselves decide, and the sign of a zero.
 @example(0.0, 1.0, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 @example(-0.0, 1.0, [1.0, -1.0, 0.5, 0.0, 1.0, 2.0])
 @example(1.0, 1.0, [1.0, -1.0, 0.5, 0.0, 1.0, 2.0])
@@ -164,11 +164,11 @@ def test_every_rule_is_that_of_python(a, b, along):
 
 
 def test_a_root_has_the_derivatives_of_its_equation():
-    """Those that a search leaves are those of where it began, if it had nothing to do."""
+    """After zero steps, the derivatives of the root are those of the starting point and of the equation."""
     y = np.array([[4.0, 1.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.0]])
     _, found = machine_code(searched)(0, np.array([[2.0, 7.0, 7.0, 7.0]]), y)
     assert found[0].tolist() == [2.0, 7.0, 7.0, 7.0] and found[1].tolist() == [2.0, 0.25, 0.0, 0.5]
-    # Nothing is what is 0 and stays so; a comparison is one of values.
+    # `is_exact_zero` holds if the number and its derivatives are zero; `==` compares values only.
     assert found[2].tolist() == [0.0, 0.0, 5.0, 0.0] and found[3].tolist() == [0.0] * 4
     _, found = machine_code(searched)(5, np.array([[2.1, 7.0, 7.0, 7.0]]), y)
     assert found[1] == pytest.approx([2.0, 0.25, 0.0, 0.5], abs=1e-15)
@@ -200,7 +200,7 @@ def model_named(name):
 
 @pytest.mark.parametrize("name", ["tree", furthest_walker, jumper, "m0097", "m0115"])
 def test_whole_models(name):
-    """Joints, contact, muscles around surfaces, constraints; muscles in contact."""
+    """Compare complete models with joints, contact, constraints and muscles around surfaces."""
     made = osimlite.tangents(model_named(name))
     rng, size, moving = np.random.default_rng(1), len(made.states), 2 * len(made.coordinates)
     x, u = made.x.copy(), rng.uniform(0.05, 0.95, len(made.controls))
@@ -220,14 +220,14 @@ def test_whole_models(name):
         off(rates, value[made.state_indices]) < 1e-12
         and (np.abs(a - wanted[places]) / sizes).max() < 1e-12
     )
-    # Not all at once: whichever others are beside it, a direction has the same derivatives.
+    # A direction has the same derivatives when it is evaluated alone.
     along = rng.normal(size=(size + len(u), 1))
     _, change = made.along(0.3, x, u, along[:size], along[size:])
     assert (
         np.abs(change - np.hstack((a, b)) @ along).max()
         < 1e-12 * np.abs(np.hstack((a, b))).max() * np.abs(along).sum()
     )
-    # What jets cannot know: that searches have derivatives of their roots, not of their steps.
+    # Differences check what jets do not: searches have the derivatives of their roots, not those of their steps.
     none = np.zeros((size, 0))
 
     def moved(h):
@@ -239,7 +239,7 @@ def test_whole_models(name):
 
 
 def test_what_is_nothing_now_may_be_something_next():
-    """Constraints that a motionless mechanism keeps without a force: derivatives of what is 0 count."""
+    """A motionless mechanism needs no constraint forces, but their derivatives count although the forces are 0."""
     model = osimlite.Model(name="gears", gravity=(0.0, 0.0, 0.0))
     for name in ("one", "two"):
         body = model.add(
@@ -275,7 +275,7 @@ def test_parameters():
     made.take(np.array([mass]))
     _, found = made.along(0.0, x, made.u, np.zeros((len(x), 1)), None, np.ones((1, 1)))
     assert np.abs(found[:, 0] - wanted).max() < 1e-9 * np.abs(wanted).max()
-    # It does not stay.
+    # A direction of parameters does not remain for the next call.
     assert not made.along(0.0, x, made.u, np.zeros((len(x), 1)))[1].any()
 
 
@@ -298,7 +298,7 @@ def test_what_is_not_there_is_refused():
 
 @pytest.mark.parametrize("name", [furthest_walker, "m0036", "m0115"])
 def test_outputs_have_derivatives(name):
-    """Places, mass centre, contacts, muscles, probes: with those of differences of the outputs themselves."""
+    """Compare derivatives of positions, mass centre, contacts, muscles and probes with differences of these outputs."""
     made = osimlite.tangents(model_named(name))
     rng, size, moving = np.random.default_rng(2), len(made.states), 2 * len(made.coordinates)
     x, u = made.x.copy(), rng.uniform(0.1, 0.9, len(made.controls))
