@@ -1,4 +1,4 @@
-"""All first and second derivatives of the nonlinear programs of every kind of study, beside differences."""
+"""Tests of first and second derivatives of the nonlinear programs of all kinds of studies, by finite differences."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.optimal.studies import study as moco_study
 
 sparse = pytest.importorskip("scipy.sparse")
 STEP = 2e-3
-"""Of Richardson's differences, whose error is that to the sixth power times the seventh derivative."""
+"""Step of Richardson's differences; their error is the sixth power of the step times the seventh derivative."""
 
 
 def matrix(sparsity, numbers):
@@ -25,7 +25,14 @@ def matrix(sparsity, numbers):
 
 
 def apart(entries):
-    """Columns (m, n) in as few sets as are found, so that no row has entries in two of a set: (n, sets) of 0 and 1."""
+    """Group columns so that no row has nonzero entries in two columns of a group (Curtis, Powell and Reid 1974).
+
+    Args:
+        entries: pattern (m, n) of nonzero entries.
+
+    Returns:
+        Sums of columns as 0 and 1 (n, groups), by a greedy search.
+    """
     shared, sets = entries.T.astype(int) @ entries, []
     for column in range(len(shared)):
         other = next((each for each in sets if not shared[column, each].any()), None)
@@ -36,7 +43,16 @@ def apart(entries):
 
 
 def differences(function, w, ways):
-    """Derivatives (m, ways) of an array along ways (n, ways): central differences, extrapolated from two steps."""
+    """Differentiate an array along directions by central differences that are extrapolated from three steps.
+
+    Args:
+        function: function of w that returns an array (m,).
+        w: point (n,).
+        ways: directions (n, k).
+
+    Returns:
+        Derivatives (m, k).
+    """
 
     def extrapolated(way):
         one, two, four = (
@@ -49,7 +65,16 @@ def differences(function, w, ways):
 
 
 def worst(found, wanted, name):
-    """The greatest difference over the greatest entry of its row, and where it is."""
+    """Compare matrices.
+
+    Args:
+        found: matrix to check.
+        wanted: reference.
+        name: function that names a row.
+
+    Returns:
+        Largest difference relative to the largest entry of its row or to one, and a text that says where it is.
+    """
     off = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted).max(axis=1, keepdims=True))
     row, column = np.unravel_index(np.argmax(off), off.shape)
     return off[
@@ -62,7 +87,7 @@ def check(study, folder, *, tolerance=1e-7, curved=True):
     layout, rng = program.layout, np.random.default_rng(3)
     low, high = np.maximum(layout.lower, -1.0), np.minimum(layout.upper, 1.0)
     w = np.clip(low + (high - low) * rng.uniform(0.2, 0.8, len(low)), layout.lower, layout.upper)
-    # Where the motion is given, nothing is known of other times than those.
+    # Variables with equal bounds do not move: at fixed times a prescribed motion is known at these times only.
     moving = np.eye(len(w))[:, layout.lower < layout.upper]
     push = rng.normal(size=len(program.labels))
 
@@ -87,7 +112,7 @@ def check(study, folder, *, tolerance=1e-7, curved=True):
         return
     hessian = Hessian(program)
     half = matrix(hessian.sparsity, hessian.compute_entries(w, 0.7, push)).toarray()
-    # What one set of columns is not said to have, and has, is an error as well.
+    # An entry that is missing in the declared pattern changes the sums of its group, and is found too.
     curves = (half + np.triu(half, 1).T) @ moving
     ways = apart(curves != 0.0)
     off, where = worst(
@@ -169,7 +194,7 @@ GOALS = {
         "impulse_axis": 1,
     },
 }  # fmt: skip
-"""By classes of goals what they ask for."""
+"""Required properties of goals, by class."""
 PATHS = {
     "MocoControlBoundConstraint": {
         "control_paths": ("/forceset/motor0",),
@@ -190,7 +215,7 @@ PATHS = {
         ],
     },
 }  # fmt: skip
-"""By classes of path constraints what they ask for."""
+"""Required properties of path constraints, by class."""
 OF_MUSCLES = (
     "MocoInitialActivationGoal",
     "MocoInitialForceEquilibriumDGFGoal",
@@ -214,7 +239,7 @@ def test_goals(kind, tmp_path):
 
 
 def test_every_class_is_checked():
-    """Also those that MocoTrack and MocoInverse make, which are goals and constraints like others."""
+    """MocoTrack and MocoInverse add goals and constraints of these classes as well."""
     assert {kind.__name__ for kind in GOAL_BUILDERS} == {*GOALS}
     assert {kind.__name__ for kind in PATH_CONSTRAINT_BUILDERS} == {*PATHS}
 
@@ -246,7 +271,7 @@ IMPLICIT = {
 @pytest.mark.parametrize("mode", ["explicit", "implicit"])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_schemes_and_dynamics(scheme, mode, tmp_path):
-    """With muscles of all kinds, a free mass, and controls that are free between nodes."""
+    """The model has muscles of all modes, a mass as parameter, and controls that are free between mesh points."""
     choices = {"interpolate_control_mesh_interior_points": False} | (
         IMPLICIT if mode == "implicit" else {}
     )
@@ -282,7 +307,7 @@ def test_models_with_constraints(scheme, method, derived, mode, tmp_path):
 
 @pytest.mark.parametrize("mode", ["explicit", "implicit"])
 def test_loads_over_time(mode, tmp_path):
-    """Loads are numbers that are renewed for each time, and push as they do where time is a symbol."""
+    """Loads are parameters that are set for each time, and act as they do where time is a symbol."""
     tables(tmp_path)
     model = osimlite.modify(
         links(), osimlite.ModOpAddExternalLoads(filepath=str(tmp_path / "loads.xml"))

@@ -1,6 +1,7 @@
-"""Studies with one fault at random: a finding, or one sentence with the file; never a traceback, never a silent run.
+"""Tests of Moco studies with one random fault: each causes a finding, or an error of one line that names the file.
 
-A hundred in all; ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others.
+No fault may cause a traceback or pass silently. The full suite tries 102 faults, the quick suite 9;
+``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others.
 """
 
 from __future__ import annotations
@@ -26,7 +27,11 @@ STUDIES = "followed", "placed", "pushed"
 
 
 def said_of(study):
-    """What `solve` says of a study that it refuses, and what `run` finds in it before it solves it."""
+    """Solve a study, or examine it if `solve` refuses nothing.
+
+    Returns:
+        Error message of `solve`, and findings of `run`.
+    """
     refusal, found = "", []
     try:
         solve(study)
@@ -34,7 +39,7 @@ def said_of(study):
         refusal = str(error)
         assert error.file is not None, refusal
         assert "\n" not in refusal
-        # What is wrong with the study is wrong somewhere in it.
+        # An error in the study itself has a line.
         if Path(error.file) == study and "is not a number at the guess" not in refusal:
             assert error.line is not None, refusal
     else:
@@ -59,7 +64,7 @@ def test_a_fault_is_told(kind, tmp_path):
             file.unlink()
         else:
             file.write_bytes(change.text.encode())
-            # Files of one length that are written within one tick of the clock look the same.
+            # Set distinct times: files of equal length that are written within one tick of the clock look unchanged.
             os.utime(file, (10 * number, 10 * number))
         try:
             told = any(said_of(study))

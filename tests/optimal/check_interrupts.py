@@ -1,4 +1,4 @@
-"""Ctrl-C ends the construction of a program at any moment, also inside CasADi's conversions."""
+"""Tests of Ctrl-C during the construction of a program, which it ends at any moment, even in CasADi's conversions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from osimlite.optimal.program import Program
 from tests.optimal.studies import study_file
 
 CONVERSIONS = "DM_from_array", "size1"
-"""Python functions of CasADi that its conversions of arguments call, and whose errors they discard."""
+"""Python functions that CasADi calls when it converts arguments, and whose errors it discards."""
 
 
 @pytest.mark.parametrize("name", CONVERSIONS)

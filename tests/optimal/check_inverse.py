@@ -1,4 +1,4 @@
-"""Motions that are given: what muscles do in a squat, beside Moco's MocoInverse."""
+"""Tests of MocoInverse: muscle activity of a prescribed squat is compared with Moco's solution."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ NAME = "squat_inverse-20"
 
 
 def squat(folder, **choices):
-    """The tool, of whose study the file has six digits of the motion alone."""
+    """Return the MocoInverse tool of the squat.
+
+    The study that OpenSim wrote for it contains the motion with six digits only, so the motion comes from the solution
+    file instead.
+    """
     model = study(folder, NAME).problem.phases.model.model.copy_deep()
     for motion in list(model.components(osimlite.PositionMotion)):
         model.remove(motion)
@@ -46,7 +50,7 @@ def test_moco_s_solution_is_one_here(tmp_path):
     program = Program(build_inverse_problem(squat(tmp_path), folder=tmp_path))
     terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, NAME)))
     assert terms == pytest.approx(moco_said(NAME)["terms"], rel=1e-9)
-    # N m, of some hundreds: OpenSim's poses fulfil the constraint of the patella to 1e-9 or so.
+    # The rows are N m, with terms of some hundreds; OpenSim's poses fulfil the patella constraint to about 1e-9.
     assert missed[0].size < 1e-3
 
 
@@ -60,7 +64,7 @@ def test_ours_costs_no_more(tmp_path):
 
 
 def test_meshes_of_given_motions_are_refined(tmp_path):
-    """With rigid tendons; where they are implicit it is refused."""
+    """Meshes are refined with rigid tendons; implicit tendons are refused."""
     with pytest.raises(OsimliteError, match="does not support implicit tendons"):
         solve_inverse(squat(tmp_path), folder=tmp_path, refine=1e-3)
     rigid = squat(tmp_path, mesh_interval=0.2)
@@ -79,7 +83,7 @@ def test_columns_that_are_no_states_must_be_allowed(tmp_path):
 
 
 def test_names_of_coordinates_will_do(tmp_path):
-    """As in motions of other tools, in degrees."""
+    """Other tools name columns by coordinates and write degrees."""
     made = build_inverse_problem(squat(tmp_path), folder=tmp_path)
     table = read_sto(tmp_path / "squat-25.sto")
     names = [name for name in table.columns if name.endswith("/value")]
@@ -117,7 +121,7 @@ def test_setups_are_run_and_tell_the_motion_too(tmp_path):
 def test_a_study_with_a_motion(tmp_path):
     found = solve(study_file(tmp_path, NAME))
     assert found.success
-    # Its motion has six digits, and accelerations of it fewer.
+    # The motion has six digits, and its accelerations have fewer.
     assert found.objective == pytest.approx(moco_said(NAME)["objective"], rel=0.05)
 
 
@@ -158,7 +162,7 @@ def test_a_motion_without_a_coordinate(tmp_path):
 
 
 def test_muscles_without_states_are_solved(tmp_path):
-    """As in Moco: activations are controls, and nothing but the balance of forces is left."""
+    """As in Moco, activations are controls then, and only the balance of generalized forces remains."""
     tool = squat(tmp_path)
     tool.model.operators = [
         osimlite.ModOpIgnoreActivationDynamics(),

@@ -1,4 +1,4 @@
-"""Meshes that split where the error is large."""
+"""Tests of mesh refinement: intervals with large errors are split."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ORDERS = {
     "legendre-gauss-3": 4,
     "legendre-gauss-radau-2": 3,
 }
-"""Of the error of an interval: rates are a polynomial through two, three, three and two points, and integrated."""
+"""Order of the error of an interval: the integral of a polynomial through two, three, three and two rates."""
 
 
 def found_on(folder, intervals, **choices):
@@ -47,7 +47,7 @@ def test_errors_fall_with_the_order_of_the_scheme(scheme, tmp_path):
 
 
 def test_errors_bound_those_of_an_integration(tmp_path):
-    """From the start of each interval, with the same controls."""
+    """Integrate from the start of each interval with the same controls."""
     program, found, w = found_on(tmp_path, 20)
     functions, times = program.problem.functions, found.states.times
     x = np.column_stack([found.states[name] for name in functions.states])
@@ -65,7 +65,7 @@ def test_errors_bound_those_of_an_integration(tmp_path):
         end = integrate.solve_ivp(rate, times[[first, last]], x[first], rtol=1e-11, atol=1e-12).y[
             :, -1
         ]
-        # At the ends much of the error within has gone.
+        # At the end of an interval, much of the error within it has cancelled.
         assert (np.abs(end - x[last]) / sizes).max() < error
 
 
@@ -98,7 +98,7 @@ def test_intervals_split_where_it_is_needed(hessian, tmp_path):
     finest = solve(study(tmp_path, "pendulum-50", num_mesh_intervals=200))
     assert found.objective == pytest.approx(finest.objective, rel=2e-4)
     assert found.rounds[-1].iterations < found.rounds[0].iterations
-    # A new search starts where this one ends, on the mesh that it has.
+    # A new solution starts from this one, on its mesh.
     given.solver.mesh = tuple((found.states.times[::2] / found.states.times[-1]).tolist())
     program = Program(build_problem(given))
     assert estimate_errors(

@@ -1,4 +1,4 @@
-"""Constant sparse matrices multiply as full ones do."""
+"""Tests of constant sparse matrices: they multiply as dense ones do."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_products(count: int, shape: tuple[int, int]) -> None:
     x, y = rng.normal(size=shape[1]), rng.normal(size=shape[0])
     assert matrix @ x == pytest.approx(full @ x, abs=1e-13)
     assert matrix.multiply_transpose(y) == pytest.approx(full.T @ y, abs=1e-13)
-    # Each place once, row by row.
+    # Each entry occurs once, and entries are ordered by rows.
     places = matrix.rows * shape[1] + matrix.columns
     assert (np.diff(places) > 0).all()
     chosen = rng.integers(0, shape[1], 9)

@@ -1,4 +1,4 @@
-"""The same nonlinear programs as Moco's: its solutions are solutions here, and ours cost no more."""
+"""Tests of Moco studies: Moco's solutions have the same costs and residuals here, and osimlite's cost no more."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCHEMES = "trapezoidal", "legendre-gauss-3", "legendre-gauss-radau-3"
 
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
-    """What is found of a study as it is, by its name."""
+    """Return a cached function that solves the study of a name without changes."""
     folder = tmp_path_factory.mktemp("solved")
     return cache(lambda name: solve(study_file(folder, name)))
 
@@ -38,7 +38,7 @@ def test_moco_s_solution_is_one_here(name, tmp_path):
     terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, name)))
     said = moco_said(name)
     assert terms == pytest.approx(said["terms"], rel=1e-9)
-    # Moco stops at 1e-4 of the rows as they are, and its files have 16 digits.
+    # Moco stops when the unscaled rows are below 1e-4, and its files have 16 digits.
     assert not missed or missed[0].size < max(said["ctol"], 1e-7)
 
 
@@ -47,14 +47,13 @@ def test_ours_costs_no_more(name, solved, tmp_path):
     said, found = moco_said(name), solved(name)
     assert found.success
     if name == "squat-25":
-        # At the tolerance of the study a search ends some 4e-4 to 2e-3 above the optimum, where
-        # rounding has led it.
+        # At the study's tolerance, rounding decides where a search ends, 4e-4 to 2e-3 above the optimum.
         assert found.objective == pytest.approx(said["objective"], rel=2e-3)
         found = solve(study(tmp_path, name, optim_convergence_tolerance=1e-5))
     assert found.objective <= said["objective"] * (1.0 + 1e-4)
     assert found.objective == pytest.approx(sum(found.terms.values()))
     if name != "squat-25":
-        # The same steps, as the same numbers come of the same program.
+        # The same program with the same numbers leads Ipopt through the same iterations.
         assert (found.iterations, found.objective) == (
             said["iterations"],
             pytest.approx(said["objective"], rel=1e-7),
@@ -74,7 +73,7 @@ def test_scaled_variables_find_it_too(name, hessian, tmp_path):
     scaled = {"scale_variables_using_bounds": True, "optim_hessian_approximation": hessian}
     found = solve(study(tmp_path, name, **scaled))
     assert found.success
-    # At the tolerance of the squat limited memory ends up to 4e-4 above the optimum.
+    # At the tolerance of the squat, the limited-memory method ends up to 4e-4 above the optimum.
     assert found.objective <= moco_said(name)["objective"] * (
         1.0 + (1e-4 if hessian == "exact" else 5e-4)
     )
@@ -83,7 +82,7 @@ def test_scaled_variables_find_it_too(name, hessian, tmp_path):
 
 
 def test_nothing_to_make_small():
-    """There second derivatives are those of constraints whose multipliers vanish: they are left out."""
+    """Solve a study without costs: its Hessian has only constraints, whose multipliers vanish, and is left out."""
 
     def found(hessian):
         given = small.study_of(
@@ -106,7 +105,7 @@ def test_schemes_agree(scheme, tmp_path):
     found = solve(
         study(tmp_path, "sliding-100", transcription_scheme=scheme, num_mesh_intervals=40)
     )
-    # 2 sqrt(distance / acceleration): 1 m at 25 m/s2.
+    # Minimal time is 2 sqrt(distance / acceleration) for 1 m at 25 m/s2.
     assert found.success
     assert found.objective == pytest.approx(0.4, abs=2e-3)
 
@@ -135,11 +134,11 @@ def test_the_file_comes_back_and_starts_another_search(tmp_path, solved):
 
 
 def test_implicit_tendons(tmp_path):
-    """Moco's hanging muscle: its solution fulfils the equilibrium of tendon and fibers, and ours is as good."""
+    """Compare Moco's hanging muscle: its solution fulfils the tendon equilibrium here, and ours costs no more."""
 
     def hanging():
         given = study(tmp_path, "hanging-25")
-        # What is left out is 1e-11 of the objective.
+        # The disabled goal contributes 1e-11 of the objective.
         given.problem.phases.goals[1].enabled = False
         return given
 
@@ -187,7 +186,7 @@ def test_a_failure_names_more_violations_than_a_solution(success, name, count, t
     ]
     assert told == [str(violation) for violation in violations[:count]]
     assert (name, told[0]) in outcome.messages
-    # Nobody has asked for a simulation of the solution.
+    # The solution is simulated on request only.
     assert not {"simulated", "not simulated"} & {title for title, _ in outcome.messages}
 
 
@@ -209,7 +208,7 @@ def test_an_interrupt_keeps_the_best_so_far(tmp_path):
 
 
 def test_parameters_are_found(tmp_path):
-    """The lightest slider is the first to arrive: 2 sqrt(1 m / (50 N / mass))."""
+    """The lightest slider arrives first, after 2 sqrt(1 m / (50 N / mass))."""
     given = study(tmp_path, "sliding-100", num_mesh_intervals=20)
     bounds = osimlite.MocoBounds(bounds=(1.0, 4.0))
     given.problem.phases.parameters.append(
@@ -233,7 +232,13 @@ FOLLOWED = (
 
 
 def _frames(tmp_path, kind, **given):
-    """Moco's swing of the pendulum, and a goal of its second body."""
+    """Return Moco's pendulum study with a goal for its second body, and the path of the solution.
+
+    Args:
+        tmp_path: folder of the files.
+        kind: class of the goal.
+        given: properties of the goal.
+    """
     changed, found = study(tmp_path, "pendulum-50"), moco_found(tmp_path, "pendulum-50")
     reference = osimlite.TableProcessor(filepath=str(found))
     goal = kind(
@@ -245,7 +250,7 @@ def _frames(tmp_path, kind, **given):
 
 @pytest.mark.parametrize("kind", FOLLOWED)
 def test_frames_follow_their_own_motion(kind, tmp_path):
-    """What is computed of a motion costs nothing in it, and the angle of none has a derivative."""
+    """A goal that tracks its own motion costs nothing; the gradient stays finite at a rotation angle of zero."""
     changed, found = _frames(tmp_path, kind)
     table, reference = read_sto(found), tmp_path / "reference.sto"
     states = [column for column in table.columns if column.startswith("/jointset")]
@@ -428,7 +433,7 @@ def test_what_the_solver_makes_a_cost(tmp_path):
         found.trajectory.columns[name] for name in found.trajectory.names["derivatives"]
     ]
     squares, times = np.square(accelerations).sum(axis=0), found.trajectory.times
-    # Simpson's rule over each interval and its middle.
+    # Simpson's rule over each interval and its midpoint.
     each = (
         (squares[:-2:2] + 4.0 * squares[1::2] + squares[2::2]) * (times[2::2] - times[:-2:2]) / 6.0
     )

@@ -1,4 +1,4 @@
-"""2-D walking that follows a measured gait: opensim-core's example2DWalking."""
+"""Tests of MocoTrack on 2-D walking that follows a measured gait (opensim-core's example2DWalking)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def gait(intervals):
 
 
 def test_moco_s_walk_is_one_here(example, tmp_path):
-    """Its solution has its own cost, term by term, and violates nothing beyond its tolerance."""
+    """Moco's solution has the same cost here, term by term, and fulfils the constraints to its tolerance."""
     of_moco = study(tmp_path, "track").problem.phases
 
     def more(made):
@@ -60,7 +60,7 @@ def test_moco_s_walk_is_one_here(example, tmp_path):
     terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, "walk-10t4")))
     assert terms == pytest.approx(moco_said("walk-10t4")["terms"], rel=1e-10)
     assert missed[0].size < 3e-6
-    # What both follow over time is exact where times are variables, too.
+    # References are functions of time: their derivatives must be exact where the times are variables too.
     w = program.layout.make_guess()
     way = np.random.default_rng(0).normal(size=len(w)) * 1e-2
     way[:2] = 0.01, -0.02

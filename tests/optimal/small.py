@@ -1,4 +1,4 @@
-"""A study on two links with all that goals can ask for: small, so that it is made in a moment."""
+"""Small study on a chain of links with everything that goals can require, which is built quickly."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ TIMES = np.linspace(0.0, 1.0, 12)
 
 
 def links(*muscles, count=2):
-    """Links on hinges with motors, markers, balls above a floor, and muscles of some modes."""
+    """Return a model of links on hinges with motors, markers, spheres above a floor, and muscles.
+
+    Args:
+        muscles: tendon mode of each muscle.
+        count: number of links.
+    """
     model = osimlite.Model(name="links")
     inertia, parent = (0.1, 0.2, 0.3, 0.0, 0.0, 0.0), "/ground"
     floor = osimlite.ContactHalfSpace(
@@ -87,7 +92,7 @@ def links(*muscles, count=2):
 
 
 def coupled(model, *coordinates):
-    """The same, of which some angles follow from the first."""
+    """Add couplers to the model, by which the named angles depend on the first one; return the model."""
     for number, name in enumerate(coordinates):
         function = osimlite.PolynomialFunction(coefficients=(0.3, 0.5 - number, 0.1))
         model.add(
@@ -102,7 +107,7 @@ def coupled(model, *coordinates):
 
 
 def tied(model):
-    """The same, of which a point stays at a distance."""
+    """Add a constraint that keeps a point at a distance; return the model."""
     model.add(
         osimlite.ConstantDistanceConstraint(
             name="rope",
@@ -117,7 +122,14 @@ def tied(model):
 
 
 def study_of(model, *goals, constraints=(), **solver):
-    """A study of it over about a second, on a mesh of two intervals."""
+    """Return a study of the model over about a second, on a mesh of two intervals.
+
+    Args:
+        model: the model.
+        goals: goals of the study.
+        constraints: path constraints.
+        solver: properties of the solver.
+    """
     phase = osimlite.MocoPhase(
         name="phases", model=osimlite.ModelProcessor(name="model", model=model)
     )
@@ -139,7 +151,7 @@ def study_of(model, *goals, constraints=(), **solver):
 
 
 def tables(folder):
-    """Files of what can be followed."""
+    """Write tables of references that goals can track into a folder."""
     t = TIMES
     motion = {
         "/jointset/j0/q0/value": 0.5 * np.sin(2 * t),

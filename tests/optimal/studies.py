@@ -1,4 +1,4 @@
-"""Studies of Moco's own, as OpenSim printed them, with what it found."""
+"""Moco studies as OpenSim printed them, with Moco's solutions."""
 
 from __future__ import annotations
 
@@ -21,14 +21,20 @@ def _text(name):
 
 
 def study_file(folder, name):
-    """The study, unpacked into a folder."""
+    """Unpack a study into a folder, and return its path."""
     path = folder / f"{name}.omoco"
     path.write_bytes(_text(f"{name}.omoco"))
     return path
 
 
 def study(folder, name, **solver):
-    """The study, with other properties of its solver."""
+    """Read a study, and set properties of its solver.
+
+    Args:
+        folder: folder into which the study is unpacked.
+        name: name of the study.
+        solver: values of properties of the solver.
+    """
     result = osimlite.read_document(study_file(folder, name))
     for key, value in solver.items():
         setattr(result.solver, key, value)
@@ -36,12 +42,12 @@ def study(folder, name, **solver):
 
 
 def moco_said(name):
-    """Objective, iterations and so on."""
+    """Return Moco's objective, terms, iterations and settings of a study."""
     return json.loads(_text(f"{name}.json"))
 
 
 def moco_found(folder, name):
-    """Moco's solution file, unpacked into a folder."""
+    """Unpack Moco's solution file into a folder, and return its path."""
     path = folder / f"{name}.sto"
     path.write_bytes(_text(f"{name}.sto"))
     return path

@@ -1,4 +1,4 @@
-"""Studies of Moco as files, and faults at random that only studies can have."""
+"""Moco studies as files, and random faults that only studies can have."""
 
 from __future__ import annotations
 
@@ -102,7 +102,12 @@ def _pushed():
 
 
 def project(kind: str, folder: Path) -> Project:
-    """A study with its model and its tables, which are written into a folder."""
+    """Write a study with its model and tables into a folder, and return its texts.
+
+    Args:
+        kind: "followed", "placed" or "pushed".
+        folder: the folder.
+    """
     study = {"followed": _followed, "placed": _locate_part, "pushed": _pushed}[kind]()
     tables(folder)
     columns = [f"/jointset/j{k}/q{k}/{what}" for what in ("value", "speed") for k in range(2)]
@@ -123,7 +128,7 @@ def project(kind: str, folder: Path) -> Project:
     study.problem.phases.model = osimlite.ModelProcessor(name="model", filepath="model.osim")
     study.solver.optim_max_iterations = 1
     osimlite.write(study, folder / "study.omoco")
-    # Its rows end with a tab, which nothing needs.
+    # Remove the tab at the end of each row, which readers do not need.
     markers = folder / "markers.trc"
     markers.write_text("".join(line.rstrip() + "\n" for line in markers.read_text().splitlines()))
     used = {file.name: file.read_text() for file in sorted(folder.iterdir())}
@@ -137,7 +142,13 @@ Kind = Callable[[Project, random.Random], Change | None]
 
 
 def _swap(pattern: str, *news: str | Callable[[re.Match[str]], str], sure: bool = True) -> Kind:
-    """Another text in the place of the group of a pattern."""
+    """Return a fault that replaces the first group of a pattern by another text.
+
+    Args:
+        pattern: regular expression with one group.
+        news: replacements, or functions that compute one from the match.
+        sure: whether the fault must be reported.
+    """
 
     def change(project: Project, draw: random.Random) -> Change | None:
         text = project.texts["study.omoco"]
@@ -198,11 +209,11 @@ KINDS: tuple[Kind, ...] = (
           "</MocoFinalBounds>", '<MocoFinalBounds name="time_final_bounds"><bounds>-2 -1</bounds></MocoFinalBounds>'),
     _swap(r"(<lower_bound>.*?</lower_bound>)", ""),
 )  # fmt: skip
-"""What may be wrong with a study."""
+"""Faults that a study can have."""
 
 
 def faults(project: Project, draw: random.Random) -> Iterator[tuple[str, Change]]:
-    """Faults without end, half of them of studies alone."""
+    """Yield random faults without end, 60 % of them specific to studies."""
     while True:
         kind = draw.choice(KINDS if draw.random() < 0.6 else GENERAL)
         change = kind(project, draw)
