@@ -1,4 +1,4 @@
-"""The page in a browser without a window."""
+"""Fixture of the viewer's page in a headless browser."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ from tests.browser import chromium as chromium
 
 
 class Page:
-    """A page of the viewer in the browser; `errors` holds what it complained of."""
+    """Page of the viewer in a browser.
+
+    Attributes:
+        errors: errors and error messages of the page.
+        asked: addresses that the page requested.
+    """
 
     def __init__(self, browser: Any, url: str, *, offline: bool, waits: bool) -> None:
         self.context = browser.new_context(viewport={"width": 1000, "height": 700}, offline=offline)
@@ -28,13 +33,13 @@ class Page:
             self.until("v && v.stage.frames_drawn > 0")
 
     def run(self, code: str, argument: Any = None) -> Any:
-        """The value of an expression, in which `v` is the viewer and `x` the argument."""
+        """Return the value of a JavaScript expression, in which `v` is the viewer and `x` the argument."""
         return self.page.evaluate(
             f"(x) => {{ const v = window.osimlite?.viewer; return ({code}); }}", argument
         )
 
     def until(self, code: str, argument: Any = None, seconds: float = 30.0) -> None:
-        """Wait until an expression holds; Playwright's own way of waiting needs eval, which the page forbids."""
+        """Wait until an expression holds; Playwright's own function needs eval, which the page forbids."""
         end = time.monotonic() + seconds
         while not self.run(code, argument):
             assert time.monotonic() < end, f"waited in vain for {code}"
@@ -43,7 +48,7 @@ class Page:
 
 @pytest.fixture
 def open_page(chromium: Any) -> Iterator[Any]:
-    """Open a file or an address, and wait until the model is drawn; a file is opened without a network."""
+    """Return a function that opens a page and waits until the model is drawn; files are opened without a network."""
     pages: list[Page] = []
 
     def opened(where: Path | str, *, waits: bool = True) -> Page:

@@ -1,4 +1,4 @@
-"""Motions made by formula, for pictures."""
+"""Motions from formulas, for pictures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Recorded:
 
 
 def stroll(count: int = 51) -> Recorded:
-    """The walker pushed along its platform for half a second, loaded on one foot for a while."""
+    """Return a motion of the walker along its platform for half a second, with a load on the right foot."""
     mechanism = build_mechanism(dynamic_walker())
     q, u = mechanism.default_state()
     times = np.linspace(0.0, 0.5, count)

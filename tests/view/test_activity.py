@@ -1,4 +1,4 @@
-"""Muscles in the colours of their activations."""
+"""Tests of muscles in the colours of their activations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytest.importorskip("PIL.Image")
 
 @pytest.fixture
 def model() -> Model:
-    """Two paths of ground."""
+    """Return a model with two path actuators that are fixed to ground."""
     model = Model(name="two")
     for name, height in (("one.a", 0.0), ("two", 0.5)):
         force = PathActuator(name=name, optimal_force=1.0)

@@ -35,7 +35,7 @@ def frames(path):
 
 
 def has(picture, color):
-    """How many pixels have a colour, up to the few shades of a shared palette."""
+    """Return the number of pixels of a colour, within the tolerance of a shared palette."""
     wanted = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
     return int((np.abs(picture - wanted).max(axis=2) < 16).sum())
 
@@ -64,7 +64,7 @@ def test_the_film_runs_at_the_speed_of_the_motion(film):
 
 def test_forces_are_drawn_while_they_act(film):
     pictures = [picture for picture, _ in film[0]]
-    # Loaded from 0.1 to 0.3 s; the scale of the forces has the same colour all the time.
+    # The foot is loaded from 0.1 to 0.3 s; the scale of the forces has the same colour all the time.
     scale = has(pictures[0], to_hex(FORCE))
     assert scale > 0
     assert has(pictures[5], to_hex(FORCE)) > scale + 50
@@ -106,7 +106,7 @@ def test_all_that_moves_is_in_the_picture():
                 assert (away <= film.reach + 1e-12).all()
                 seen += 1
     assert seen >= 5 * len(film.poses)
-    # The platform is 20 m long and stays where it is: that much scenery is not shown whole.
+    # The platform is 20 m long and does not move: scenery of that size is not shown completely.
     assert film.reach.max() < 2.0
 
 
@@ -128,7 +128,7 @@ def test_what_stands_still_is_shown_if_it_is_not_too_large():
 
 
 def test_ground_stays_in_the_picture_of_a_jump():
-    """But not where it is so far down that nothing could be seen of what moves."""
+    """The picture includes the ground unless it is so far away that the model would be too small."""
     motion = stroll()
     level = motion.values[0] * (np.array(motion.coordinates) != "platform_rz")
     up = np.outer(motion.times, np.array(motion.coordinates) == "Pelvis_ty")

@@ -1,4 +1,4 @@
-"""Reference bands from a user's file, behind the curves over the gait cycle."""
+"""Tests of reference bands from a user's file, which are drawn behind curves over the gait cycle."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_band_lies_behind_the_curves_of_its_panel(tmp_path: Path) -> None:
     panels = [panel._replace(band=bands.get(panel.title)) for panel in panels]
     (figure,) = draw_pages("", panels)
     assert [len(axes.collections) for axes in figure.axes] == [1, 0]
-    # Over time a band has no meaning.
+    # A band is defined over the gait cycle, so it is not drawn over time.
     (figure,) = draw_pages(
         "",
         [panel._replace(curves=[c._replace(steps={}) for c in panel.curves]) for panel in panels],

@@ -1,4 +1,4 @@
-"""The page in a browser: what is in its scene graph, where sliders move bodies, and whether the motion plays."""
+"""Tests of the page in a browser: its scene graph, the effect of sliders, and the playback of motions."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ def shown(path: Path, motion=None, **more) -> ModelView:
 
 
 def graph(page, mechanism) -> np.ndarray:
-    """The matrices (b, 3, 4) of all bodies in the scene graph of the page."""
+    """Return the matrices (b, 3, 4) of all bodies in the scene graph of the page."""
     rows = page.run("x.map((path) => v.bodyMatrix(path))", [body.path for body in mechanism.bodies])
     return np.array(rows).reshape(-1, 3, 4)
 
 
 def says(mechanism, q) -> np.ndarray:
-    """Where the mechanism has the bodies (b, 3, 4)."""
+    """Return the matrices (b, 3, 4) of all bodies of the mechanism at q."""
     state = mechanism.at(q)
     return np.dstack((state.rotations[:-1], state.origins[:-1, :, None]))
 
@@ -52,7 +52,7 @@ def values(page) -> np.ndarray:
 
 
 def slide(page, path: str, value: float) -> None:
-    """Move a slider as a hand does."""
+    """Move a slider as a user does."""
     slider = page.page.locator(f'[data-coordinate="{path}"] input[type=range]')
     slider.evaluate(
         "(s, value) => { s.value = value; s.dispatchEvent(new Event('input')); }", value
@@ -78,7 +78,7 @@ def test_a_slider_moves_bodies_to_where_the_mechanism_says(name, file_of, open_p
         assert q[mechanism.coordinate_index(info.path)] == pytest.approx(aim, abs=1e-9)
         assert np.abs(graph(page, mechanism) - says(mechanism, q)).max() < 1e-12
     assert np.abs(graph(page, mechanism) - says(mechanism, view.q)).max() > 1e-3
-    # A page from --html asks nobody for anything.
+    # A page from --html makes no requests to a network.
     assert [url for url in page.asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
@@ -97,7 +97,7 @@ def test_lines_go_where_the_scene_says(file_of, open_page, tmp_path):
     view = shown(file_of(GAIT))
     mechanism, scene = view.scene.mechanism, view.scene
     page = open_page(view.write_page(tmp_path / "page.html"))
-    # Bent knees: points that come and go, and points that move along with the knee.
+    # Bent knees: conditional points appear, and moving points follow the knee.
     q = mechanism.values({"knee_angle_r": -1.8, "hip_flexion_r": 0.9, "ankle_angle_l": 0.3})
     page.run("v.show(x)", q.tolist())
     bodies, moved = scene.compute_poses(q), 0
@@ -140,7 +140,7 @@ def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_pa
     q = values(page)
     lengths, arms = paths.lengths(q), paths.moment_arms(q)
     names = [line.path for line in view.scene.lines if line.layer == "paths"]
-    # Of knees that move the patella along, of hips, and of what is not crossed.
+    # Moment arms at knees, which move the patella as well, at hips, and at joints that the paths do not cross.
     for coordinate in ("knee_angle_r", "hip_flexion_r", "ankle_angle_l"):
         place = mechanism.coordinate_index(coordinate)
         result = page.run("x[1].map((k) => v.mechanism.over(k, x[0], v.q))", [place, [*range(80)]])
@@ -245,7 +245,7 @@ def test_fibers_are_as_thick_as_the_muscle_is_strong_between_thin_tendons(
             line.fibers, rel=0.02
         )
     assert strong.fibers > 1.5 * weak.fibers
-    # Each triangle of the surface leads to its line.
+    # The page maps each triangle of the surface to its line.
     last = page.run("20 * (v.stage.tubed[0].rings[0] - 1) - 1")
     first, same, second = page.run("x.map((k) => v.stage.tubed[0].owner(k))", [0, last, last + 1])
     assert first == same != second
@@ -392,7 +392,7 @@ def test_a_click_shows_properties(fixtures, open_page, tmp_path):
     page.run("v.select('/bodyset/Pelvis')")
     words = page.page.locator("#details").inner_text()
     assert "mass_center" in words and "/bodyset/Pelvis" in words
-    # The picture answers to clicks, too: the pelvis is the largest thing in it.
+    # A click into the picture selects, too; the pelvis is the largest body in it.
     spot = page.run(
         "v.stage.onPage(x, [0, 0, 0])",
         [b.name for b in view.scene.mechanism.bodies].index("Pelvis"),
@@ -416,7 +416,7 @@ def test_what_a_finding_concerns_glows(fixtures, open_page, tmp_path):
     assert bad in page.run(glowing)
     assert page.page.locator(f'#overlay .pin[title*="{bad}"]').is_visible()
     page.page.locator("#findings .finding").first.click()
-    # Errors come first.
+    # Errors come before warnings.
     assert page.run("v.selected") == bad
     page.run("v.select('/')")
     page.run("v.stage.showMarks(false)")
@@ -440,7 +440,7 @@ def test_a_large_model_opens_quickly(file_of, open_page, tmp_path):
     took = time.perf_counter() - begin
     assert len(list(view.model.components())) > 900
     assert page.run("v.data.tree.length") > 600
-    # 3 s on two cores that have nothing else to do; a runner that shares its cores gets more.
+    # It takes 3 s on two idle cores; a CI runner that shares its cores gets more time.
     assert took < 12.0
 
 
@@ -527,7 +527,7 @@ def test_signs_that_cover_each_other_are_one(fixtures, open_page, tmp_path):
     path.write_text(text.replace("<radius>0.05", "<radius>-0.05"))
     page = open_page(shown(path).write_page(tmp_path / "page.html"))
     signs = page.page.locator("#overlay .pin:visible")
-    # From far away all are near each other.
+    # From far away, all marks are close to each other in the picture and are merged.
     page.run("v.stage.camera.position.multiplyScalar(9.0), v.stage.controls.update()")
     page.run("v.stage.wanted()")
     page.until("!v.stage.waiting")
@@ -553,7 +553,7 @@ def test_nothing_of_the_model_is_below_the_player(open_page, tmp_path):
 
 def test_the_label_of_gravity_is_below_the_buttons_of_a_small_frame(open_page, tmp_path):
     page = open_page(shown_walker().write_page(tmp_path / "page.html"))
-    # The size of the viewer in a narrow notebook.
+    # This is the size of the viewer in a narrow notebook.
     page.page.set_viewport_size({"width": 400, "height": 460})
     page.until("v.stage.canvas.clientHeight < 300")
     page.run("v.stage.resize(), v.stage.look(v.data.directions.home)")

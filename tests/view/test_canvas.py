@@ -32,7 +32,7 @@ def test_the_pixels_of_a_triangle_are_those_whose_middles_are_inside(a, b, c):
         size = float(np.hypot(ex - sx, ey - sy))
         away.append(((ex - sx) * (y - sy) - (ey - sy) * (x - sx)) / (size or 1.0))
     inside = (np.min(away, axis=0) > 0.0) | (np.max(away, axis=0) < 0.0)
-    # What lies on an edge may be either.
+    # Pixels on an edge may or may not be drawn.
     clear = np.abs(away).min(axis=0) > 1e-6
     assert (drawn == inside)[clear].all()
 
@@ -63,7 +63,7 @@ def test_glass_lets_shine_through_from_the_back_to_the_front():
     canvas.draw_opaque(*triangle((0, 0, 0), (32, 0, 0), (0, 32, 0), color=WHITE))
     colors = np.array([np.tile(color, (3, 1)) for color in (RED, GREEN, GREEN)])
     canvas.draw_translucent(places, colors, np.array((0.5, 0.5, 1.0)))
-    # White, half green over it, half red over that; what is behind the white is not seen.
+    # The colour is half green over half red over white; what is behind the opaque white surface is hidden.
     assert np.abs(canvas.to_pixels()[4, 4].astype(int) - (191, 128, 64)).max() <= 1
 
 

@@ -1,4 +1,4 @@
-"""Files of glTF: read back by the standard's words, bodies and paths are where the scene has them."""
+"""Tests of glTF files: they are read according to the standard, and bodies and paths are compared with the scene."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 
 
 class Read:
-    """A file, as the standard has it."""
+    """glTF file that is read according to the standard."""
 
     def __init__(self, data: bytes) -> None:
         magic, version, length = struct.unpack_from("<4sII", data)
@@ -46,7 +46,7 @@ class Read:
         return [index for index, node in enumerate(self.parts["nodes"]) if node["name"] == name]
 
     def placed(self, place: int, moment: int) -> Any:
-        """The matrix (4, 4) of a node in the scene at a moment."""
+        """Return the matrix (4, 4) of a node in the scene at a frame of the animation."""
         node = dict(self.parts["nodes"][place])
         for channel in self.parts.get("animations", [{"channels": []}])[0]["channels"]:
             if channel["target"]["node"] == place:
@@ -106,8 +106,7 @@ def test_bodies_and_shapes_move(tmp_path):
                 )
                 < 1e-4
             )
-    # Between two moments players go the straight way, which is the short one for neighbours in
-    # sign.
+    # Players interpolate quaternions linearly, which is the short way only if neighbours have the same sign.
     for channel, sampler in zip(
         *(read.parts["animations"][0][what] for what in ("channels", "samplers")), strict=True
     ):

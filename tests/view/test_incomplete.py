@@ -1,4 +1,4 @@
-"""Models with one wrong reference are shown, and what is left out is named."""
+"""Tests of models with one wrong reference: they are shown, and messages name what is left out."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def test_the_page_has_the_findings_of_validate(
     if name == "wrong reference":
         text = text.replace("/bodyset/RightShank<", "/bodyset/Nowhere<", 1)
     (tmp_path / "m.osim").write_text(text, encoding="utf-8")
-    # The settings of a project hold for both commands.
+    # The settings of a project apply to both commands.
     (tmp_path / "osimlite.toml").write_text('ignore = ["OSIM508"]\n', encoding="utf-8")
-    # Bones are in no folder here, for both commands.
+    # Neither command finds the meshes of bones here.
     checked = run("validate", "m.osim", "--format", "json", folder=tmp_path)
     done = run("view", "m.osim", "--html", "m.html", folder=tmp_path)
     assert done.code == 0, done.err

@@ -1,4 +1,4 @@
-"""What the page computes with, in a browser without the page: where things are, and lengths and arms of paths."""
+"""Tests of the page's computations in a browser without the page: poses, path lengths and moment arms."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ MODELS = [
     "m0923",
     "m0954",
 ]
-"""Of the corpus: with couplers that depend on each other, balls, points that move along with
-coordinates, every surface to wrap around, and constraints between bodies.
+"""Corpus models with couplers that depend on each other, ball joints, moving path points, all wrap surfaces and
+constraints between bodies.
 """
 
 FOUND = """([program, lines, poses, asked]) => {
@@ -44,7 +44,9 @@ FOUND = """([program, lines, poses, asked]) => {
 
 @pytest.fixture(scope="module")
 def found(chromium):
-    """Values, poses, corners, and lengths and arms, which the page finds in poses."""
+    """Yield a function that returns coordinates, poses, path corners, lengths and moment arms as the page computes
+    them.
+    """
     page = chromium.new_page()
 
     def of(mechanism, poses, routes=(), asked=()):
@@ -59,7 +61,7 @@ def found(chromium):
 
 
 def off(bodies, state) -> float:
-    """How far bodies are from where osimlite has them."""
+    """Return the largest difference between poses of bodies on the page and in osimlite."""
     placed = np.dstack((state.rotations, state.origins[:, :, None]))
     return np.abs(np.reshape(bodies, placed.shape) - placed).max()
 
@@ -100,7 +102,7 @@ def test_models_are_where_osimlite_has_them_and_their_paths_pull_alike(name, sha
         assert np.abs(q - expected).max() < 1e-12
         assert off(bodies, mechanism.at(expected)) < 1e-12
         lengths, arms = paths.lengths(expected), paths.compute_moment_arms(expected[None])[0]
-        # Rounding counts for as much as others move further than the coordinate.
+        # Rounding errors grow with the motion of dependent coordinates per motion of the selected one.
         polylines, far = paths.polylines(expected), np.abs(paths.compute_coupling(expected)).max()
         for route, line, row in zip(routes, corners, measured, strict=True):
             assert line == pytest.approx(polylines[route].ravel(), abs=1e-12)

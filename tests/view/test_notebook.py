@@ -1,4 +1,4 @@
-"""What notebooks show, as HTML and in a browser."""
+"""Tests of the output in notebooks, as HTML and in a browser."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from osimlite.view import notebook
 
 
 def page_in(html: str) -> str:
-    """The page that an output brings along."""
+    """Unpack the page that an output contains."""
     (packed,) = re.findall(r'atob\("([^"]+)"\)', unescape(html))
     return gzip.decompress(base64.b64decode(packed)).decode()
 
@@ -33,7 +33,7 @@ def test_a_model_shows_its_tree_and_itself():
     )
     assert "RightThigh <i>Body</i>" in html and "sandbox='allow-scripts'" in html
     assert "three.js" in page_in(html)
-    # Nothing that a notebook would have to load.
+    # The notebook has nothing to load.
     assert not re.search(r"(?:src|href)=", html)
 
 
@@ -110,7 +110,7 @@ def test_paths_are_a_table_of_lengths_and_moment_arms():
         osimlite.PathSpring(name="spring", geometry_path=path, resting_length=0.1, stiffness=1.0)
     )
     html = osimlite.paths(model)._repr_html_()
-    # The hypotenuse of 0.05 and 0.12 m, and the area of the triangle.
+    # 0.13 m is the hypotenuse of 0.05 and 0.12 m; the moment arm follows from the area of the triangle.
     assert "<td style='text-align:left'>0.13</td>" in html and "flexion 0.04615" in html
 
 
@@ -118,7 +118,7 @@ def test_a_motion_has_a_heading_and_a_table_of_its_columns():
     motion = osimlite.simulate(dynamic_walker(), to=0.01)
     html = motion._repr_html_().partition("<iframe")[0]
     assert html.startswith(f"<details><summary>{escape(motion.heading)}</summary><table>")
-    # One row for each coordinate, below the head.
+    # The table has one row per coordinate below its head.
     assert html.count("<tr>") == 1 + len(motion.coordinates)
     assert "<td>rad</td>" in html and "smallest" in html
 

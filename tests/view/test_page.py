@@ -1,4 +1,4 @@
-"""What the page is made of, and its server, without a browser."""
+"""Tests of the viewer's page and of its server, without a browser."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_the_grid_lies_on_the_ground_of_the_model():
     body = view.scene.mechanism.bodies[data["floor"]["body"]]
     assert body.name == "Platform"
     assert np.linalg.det(matrix[:, :3]) == pytest.approx(1.0, abs=1e-12)
-    # The exercise turns its plane by -1.57, and not by a right angle.
+    # The exercise rotates its plane by -1.57 rad, which is not exactly a right angle.
     assert matrix[:, 1] == pytest.approx([-np.cos(1.57), np.sin(1.57), 0.0], abs=1e-12)
 
 
@@ -171,7 +171,7 @@ def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):
         with image.open(view.write_picture(tmp_path / "a.png", size, time)) as picture:
             assert picture.size == size
             pictures.append(np.asarray(picture.convert("RGB")).astype(int))
-    # Force arrows are orange; the walker's platform is of a darker red.
+    # Force arrows are orange; the walker's platform is darker and more red.
     parts = [np.moveaxis(picture, 2, 0) for picture in pictures]
     orange = [
         int(((r > 80) & (g > 0.3 * r) & (g < 0.6 * r) & (b < 0.2 * r)).sum()) for r, g, b in parts

@@ -97,7 +97,7 @@ def test_a_group_begins_a_row_if_it_fits_there_only():
     (figure,) = drawn(panels_of(columns)[0])
     tops = [round(axes.get_position().y1, 6) for axes in figure.axes]
     rows = [sorted({*tops}, reverse=True).index(top) for top in tops]
-    # The knee fills the gap beside the pelvis.
+    # The panel of the knee fills the gap next to the pelvis.
     assert [axes.get_title(loc="left")[:4] for axes in figure.axes] == [
         "pelv",
         "knee",
@@ -109,7 +109,14 @@ def test_a_group_begins_a_row_if_it_fits_there_only():
 
 
 def draw_groups(sizes):
-    """Titles of the panels of groups "a", "b" and so on, row by row."""
+    """Draw groups of columns that are named "a", "b" and so on.
+
+    Args:
+        sizes: number of columns of each group.
+
+    Returns:
+        Titles of the panels, one text per row.
+    """
     columns = [
         Column(f"{name}{k}", "deg", wave(k), name)
         for name, size in zip("abcdefghi", sizes, strict=False)
@@ -264,7 +271,7 @@ def test_activations_and_controls_have_units() -> None:
     columns = describe_columns(table("Static Optimization", values), names)
     assert [column.unit for column in columns] == ["0–1", "× optimal force", ""]
     (figure,) = drawn(panels_of(columns)[0])
-    # Small activations look small.
+    # The axis of activations ends at 1, so that small activations look small.
     lowest, highest = figure.axes[0].get_ylim()
     assert lowest <= 0.0 and 1.0 <= highest < 1.1
     constant = describe_columns(table("Static Optimization", {"soleus_r": 0.5 + 0 * TIMES}), names)
@@ -358,7 +365,7 @@ def test_limits_near_the_curves_are_lines() -> None:
         [line.get_ydata()[0] for line in axes.lines if line.get_color() == LIMIT_COLOR]
         for axes in figure.axes
     ]
-    # A distant limit would flatten the curve.
+    # A distant limit is not drawn, because it would flatten the curve.
     assert drawn == [[0.01, 1.0], []]
 
 

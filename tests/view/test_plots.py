@@ -23,7 +23,13 @@ def walker():
 
 
 def drawn(name, motion=None, mechanism="walker"):
-    """The figure of a name, laid out as it will be saved."""
+    """Return the figure of a name with its final layout.
+
+    Args:
+        name: name of the figure.
+        motion: motion to draw; the stroll of the walker by default.
+        mechanism: mechanism of the motion; the walker by default.
+    """
     figures = dict(
         draw_figures(motion or stroll(), walker() if mechanism == "walker" else mechanism)
     )
@@ -183,7 +189,7 @@ def test_energy_is_that_of_the_mechanism():
     q, u = motion.values[0].copy(), motion.speeds[0]
     q[mechanism.coordinate_index("Pelvis_tx")] = times[at]
     assert parts["kinetic"][at] == pytest.approx(mechanism.kinetic_energy(q, u), rel=1e-12)
-    # 5 kg slide down 10 degrees.
+    # 5 kg slide down a slope of 10 degrees.
     fall = -5.0 * 9.80665 * times[at] * np.sin(np.radians(10))
     height = parts["potential of gravity"]
     assert height[at] - height[0] == pytest.approx(fall, rel=1e-9)
@@ -198,7 +204,7 @@ def test_energy_of_a_simulation_has_what_contacts_store():
     stored, total = (trajectory.energy[part] for part in ("stored", "total"))
     assert result[STORED].get_ydata() == pytest.approx(stored) and stored[0] > 1.0
     assert result["sum"].get_ydata() == pytest.approx(total)
-    # The table of the command says the same.
+    # The summary of the simulation states the same energies.
     said = trajectory.summary["energy_J"]
     assert result["sum"].get_ydata()[[0, -1]] == pytest.approx(
         [said["start"]["total"], said["end"]["total"]]

@@ -1,4 +1,4 @@
-"""Reports of trials: steps by the force, what is drawn over what, a page that needs nothing else."""
+"""Tests of reports of trials: steps from forces, contents of the plots, and a page without external files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FORCE = """<ExternalForce name="{side}"><applied_to_body>calcn_{side}</applied_t
 
 @pytest.fixture
 def loads(tmp_path: Path) -> Path:
-    """Loads of two feet that stand for 0.6 s of every second, with noise for one sample."""
+    """Write loads of two feet with a stance of 0.6 s per second, and one sample of noise."""
     times = np.arange(0.0, 3.0, 0.01)
     columns, rows = [], []
     for side, start in (("r", 0.25), ("l", 0.75)):
@@ -71,7 +71,7 @@ def test_sides_and_roots() -> None:
 
 @pytest.fixture
 def trials(tmp_path: Path) -> Path:
-    """Two trials of a model whose name is none for HTML."""
+    """Write two trials of a model whose name must be escaped in HTML."""
     model = free_body()
     model.name = 'a <b>"model"'
     osimlite.write(model, tmp_path / "model.osim")
@@ -81,7 +81,7 @@ def trials(tmp_path: Path) -> Path:
 
 
 def data_of(page: str) -> list[dict[str, Any]]:
-    """The data of the viewers in a page."""
+    """Return the data of all viewers in a page."""
     inner = [html.unescape(text) for text in re.findall(r'srcdoc="([^"]*)"', page)]
     result = [
         re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)
@@ -102,7 +102,7 @@ def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)', outside) and "<script" not in outside
     viewers = data_of(page)
     assert [viewer["name"] for viewer in viewers] == ['a <b>"model"'] * 2
-    # The model has findings; the report is about the motion.
+    # The report is about the motion: it leaves out findings of the model.
     assert osimlite.validate(trials / "model.osim").findings
     assert [viewer["findings"] for viewer in viewers] == [[], []]
     measured = viewers[0]["motion"]["measured"]
@@ -110,7 +110,7 @@ def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
 
 
 def test_a_page_says_what_the_results_are_worth(trials: Path) -> None:
-    """The numbers are those of this run, wherever it wrote them, not of what lies beside the setups."""
+    """The numbers come from this run, wherever it wrote its results, and not from older files near the setups."""
     words = [f"trial0/{name}.xml" for name in ("z_ik", "id")]
     assert run("run", *words, folder=trials).code == 0
     left = next(path for path in (trials / "trial0").glob("*.mot"))
@@ -147,7 +147,7 @@ def test_a_report_that_has_no_place_is_told_before_anything_is_run(trials: Path)
 
 
 def test_one_call_leaves_the_next_one_possible(trials: Path) -> None:
-    """The module of a function must not take its place in the package."""
+    """Importing the module `report` must not replace the function of that name in the package."""
     outcomes: dict[str | Path, Outcome] = {"ik.xml": osimlite.run(trials / "trial0" / "z_ik.xml")}
     for name in ("one.html", "two.html"):
         assert osimlite.report(outcomes, trials / name) == trials / name
@@ -164,7 +164,7 @@ def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
     assert drawn and all(
         np.allclose(column, table[name], atol=1e-9) for name, column in drawn.items()
     )
-    # The only joint is that to ground, whose forces are residuals.
+    # The only joint connects to ground, and its forces are residuals, not moments.
     assert collect_moments([trial]) == {} and trial.evidence is outcomes[0].evidence
     assert outcomes[1].evidence is not None and outcomes[1].evidence.loads is None
 

@@ -1,4 +1,4 @@
-"""Recordings for Rerun, read back by Rerun itself."""
+"""Tests of recordings for Rerun, which Rerun itself reads back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from tests.view.motions import stroll
 
 
 def read(path: Path) -> dict[str, dict[str, Any]]:
-    """What a recording has: by entity and component, a row for each moment."""
+    """Read a recording with Rerun.
+
+    Returns:
+        By entity and component, a row for each time.
+    """
     chunk = pytest.importorskip("rerun.chunk", reason="needs rerun-sdk (extra 'rerun')")
     result: dict[str, dict[str, Any]] = {}
     for part in chunk.RrdReader(path).stream().to_chunks():
@@ -34,7 +38,7 @@ def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
     for index, body in enumerate(scene.mechanism.bodies):
         moves = result[f"/model{body.path}"]
         for moment, pose in enumerate(poses):
-            # Matrices stand column by column.
+            # Rerun stores matrices by columns.
             turned = np.array(moves["Transform3D:mat3x3"][moment]).reshape(3, 3).T
             assert np.allclose(turned, pose.rotations[index], atol=1e-6)
             assert np.allclose(

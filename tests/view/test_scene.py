@@ -23,7 +23,15 @@ def scene_of(model, folders=None):
 
 
 def with_shape(shape, folders=None):
-    """The pelvis with one shape: the scene, and the shape's points in the frame of the body."""
+    """Build the walker with a single shape on its pelvis.
+
+    Args:
+        shape: the shape.
+        folders: folders of meshes.
+
+    Returns:
+        Scene, and the points of the shape in the frame of the body; None if the shape is not drawn.
+    """
     model = dynamic_walker()
     pelvis = model.body_set.objects[1]
     del pelvis.attached_geometry[:]
@@ -152,7 +160,7 @@ def test_contact_surfaces_are_where_the_forces_find_them():
 
 
 def test_a_torus_to_wrap_around_is_where_paths_touch_it():
-    """OpenSim 4.6 bends a path around a tube of the inner radius, about a circle of the outer one."""
+    """In OpenSim 4.6, the tube around which a path wraps has `inner_radius`, and its circle has `outer_radius`."""
     model = dynamic_walker()
     model.body_set.objects[1].wrap_object_set.objects.append(
         WrapTorus(name="ring", inner_radius=0.01, outer_radius=0.05)
@@ -187,7 +195,7 @@ def test_sticks_join_the_joints():
     }
     thigh, shank = lines["RightThigh"], lines["RightShank"]
     assert np.linalg.norm(thigh[1] - thigh[0]) == pytest.approx(0.4)
-    # The last body of a limb ends at its mass centre.
+    # The last body of a limb has no further joint, so its stick ends at its mass centre.
     assert np.linalg.norm(shank[1] - shank[0]) == pytest.approx(0.2175)
     assert shank[0] == pytest.approx(thigh[1])
 

@@ -1,4 +1,4 @@
-"""The server of the page, as programs meet it that do not keep to its manners."""
+"""Tests of the page's server with clients that violate the protocol."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HEAD = "POST /assemble HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 
 @pytest.fixture(scope="module")
 def running():
-    """A server that hangs up soon, of a model with a constraint to keep."""
+    """Yield a server with a short timeout, for a model with a constraint."""
     model = dynamic_walker()
     coupled = osimlite.CoordinateCouplerConstraint(
         name="coupled",
@@ -36,7 +36,7 @@ def running():
 
 @pytest.fixture
 def server(running, capfd, caplog):
-    """The server, which still answers afterwards, and says nothing on the terminal."""
+    """Yield the server; then check that it still works and printed nothing."""
     caplog.set_level(logging.DEBUG, "osimlite.view.server")
     yield running
     assert (
@@ -49,7 +49,11 @@ def server(running, capfd, caplog):
 
 
 def said(server: PageServer, question: bytes) -> tuple[int, bytes]:
-    """Status and body of what the server answers until it hangs up; 0 without a head, as in the first HTTP."""
+    """Send a request, and read until the server closes the connection.
+
+    Returns:
+        Status and body; the status is 0 for an answer without a head, as in HTTP 0.9.
+    """
     with socket.create_connection((HOST, server.server.server_address[1]), timeout=20) as line:
         line.sendall(question)
         parts = []
@@ -89,7 +93,7 @@ def test_what_is_no_question_is_a_bad_request(server, body):
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e308", "-1e300", "1e999"])
 def test_numbers_that_no_pose_has(server, number):
-    """An answer is always JSON, which knows neither NaN nor infinity."""
+    """The answer is always valid JSON, which has neither NaN nor infinity."""
     status, result = asked(server, f'{{"values": [{", ".join([number] * 8)}]}}'.encode())
     assert status == 200
     assert "error" in result or all(value == value for value in result["values"])

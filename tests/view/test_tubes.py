@@ -1,4 +1,4 @@
-"""Muscles as tubes with fibers and tendons, in pictures, films and the page."""
+"""Tests of muscles as tubes with fibers and tendons, in pictures, films and the page."""
 
 from __future__ import annotations
 
@@ -37,7 +37,13 @@ def make_line(thick: float = 0.0, tendon: float = 0.0) -> Line:
 
 
 def lay(corners: np.ndarray, thick: float, tendon: float) -> np.ndarray:
-    """The rings (n, RING.SIZE) of a tube."""
+    """Return the rings (n, RING.SIZE) of a tube along a polyline.
+
+    Args:
+        corners: corners of the polyline (m, 3).
+        thick: radius of the belly (m).
+        tendon: length of the tendon (m).
+    """
     numbers = np.full((len(corners) + MORE_RINGS) * RING.SIZE, np.nan)
     count = lay_tube(corners.ravel(), len(corners), THIN, thick, tendon, 1.0, numbers)
     return numbers[: count * RING.SIZE].reshape(-1, RING.SIZE)
@@ -52,7 +58,7 @@ def test_a_tube_is_closed_and_turned_outwards(corners, thick, tendon):
     length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
     volume = np.einsum("ij,ij->i", a, areas).sum() / 6.0
     assert np.linalg.norm(areas.sum(axis=0)) < 1e-12
-    # Of a prism with ten sides; bends take a little.
+    # A prism with ten sides has less volume than a cylinder, and bends reduce it further.
     assert volume > 0.8 * np.pi * THIN**2 * length
     assert np.linalg.norm(surface.normals, axis=1) == pytest.approx(1.0)
     assert is_tendon.any() == (thick > 0.0 and tendon > 0.0)
@@ -73,7 +79,7 @@ def test_fibers_are_between_the_halves_of_the_tendon(corners, tendon):
     assert places[is_fiber][[0, -1]] == pytest.approx((half, length - half))
     assert radii.max() == pytest.approx(0.02) and radii[~is_fiber] == pytest.approx(THIN)
     assert places[radii.argmax()] == pytest.approx(0.5 * length)
-    # All corners of the line are rings, in their order.
+    # Each corner of the polyline is the centre of a ring, in the same order.
     rows = [np.linalg.norm(middles - corner, axis=1).argmin() for corner in corners]
     assert rows == sorted(rows)
     assert np.linalg.norm(middles[rows] - corners, axis=1).max() < 1e-12
@@ -127,7 +133,7 @@ def test_the_page_has_the_same_rings(jumper, chromium):
 
 
 def count_pixels(picture: np.ndarray, color: tuple[float, ...]) -> int:
-    """How many pixels have the hue of a colour, in light or shade."""
+    """Return the number of pixels with the hue of a colour, in light or shade."""
     pixels = picture.reshape(-1, 3).astype(float)
     direction = np.array(color) / np.linalg.norm(color)
     sizes = np.maximum(np.linalg.norm(pixels, axis=1), 1e-9)
@@ -173,7 +179,7 @@ def test_strong_muscles_are_drawn_thicker(jumper, tmp_path):
         shown = ModelView.from_model(model, motion=active_motion(model, 1.0))
         picture = np.asarray(image.open(shown.write_picture(tmp_path / "a.png", (500, 500))))
         areas.append(count_pixels(picture, activity_color(1.0)))
-    # The radius grows with the square root of the force.
+    # The radius, and with it the area in the picture, grows with the square root of the force: by 3.
     assert 2.0 < areas[1] / areas[0] < 3.5
 
 

@@ -1,4 +1,4 @@
-"""The URDF with its meshes, as another program reads it, looks like the scene."""
+"""Tests of URDF files with meshes: another program reads them, and their shapes are compared with the scene."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_every_shape_is_where_the_scene_has_it(fixtures, tmp_path):
             points = bodies.transform_points(item.body, points)
             ours.append((points.min(axis=0), points.max(axis=0)))
     assert len(ours) == len(theirs) == 9
-    # Round shapes are cut into triangles differently, by up to 1 % of their size.
+    # The programs cut round shapes into different triangles, which changes their extent by up to 1 %.
     for low, high in ours:
         away = [
             max(np.abs(low - a).max(), np.abs(high - b).max()) / np.linalg.norm(high - low)
