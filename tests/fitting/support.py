@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models, data and comparisons for the tests of fitting."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1,
 
 
 def free_body() -> osimlite.Model:
-    """A body with four markers."""
+    """Return a model of a free body with four markers."""
     return make_marked_body(dict(zip(MARKERS, POINTS.tolist(), strict=True)))
 
 
 def positions(values: Any) -> Any:
-    """Where the markers are (t, 4, 3)."""
+    """Return the positions of the four markers (t, 4, 3) at poses of the free body."""
     mechanism = osimlite.mechanism(free_body())
     return np.array([[mechanism.at(q).point(0, point) for point in POINTS] for q in values])
 
@@ -52,7 +52,7 @@ HELD = tuple(f"{body}_{name}" for body in SIZES for name in BONES)
 
 
 def marked() -> osimlite.Model:
-    """A walker with five markers on each segment."""
+    """Return the dynamic walker with five markers on each segment."""
     model = dynamic_walker()
     for body in list(model.components(osimlite.Body)):
         if body.name in SIZES:
@@ -68,7 +68,16 @@ def marked() -> osimlite.Model:
 def person(
     seed: int, noise: float = 0.0, frames: int = 60
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Markers (t, 3) of somebody who moves, and by how much those of the clusters are elsewhere."""
+    """Simulate a person: scale the marked walker, displace the markers of the clusters, and move it.
+
+    Args:
+        seed: seed of motion, displacements and noise.
+        noise: standard deviation of the marker noise (m).
+        frames: number of frames.
+
+    Returns:
+        Measured positions (t, 3) by marker, and displacements of the markers of the clusters (m).
+    """
     rng, model = np.random.default_rng(seed), marked()
     scale_model(model, {body: (size,) * 3 for body, size in SIZES.items()})
     offsets = {}
@@ -90,20 +99,20 @@ def person(
 
 
 def places_at(mechanism: Mechanism, markers: list[MarkerTarget], q: Any) -> Any:
-    """Where the markers are (m, 3)."""
+    """Return the positions of the markers (m, 3) at a pose."""
     state = mechanism.at(q)
     return np.array([state.point(*marker.station) for marker in markers])
 
 
 def cost_of(mechanism: Mechanism, markers: list[MarkerTarget], measured: Any, q: Any) -> float:
-    """What OpenSim minimises."""
+    """Return the cost that OpenSim minimizes: half the weighted mean of squared distances of visible markers."""
     weights = np.array([marker.weight for marker in markers]) * np.isfinite(measured).all(axis=1)
     squares = np.sum((places_at(mechanism, markers, q) - np.nan_to_num(measured)) ** 2, axis=1)
     return float(0.5 * weights @ squares / weights.sum())
 
 
 def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
-    """Every value of an object and of all that it holds, by where it is."""
+    """Return all values of an object and of the objects in it, by path."""
     result: dict[str, Any] = {f"{path}": type(item).__name__}
     for spec in type(item).field_specs().values():
         value = getattr(item, spec.name)
@@ -117,7 +126,13 @@ def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
 
 
 def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> None:
-    """Objects mean the same; numbers agree to 1e-9."""
+    """Assert that two objects have equal values; numbers agree to 1e-9.
+
+    Args:
+        ours: object to check.
+        theirs: reference.
+        but: ending of a path that is left out.
+    """
     left_out = "/socket_frame", but
     one, other = (
         {k: v for k, v in numbers_of(item).items() if not k.endswith(left_out)}
@@ -128,7 +143,7 @@ def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> Non
         if isinstance(value, float) or (
             isinstance(value, tuple) and value and isinstance(value[0], float)
         ):
-            # Of the points of a spline OpenSim prints six digits.
+            # OpenSim prints points of splines with six digits.
             rel = 1e-5 if place.endswith(("/x", "/y")) else 1e-9
             assert np.asarray(one[place]) == pytest.approx(
                 np.asarray(value), rel=rel, abs=1e-12, nan_ok=True
@@ -147,11 +162,16 @@ PLACES = ((0.05, 0.05, 0.13), (0.05, 0.05, -0.13), (-0.12, 0.04, 0.0), (0.02, 0.
 
 
 FACING = 2
-"""The place of pelvis_rotation."""
+"""Index of the coordinate pelvis_rotation."""
 
 
 def turner(low: float, high: float) -> osimlite.Model:
-    """A pelvis, jointed as gait models are, whose rotation is clamped (degrees), and a thigh."""
+    """Return a pelvis and a leg with markers, with the root joint of gait models.
+
+    Args:
+        low: lower end of the range of pelvis_rotation (degrees), which is clamped.
+        high: upper end of that range (degrees).
+    """
     model = osimlite.Model(name="turner")
     bodies = [
         osimlite.Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
@@ -194,7 +214,7 @@ def turner(low: float, high: float) -> osimlite.Model:
 
 
 def poses(angles: Any) -> Any:
-    """Of somebody who walks in a circle, facing these angles (degrees): (t, 7)."""
+    """Return poses (t, 7) of a subject that walks in a circle and faces these angles (degrees)."""
     facing, steps = np.radians(angles), np.arange(len(angles))
     return np.column_stack(
         [0.1 * np.sin(0.3 * steps), 0.05 * np.cos(0.2 * steps), facing, np.sin(facing), 0.9 + 0.0 * facing,
@@ -203,7 +223,16 @@ def poses(angles: Any) -> Any:
 
 
 def trial_of(model: osimlite.Model, values: Any, noise: float = 0.0) -> Any:
-    """The mechanism, its stations, and where they were measured (t, m, 3)."""
+    """Measure the markers of a model.
+
+    Args:
+        model: the model.
+        values: poses (t, n).
+        noise: standard deviation of the noise (m).
+
+    Returns:
+        Mechanism, stations of the markers, and their measured positions (t, m, 3).
+    """
     mechanism: Any = osimlite.mechanism(model)
     stations = [mechanism.stations[marker.path] for marker in model.components(osimlite.Marker)]
     places = np.array([[mechanism.at(q).point(*station) for station in stations] for q in values])

@@ -1,4 +1,4 @@
-"""Inverse kinematics from files and arrays: against converged reference motions, and what hostile data become."""
+"""Tests of inverse kinematics from files and arrays: converged reference motions and damaged data."""
 
 from __future__ import annotations
 
@@ -20,18 +20,24 @@ TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
 
 
 def motion(count: int = 20) -> Any:
-    """Poses (t, 6)."""
+    """Return poses (t, 6) of a smooth motion."""
     t = np.linspace(0.0, 1.0, count)[:, None]
     return 0.4 * np.sin(3.0 * t + np.arange(6.0))
 
 
 def as_arrays(places: Any) -> dict[str, Any]:
-    """By name."""
+    """Return the positions by marker name."""
     return {name: places[:, number] for number, name in enumerate(MARKERS)}
 
 
 def unpacked(folder: Path, name: str, to: Path) -> Path:
-    """A file out of its .gz."""
+    """Decompress a file, and return its path.
+
+    Args:
+        folder: folder of the compressed file.
+        name: name without `.gz`.
+        to: folder of the result.
+    """
     path = to / name
     path.write_bytes(gzip.decompress((folder / f"{name}.gz").read_bytes()))
     return path
@@ -52,7 +58,10 @@ def unpacked(folder: Path, name: str, to: Path) -> Path:
 def test_walks_are_the_converged_ones(
     case: str, model: str, trial: str, setup: str, shared: Path, tmp_path: Path
 ) -> None:
-    """Two gait models with their weights and goals, against another solver's minima, converged to 1e-10 rad."""
+    """Compare two gait models with marker weights and coordinate goals to minima of another solver.
+
+    The reference is converged to 1e-10 rad.
+    """
     reference = shared / "oracle" / "tools" / "reference"
     human = osimlite.read(unpacked(reference / "models", f"{model}.osim", tmp_path))
     tasks: Any = osimlite.read_document(reference / case / setup).ik_task_set.objects
@@ -88,7 +97,7 @@ def test_walks_are_the_converged_ones(
 
 
 def test_files_and_arrays_are_the_same(tmp_path: Path) -> None:
-    """Metres and millimetres; the errors are those of the markers."""
+    """Files in metres and millimetres and arrays give the same poses, and small marker errors."""
     values = motion()
     places = positions(values)
     times = np.linspace(0.0, 1.0, len(values)).tolist()
@@ -109,7 +118,7 @@ def test_files_and_arrays_are_the_same(tmp_path: Path) -> None:
 
 
 def test_the_frame_solver_finds_the_same_poses() -> None:
-    """One frame at a time, with gaps; it begins anew when told."""
+    """The solver takes one frame at a time, with gaps, and starts anew after `reset`."""
     places = positions(motion())
     places[7, :2] = np.nan
     model = free_body()
@@ -130,7 +139,7 @@ def test_the_frame_solver_finds_the_same_poses() -> None:
 
 
 def test_a_gap_is_bridged_by_what_is_seen() -> None:
-    """Where three markers of four are seen nothing is lost, and a frozen or swapped marker is an error to be seen."""
+    """Three visible markers of four determine the pose; a frame with swapped markers has the largest error."""
     values = motion()
     places = positions(values)
     places[5:9, 2] = np.nan
@@ -146,7 +155,7 @@ def test_a_gap_is_bridged_by_what_is_seen() -> None:
 
 
 def test_weights_count() -> None:
-    """A marker of weight 0 is reported and does not pull."""
+    """A marker of weight 0 has an error, but no influence."""
     places = positions(motion(3))
     places[:, 3] += 1.0
     result = osimlite.inverse_kinematics(free_body(), as_arrays(places), weights={"four": 0.0})
@@ -176,7 +185,7 @@ def test_weights_count() -> None:
     ],
 )
 def test_damaged_files_are_told(change: Any, sentence: str, tmp_path: Path) -> None:
-    """One sentence, with the file and the line."""
+    """The error is one sentence with the file and the line."""
     path = tmp_path / "trial.trc"
     write_trc(path, [0.0, 0.5, 1.0], MARKERS, positions(motion(3)).reshape(3, -1).tolist())
     path.write_text(change(path.read_text()))
@@ -185,7 +194,7 @@ def test_damaged_files_are_told(change: Any, sentence: str, tmp_path: Path) -> N
 
 
 def test_what_cannot_be_fitted_is_told() -> None:
-    """Names and times that are not there."""
+    """Names and times that do not exist are reported."""
     places = as_arrays(positions(motion(3)))
     model = free_body()
     with pytest.raises(OsimliteError, match=r"no marker of the data \(hip\) is one of the model"):
@@ -205,7 +214,7 @@ def test_what_cannot_be_fitted_is_told() -> None:
 
 
 def test_one_marker_at_ten_hertz_is_followed() -> None:
-    """The pose moves no further than the marker asks for."""
+    """A single marker does not determine the pose; changes between frames stay small."""
     places = positions(motion(10))
     result = osimlite.inverse_kinematics(free_body(), {"one": places[:, 0]})
     assert result.marker_errors.max() < 1e-7
@@ -213,7 +222,7 @@ def test_one_marker_at_ten_hertz_is_followed() -> None:
 
 
 def test_markers_of_a_table(tmp_path: Path) -> None:
-    """OpenSim's own table of model markers is taken as data."""
+    """OpenSim's own table of model markers is accepted as data."""
     from osimlite.io.tables.storage import write_sto
 
     places = positions(motion(4))
@@ -229,7 +238,7 @@ def test_markers_of_a_table(tmp_path: Path) -> None:
 def test_c3d_files_need_a_package_of_their_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And say which."""
+    """The error names the package."""
     monkeypatch.setitem(sys.modules, "ezc3d", None)
     (tmp_path / "walk.c3d").write_bytes(b"")
     with pytest.raises(MissingDependency, match="pip install ezc3d"):
@@ -237,7 +246,7 @@ def test_c3d_files_need_a_package_of_their_own(
 
 
 def test_c3d_files_are_read() -> None:
-    """In their unit, with their rate; what was not seen is NaN."""
+    """Unit and rate of the file are used; a marker that was not seen is NaN."""
     pytest.importorskip("ezc3d")
     data = MarkerData.from_source(TRIALS / "two_markers.c3d")
     frames = np.arange(5.0)

@@ -1,4 +1,4 @@
-"""A model that fits a person: made-up persons are found again."""
+"""Tests of `fit`: sizes and marker positions of simulated persons are recovered."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 @pytest.mark.parametrize("seed", range(3))
 def test_somebody_is_found_again(seed: int) -> None:
-    """With 5 mm of noise: sizes to 1 %, places of markers to 3 mm."""
+    """With noise of 5 mm, sizes are recovered to 1 % and displacements of markers to 3 mm."""
     data, offsets = person(seed, 0.005, 200)
     model = marked()
     text = osimlite.to_text(model)
@@ -46,7 +46,7 @@ def test_somebody_is_found_again(seed: int) -> None:
 
 
 def test_two_sides_are_one_unless_asked() -> None:
-    """Of one side alone the markers say what both are."""
+    """Without markers on one shank, its size is that of the other side."""
     data, _ = person(5)
     only = {name: place for name, place in data.items() if not name.startswith("LeftShank")}
     together = fit(marked(), {"moving": only}, held=HELD)
@@ -58,7 +58,7 @@ def test_two_sides_are_one_unless_asked() -> None:
 
 
 def test_a_marker_that_was_taken_for_another_is_left_out() -> None:
-    """And told, with the trial."""
+    """Swapped markers are left out in those frames, and a note names marker and trial."""
     data, _ = person(7, 0.002)
     one, two = "LeftShank_upper", "RightShank_upper"
     data[one][10:13], data[two][10:13] = data[two][10:13] + 0.3, data[one][10:13] - 0.3
@@ -70,7 +70,7 @@ def test_a_marker_that_was_taken_for_another_is_left_out() -> None:
 
 
 def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
-    """Whatever the joints are: to the last digits."""
+    """Positions are linear in the scale factors, with exactly the computed derivatives, for all types of joints."""
     model = osimlite.read(FIXTURES / "kinematics" / "mixed_joint_tree.osim")
     bodies = [body for body in model.components(osimlite.Body)]
     for body in bodies:
@@ -96,7 +96,7 @@ def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
 
 
 def test_bodies_without_markers_go_with_others() -> None:
-    """The talus with the foot, the patella with the thigh."""
+    """The talus is scaled with the foot, and the patella with the thigh."""
     carriers = {
         "pelvis": "ground",
         "femur_r": "pelvis",
@@ -131,7 +131,7 @@ def test_bodies_without_markers_go_with_others() -> None:
     ],
 )
 def test_names_of_sides(one: str, other: str) -> None:
-    """As models have them."""
+    """Names of sides follow the conventions of public models."""
     names = {one: 0, other: 1, "torso": 2, "rotor": 3}
     assert (get_opposite_name(one, names), get_opposite_name(other, names)) == (other, one)
     assert (
@@ -141,7 +141,7 @@ def test_names_of_sides(one: str, other: str) -> None:
 
 
 def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
-    """With the tool for scaling, from the generic file."""
+    """The scale tool creates the same model from the generic file."""
     data, _ = person(2)
     model = marked()
     osimlite.write(model, tmp_path / "generic.osim")
@@ -174,7 +174,7 @@ def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_fitted_is_told(given: dict[str, Any], words: str) -> None:
-    """In one sentence."""
+    """The error is one sentence."""
     trials = given.pop("trials", None)
     with pytest.raises(OsimliteError, match=words) as caught:
         fit(marked(), {"moving": person(0)[0]} if trials is None else trials, **given)
@@ -182,7 +182,7 @@ def test_what_cannot_be_fitted_is_told(given: dict[str, Any], words: str) -> Non
 
 
 def test_markers_that_stand_still_are_no_reason_to_fail() -> None:
-    """All frozen: the sizes are what the distances say, within what is likely."""
+    """Frames without motion determine sizes by distances of markers only, within plausible limits."""
     data, _ = person(1)
     frozen = {name: np.tile(rows[0], (20, 1)) for name, rows in data.items()}
     result = fit(marked(), {"still": frozen}, held=HELD)
@@ -191,7 +191,7 @@ def test_markers_that_stand_still_are_no_reason_to_fail() -> None:
 
 
 def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
-    """Markers there say how large such bodies are."""
+    """Markers on bodies that are welded to ground determine the size of these bodies."""
     model = osimlite.Model(name="stand")
     post = osimlite.Body(name="post", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     arm = osimlite.Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))

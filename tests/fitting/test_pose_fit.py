@@ -1,4 +1,4 @@
-"""Poses that fit best: derivatives of their cost, that they are minima, constraints, ranges, and what is missing."""
+"""Tests of pose fitting: derivatives of the cost, minima, constraints, ranges and missing measurements."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.simple_models import make_marked_body
 from tests.suite import choose
 
 ROUND = "ConstantCurvatureJoint"
-"""Its functions of several coordinates are bent, which Newton's matrix leaves out."""
+"""Joint whose coordinates interact nonlinearly; the solver's Newton matrix neglects these second derivatives."""
 
 
 def rotation_class() -> Any:
@@ -39,7 +39,13 @@ def rotation_class() -> Any:
 
 
 def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) -> list[MarkerTarget]:
-    """Some markers on every body."""
+    """Return markers at random positions on every body.
+
+    Args:
+        mechanism: the mechanism.
+        rng: source of random numbers.
+        each: number of markers per body.
+    """
     return [
         MarkerTarget(
             StationPlacement(body, rng.uniform(-0.3, 0.3, 3)), float(rng.uniform(0.2, 5.0))
@@ -50,7 +56,7 @@ def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) ->
 
 
 def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
-    """Cost, gradient and second derivative at a pose, in the order of the fit."""
+    """Return cost, gradient and second derivative at a pose, in the order of the fit's coordinates."""
     system, shape = fit.system, fit.layout
     size = len(fit.order)
     m = pose_record.Fit(
@@ -77,7 +83,7 @@ def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
 @given(cases(max_bodies=4), st.integers(0, 99))
 @settings(max_examples=25)
 def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
-    """Gradient and second derivative against differences, with markers, a goal and a marker that is not seen."""
+    """Compare gradient and Hessian with differences, for markers, a goal and a marker that is not visible."""
     mechanism, rng = case.mechanism, np.random.default_rng(seed)
     if not mechanism.coordinates:
         return
@@ -100,7 +106,7 @@ def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
 
 
 def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[SensorTarget]:
-    """A sensor on every body and one in ground."""
+    """Return a sensor on every body and one in ground, with random orientations and weights."""
     return [
         SensorTarget(
             FramePlacement(body, make_transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))),
@@ -111,7 +117,7 @@ def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[SensorTar
 
 
 def orientations_at(mechanism: Mechanism, sensors: list[SensorTarget], q: Any) -> Any:
-    """How the sensors are turned (k, 3, 3)."""
+    """Return the orientations of the sensors (k, 3, 3) at a pose."""
     state = mechanism.at(q)
     return np.array(
         [
@@ -122,14 +128,14 @@ def orientations_at(mechanism: Mechanism, sensors: list[SensorTarget], q: Any) -
 
 
 def turns_between(wanted: Any, found: Any) -> Any:
-    """The turns (k, 3) in ground that take rotations to others, rad."""
+    """Return the rotation vectors (k, 3) in ground that rotate `wanted` into `found` (rad)."""
     return rotation_class().from_matrix(found @ np.swapaxes(wanted, -1, -2)).as_rotvec()
 
 
 @given(cases(max_bodies=4), st.integers(0, 99), st.floats(0.0, 2.9))
 @settings(max_examples=25)
 def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, far: float) -> None:
-    """Gradient and second derivative against differences, with sensors that are turned far, and one that is silent."""
+    """Compare gradient and Hessian with differences, for sensors with large errors and a sensor without data."""
     mechanism, rng = case.mechanism, np.random.default_rng(seed)
     if not mechanism.coordinates:
         return
@@ -143,7 +149,7 @@ def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, 
     fit = PoseFit(mechanism, [], sensors, code=PYTHON_CODE)
     frame = measured.ravel()
     value, slope, second = derivatives(fit, frame, case.q)
-    # OpenSim's own: half the weighted mean of the squared angles.
+    # OpenSim's cost is half the weighted mean of the squared angles.
     assert value == pytest.approx(0.5 * far**2, rel=1e-9, abs=1e-15)
     for number, place in enumerate(fit.order):
         step = np.zeros(len(case.q))
@@ -163,7 +169,7 @@ def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, 
 )
 @settings(max_examples=choose(20, 40))
 def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, kind: str) -> None:
-    """No direction that the constraints leave free leads down."""
+    """No direction that the constraints permit decreases the cost."""
     mechanism, rng = case.mechanism, np.random.default_rng(seed)
     if not mechanism.coordinates or (kind and len(mechanism.bodies) < 2):
         return
@@ -214,7 +220,7 @@ def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, k
 
 
 def test_python_and_machine_code_find_the_same_poses() -> None:
-    """The kernels are the same functions."""
+    """Python and machine code are the same kernels."""
     case = _free_body()
     markers = markers_of(case, np.random.default_rng(1))
     rng = np.random.default_rng(2)
@@ -228,12 +234,12 @@ def test_python_and_machine_code_find_the_same_poses() -> None:
 
 
 def _free_body() -> Mechanism:
-    """One free body."""
+    """Return a mechanism of one free body."""
     return osimlite.mechanism(make_marked_body({}))
 
 
 def _pendulum(**changes: Any) -> Mechanism:
-    """Two pins a metre apart, the second with changes of its coordinate."""
+    """Return a double pendulum with links of one metre; `changes` apply to the second coordinate."""
     model = Model(name="two")
     last: Any = model.ground
     for number in range(2):
@@ -259,7 +265,7 @@ ARM = [
 
 
 def test_a_clamped_coordinate_stays_in_its_range() -> None:
-    """And the other one is where it is best beside that."""
+    """The other coordinate minimizes the cost within this limit."""
     free, clamped = _pendulum(), _pendulum(clamped=True, range=(-0.5, 0.25))
     markers = [*ARM, MarkerTarget(StationPlacement(0, np.array((1.0, 0.0, 0.0))))]
     measured = places_at(free, markers, np.array((0.3, 0.9))).reshape(1, -1)
@@ -276,7 +282,7 @@ def test_a_clamped_coordinate_stays_in_its_range() -> None:
 
 
 def test_a_range_of_what_depends_bounds_what_it_depends_on() -> None:
-    """A coupler's coordinate is clamped: the other one stops where it reaches its end."""
+    """The dependent coordinate of a coupler is clamped: the independent one stops where the dependent one ends."""
     mechanism = _pendulum(clamped=True, range=(-0.4, 0.4))
     mechanism = replace(mechanism, constraints=(Coupler(1, (0,), f.Linear(2.0, 0.1)),))
     measured = places_at(_pendulum(), ARM, np.array((0.5, 1.1))).reshape(1, -1)
@@ -286,7 +292,7 @@ def test_a_range_of_what_depends_bounds_what_it_depends_on() -> None:
 
 
 def test_locked_and_prescribed_coordinates_are_held() -> None:
-    """At the default, and at the function of time."""
+    """A locked coordinate keeps its default, and a prescribed one follows its function of time."""
     measured = places_at(_pendulum(), ARM, np.array((0.3, 0.9))).reshape(1, -1)
     locked = PoseFit(_pendulum(locked=True, default_value=0.7), ARM).fit_frames(measured)
     assert locked.values[0, 1] == 0.7
@@ -297,7 +303,7 @@ def test_locked_and_prescribed_coordinates_are_held() -> None:
 
 
 def test_goals_pull_coordinates() -> None:
-    """A goal of a locked coordinate does nothing; NaN is no goal."""
+    """A goal of a locked coordinate has no effect, and NaN means no goal."""
     mechanism = _pendulum()
     measured = places_at(mechanism, ARM, np.array((0.3, 0.9))).reshape(-1)
     fit = PoseFit(mechanism, ARM, goals=[CoordinateTarget(1, 1e6)])
@@ -310,7 +316,7 @@ def test_goals_pull_coordinates() -> None:
 
 
 def test_what_is_not_seen_leaves_the_pose_as_it_was() -> None:
-    """Nothing seen: the pose before. One marker: the nearest pose that fits it."""
+    """A frame without data keeps the previous pose; with one marker, the nearest pose that fits it is found."""
     mechanism = _free_body()
     markers = markers_of(mechanism, np.random.default_rng(0))
     pose = np.array((0.3, -0.2, 0.1, 0.5, 0.6, 0.7))
@@ -327,7 +333,7 @@ def test_what_is_not_seen_leaves_the_pose_as_it_was() -> None:
 
 
 def test_nothing_seen_from_the_beginning_is_the_start() -> None:
-    """All frames are empty."""
+    """All frames are without data."""
     poses = PoseFit(_free_body(), markers_of(_free_body(), np.random.default_rng(0))).fit_frames(
         np.full((3, 9), np.nan), q=np.arange(6.0)
     )
@@ -336,7 +342,7 @@ def test_nothing_seen_from_the_beginning_is_the_start() -> None:
 
 @pytest.mark.parametrize("far", [0.0, 1.5, 3.0])
 def test_sensors_turn_bodies(far: float) -> None:
-    """Rotations are fitted exactly where that is possible, from near and from far."""
+    """Rotations are fitted exactly where that is possible, from near and far starting poses."""
     mechanism = _free_body()
     frame = make_transform(rotation_xyz(np.array((0.2, 0.5, -0.3))), (0.1, 0.0, 0.0))
     pose = np.array((0.4 + far, 0.3, 0.2, 0.0, 0.0, 0.0))
@@ -356,7 +362,7 @@ def test_sensors_turn_bodies(far: float) -> None:
 def test_a_sensor_that_is_half_a_turn_off_is_found(
     axis: tuple[float, float, float], short: float
 ) -> None:
-    """A cost without a slope is none: whichever way round, the whole half turn counts."""
+    """At an error of half a turn the gradient vanishes or is ambiguous, but the pose is no minimum."""
     mechanism = _free_body()
     sensor = SensorTarget(FramePlacement(0, np.eye(4)))
     wanted = rotation_class().from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
@@ -371,7 +377,7 @@ def test_a_sensor_that_is_half_a_turn_off_is_found(
 
 
 def test_markers_and_sensors_count_as_shares() -> None:
-    """The cost is the mean of the markers and the mean of the sensors; the turns that are left are told."""
+    """The cost is the sum of the means over markers and over sensors; remaining rotations are reported."""
     mechanism, rng = _free_body(), np.random.default_rng(5)
     markers, sensors = (
         markers_of(mechanism, rng),
@@ -398,7 +404,7 @@ def test_markers_and_sensors_count_as_shares() -> None:
 
 
 def test_a_jump_is_followed() -> None:
-    """Positions that leap from one frame to the next are fitted in each of them."""
+    """Positions that jump from one frame to the next are fitted in each frame."""
     mechanism = _free_body()
     markers = markers_of(mechanism, np.random.default_rng(3))
     poses = np.array(
@@ -416,7 +422,7 @@ def test_a_jump_is_followed() -> None:
 
 @pytest.mark.parametrize("goal", [False, True])
 def test_the_first_pose_has_no_whole_turns(goal: bool) -> None:
-    """Wherever a body is turned to, its angles are those within half a turn of where the fit began."""
+    """For any orientation of the body, the angles stay within half a turn of the starting pose."""
     model, body = (
         Model(name="arm"),
         Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
@@ -440,7 +446,7 @@ def test_the_first_pose_has_no_whole_turns(goal: bool) -> None:
 
 
 def test_a_subject_may_face_anywhere() -> None:
-    """A range that ends just before half a turn is no wall on the way to the first pose."""
+    """A range that ends just before half a turn does not stop the search for the first pose."""
     free = _free_body()
     infos = tuple(replace(info, clamped=True, range=(-3.14, 3.14)) for info in free.coordinates[:3])
     mechanism = replace(free, coordinates=(*infos, *free.coordinates[3:]))

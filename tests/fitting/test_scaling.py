@@ -1,4 +1,4 @@
-"""Scaling: what each class declares, masses and inertias, measurements, and OpenSim's own scaled model."""
+"""Tests of scaling: rules of classes, masses and inertias, measurements, and OpenSim's scaled model."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CASE = "oracle/tools/reference/scale_gait2354"
 
 
 def test_every_rule_is_about_a_property_that_is_there() -> None:
-    """And about a frame, a socket, or a path."""
+    """Each rule refers to a property, and to a frame, a socket or a path."""
     count = 0
     for name, module in MODULES.items():
         cls = getattr(import_module(module), name)
@@ -38,7 +38,7 @@ def test_every_rule_is_about_a_property_that_is_there() -> None:
 
 @pytest.fixture
 def setup(shared: Path, tmp_path: Path) -> Path:
-    """The setup of a gait model beside the files that it names."""
+    """Copy the setup of a gait model and the files that it names."""
     for source in (shared / CASE).iterdir():
         data = source.read_bytes()
         name = source.name.removesuffix(".gz")
@@ -57,7 +57,7 @@ def setup(shared: Path, tmp_path: Path) -> Path:
 
 
 def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
-    """Model and factors by meaning, and a pose of the subject that is no worse than OpenSim's."""
+    """Compare model and factors with OpenSim's; the pose of the subject must have no larger errors than OpenSim's."""
     tool: Any = osimlite.read_document(setup / "their_scale.xml")
     result = compute_scaled_model(tool, setup)
     ours = osimlite.read_text(result.texts[tool.model_scaler.output_model_file])
@@ -65,7 +65,7 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
     theirs: Any = osimlite.read_document(setup / "their_subject01_scaleSet_applied.xml")
     assert result.measured is not None and result.placed is not None
     for scale in theirs.objects:
-        # OpenSim prints six digits of these.
+        # OpenSim prints six digits of the factors.
         assert result.measured.factors[scale.segment] == pytest.approx(scale.scales, rel=1e-5)
     assert (
         result.measured.notes[0]
@@ -93,7 +93,7 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
 
 
 def body_model() -> osimlite.Model:
-    """A thigh with two markers on its ends and a shank below."""
+    """Return a model of a thigh with markers at its two ends."""
     model = osimlite.Model(name="leg")
     thigh = osimlite.Body(
         name="thigh",
@@ -118,7 +118,7 @@ LENGTH = {"length": ([("top", "bottom")], {"thigh": "Y"})}
 
 
 def test_distances_of_markers_scale_bodies() -> None:
-    """The mean over the frames, along the axes that are named; the model given stays as it is."""
+    """The factor is the mean over the frames, along the named axes; the input model is not changed."""
     model = body_model()
     result = osimlite.scale(model, STATIC, measurements=LENGTH)
     assert result.measured is not None and result.measured.ratios == {
@@ -137,7 +137,7 @@ def test_distances_of_markers_scale_bodies() -> None:
 
 
 def test_markers_are_placed_where_they_were_measured() -> None:
-    """In the pose that fits them; fixed ones stay."""
+    """Markers move to their measured positions in the fitted pose; fixed markers stay."""
     model = body_model()
     model["/markerset/top"].fixed = True
     result = osimlite.scale(model, STATIC, measurements=LENGTH, place=True)
@@ -149,7 +149,7 @@ def test_markers_are_placed_where_they_were_measured() -> None:
 
 
 def test_inertia_of_equal_factors_is_exact() -> None:
-    """It goes by the square of the factor, and by the mass."""
+    """Inertia scales with the square of the factor and with the mass."""
     model = body_model()
     scale_model(model, {"thigh": (1.1, 1.1, 1.1)})
     assert model["/bodyset/thigh"].inertia == pytest.approx(
@@ -163,7 +163,7 @@ def test_inertia_of_equal_factors_is_exact() -> None:
 
 
 def test_what_cannot_be_scaled_is_told() -> None:
-    """Names that are not there, markers that are missing, ranges that are empty."""
+    """Unknown names, missing markers and empty ranges are reported."""
     model = body_model()
     with pytest.raises(SettingError, match="no body 'tigh'; did you mean 'thigh'"):
         osimlite.scale(model, factors={"tigh": 1.2})
@@ -210,6 +210,6 @@ def test_what_cannot_be_scaled_is_told() -> None:
 def test_frames_of_a_range_are_those_of_opensim(
     first: float, last: float, frames: tuple[int, int]
 ) -> None:
-    """The last one not after the beginning to the first one not before the end."""
+    """OpenSim takes the last frame not after the beginning to the first frame not before the end."""
     result = select_frames(np.arange(4.0), first, last)
     assert (result.start, result.stop) == frames

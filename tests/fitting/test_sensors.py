@@ -1,4 +1,4 @@
-"""Orientations of sensors: reading them, putting sensors onto a model, and what is told where something is missing."""
+"""Tests of orientation sensors: reading data, placing sensors on a model, and messages about missing data."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PLACER = """<OpenSimDocument Version="40600">
 
 
 def leg() -> osimlite.Model:
-    """A thigh and a shank."""
+    """Return a model of a thigh and a shank."""
     model = osimlite.Model(name="leg")
     carrier: Any = model.ground
     for name, joint in (("thigh", osimlite.FreeJoint), ("shank", osimlite.PinJoint)):
@@ -54,13 +54,13 @@ def leg() -> osimlite.Model:
 
 
 def turned(*angles: float) -> Any:
-    """A rotation matrix."""
+    """Return the rotation matrix of body-fixed X-Y-Z angles (rad)."""
     return rotation_xyz(np.array(angles))
 
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Path:
-    """A model, the setup of a placer, and the orientations of a subject that stands."""
+    """Write a model, the setup of an IMU placer, and the orientations of a standing subject."""
     osimlite.write(leg(), tmp_path / "leg.osim")
     rows = [[*quaternion_of(turned(0.1, 0.5, 0.2)), *quaternion_of(turned(0.0, 0.5, 0.0))]]
     write_sto(tmp_path / "standing.sto", "s", [0.0], ["thigh_imu", "shank_imu"], np.array(rows).reshape(1, -1),
@@ -168,7 +168,7 @@ def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
 
 
 def worn() -> osimlite.Model:
-    """The leg with sensors and markers."""
+    """Return the leg with sensors and markers."""
     model = leg()
     place_sensors(
         model,
@@ -187,7 +187,15 @@ def worn() -> osimlite.Model:
 
 
 def measured(model: osimlite.Model, count: int = 8) -> tuple[Any, dict[str, Any], dict[str, Any]]:
-    """Poses (t, 7), and what sensors and markers make of them."""
+    """Compute measurements of a smooth motion.
+
+    Args:
+        model: the leg with sensors and markers.
+        count: number of frames.
+
+    Returns:
+        Poses (t, 7), quaternions by sensor, and positions by marker.
+    """
     mechanism, t = osimlite.mechanism(model), np.linspace(0.0, 1.0, count)[:, None]
     poses = 0.4 * np.sin(3.0 * t + np.arange(7.0))
     sensors = {
@@ -244,7 +252,7 @@ def test_orientations_are_fitted_and_translations_stay(lab: Path) -> None:
 
 
 def test_markers_and_orientations_are_fitted_together() -> None:
-    """A sensor of weight 0 is reported and does not pull; markers tell where the model is."""
+    """A sensor of weight 0 has an error, but no influence; markers determine the position of the model."""
     model = worn()
     poses, sensors, places = measured(model)
     sensors["thigh_imu"] = quaternion_of(turned(0.5, 0.0, 0.0) @ rotation_of(sensors["thigh_imu"]))
@@ -313,7 +321,7 @@ def test_what_cannot_be_fitted_is_told() -> None:
 def test_frames_with_many_sensors_missing_reach_their_best_pose(
     corpus: Any, tmp_path: Path
 ) -> None:
-    """Where poses look nearly alike and coordinates are at ends of their ranges, some hundred steps were not enough."""
+    """Nearly equal poses and coordinates at the ends of their ranges once needed more than some hundred steps."""
     path = next(result.converted for result in corpus if result.id == "m0954")
     (tmp_path / "model.osim").write_bytes(gzip.decompress(path.read_bytes()))
     model = osimlite.read(tmp_path / "model.osim")

@@ -1,4 +1,4 @@
-"""Subjects that turn around: a clamped angle comes to an end of its range, and goes on at the other."""
+"""Tests of subjects that turn around: at one end of its range, a clamped angle continues at the other end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.suite import choose
 
 
 def fitted(model: osimlite.Model, places: Any) -> Any:
-    """The motion that fits."""
+    """Return the result of inverse kinematics for these marker positions (t, m, 3)."""
     names = [marker.name for marker in model.components(osimlite.Marker)]
     return osimlite.inverse_kinematics(model, {name: places[:, k] for k, name in enumerate(names)})
 
@@ -23,7 +23,7 @@ def fitted(model: osimlite.Model, places: Any) -> Any:
     ("low", "high"), [(-180.0, 180.0), (-200.0, 200.0), (0.0, 360.0), (-180.0, 540.0)]
 )
 def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way: float) -> None:
-    """Twice around and back; nothing is lost on the way, and no coordinate leaps without need."""
+    """After two turns and back, the fit is exact, and coordinates jump only at the ends of the range."""
     angles = way * np.concatenate([np.arange(100.0, 760.0, 8.0), np.arange(760.0, 100.0, -30.0)])
     model = turner(low, high)
     _, _, places = trial_of(model, poses(angles))
@@ -34,7 +34,7 @@ def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way:
     off = facing - angles
     assert off == pytest.approx(360.0 * np.round(off / 360.0), abs=1e-6)
     leaps = np.flatnonzero(np.abs(np.diff(facing)) > 31.0)
-    # Only where going on would leave the range.
+    # A jump is necessary only if continuing would leave the range.
     on = facing[leaps] + np.diff(angles)[leaps]
     assert ((on < low) | (on > high)).all()
     others = np.delete(result.values, FACING, axis=1)
@@ -44,7 +44,7 @@ def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way:
 @pytest.mark.parametrize("turning", [0, 1, 2])
 @pytest.mark.parametrize("widest", [90.0, 180.0])
 def test_who_turns_over_is_followed(turning: int, widest: float) -> None:
-    """Head over heels, sideways or on the spot: the ranges of the three angles leave no rotation out."""
+    """The ranges of the three angles contain all orientations, so turns about any axis are followed."""
     model = turner(-180.0, 180.0)
     steps = np.arange(0.0, 720.0, 8.0)
     values = poses(steps)
@@ -61,7 +61,7 @@ def test_who_turns_over_is_followed(turning: int, widest: float) -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(-170.0, 170.0), (-90.0, 90.0), (-180.0, 180.0)])
 def test_every_frame_is_at_the_least_of_all_minima(low: float, high: float) -> None:
-    """Against a search from all around, also where the range leaves out a part of the turn."""
+    """Compare with minima from several starting angles, also where the range excludes part of the turn."""
     angles = np.arange(60.0, 420.0, choose(75.0, 25.0))
     model = turner(low, high)
     mechanism, stations, places = trial_of(model, poses(angles), 0.005)
@@ -77,7 +77,7 @@ def test_every_frame_is_at_the_least_of_all_minima(low: float, high: float) -> N
                 np.array([state.point(*station) for station in stations]) - wanted
             ).ravel() / np.sqrt(len(stations))
 
-        # Collecting the tests does not need it, and would wait for its import.
+        # Import here: collecting the tests does not need SciPy, whose import is slow.
         from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
         least = np.inf

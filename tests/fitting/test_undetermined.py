@@ -1,4 +1,4 @@
-"""Coordinates that no measurement determines are named, and keep their default values."""
+"""Tests of coordinates that no measurement determines: they are named, and keep their default values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,13 @@ MARKERS = ("ASI", "PSI", "SAC", "THI", "KNE", "TIB", "ANK", "TOE")
 
 
 def fit(model: Path, markers: tuple[str, ...], **options: Any):
-    """Fit the walk of a lab to some of its markers."""
+    """Fit the walk of a lab to some of its markers.
+
+    Args:
+        model: model file.
+        markers: names of the markers.
+        options: options of inverse kinematics.
+    """
     data = MarkerData.from_source(LABS / "unseen" / "walk.trc")
     arrays = {
         name: data.positions[:, place] for place, name in enumerate(data.names) if name in markers

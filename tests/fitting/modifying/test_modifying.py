@@ -1,4 +1,4 @@
-"""Models changed as a whole: words, operators, fitted paths, smooth contact."""
+"""Tests of `modify`: its options, operators of OpenSim, fitted paths and smooth contact."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_what_is_none_is_refused(words: tuple[str, str], message: str) -> None:
 
 
 def test_fitted_paths_are_what_they_are_said_to_be() -> None:
-    """Lengths and moment arms in poses that were not fitted to."""
+    """Compare lengths and moment arms in poses that were not used for the fit."""
     model = jumper()
     fitted = {item.path.name: item for item in fit_paths(model, poses=300)}
     changed = modify(model, replace=[("paths", "polynomial")])
@@ -82,7 +82,7 @@ def test_fitted_paths_are_what_they_are_said_to_be() -> None:
 
 
 def test_contact_becomes_smooth() -> None:
-    """Deep in the ground both push alike."""
+    """In deep contact, both contact models give similar motions."""
     model = furthest_walker()
     for force in list(model.components(osimlite.HuntCrossleyForce)):
         if "Foot" not in force.name:
