@@ -1,4 +1,4 @@
-"""The component tree of real files equals OpenSim's: every path and class, in the same order."""
+"""Compare the component trees of corpus models with OpenSim's: every path and class, in the same order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Real models: both engines find the accelerations that the recursion of this package finds, under their forces."""
+"""Compare accelerations of both engines with osimlite's recursive algorithm on corpus models."""
 
 from __future__ import annotations
 
@@ -28,7 +28,11 @@ def largest_difference(ours, expected):
 
 
 def state_near(mechanism, seed):
-    """A little beside the default values, locked coordinates still."""
+    """Return a random state near the default one, with locked coordinates at rest.
+
+    Returns:
+        Coordinates and speeds.
+    """
     rng = np.random.default_rng(seed)
     q = np.array([info.default_value for info in mechanism.coordinates])
     free = np.array([not info.locked for info in mechanism.coordinates])
@@ -41,7 +45,7 @@ def test_same_accelerations(corpus_model):
         pytest.skip("OpenSim cannot load this file")
     model = read_text(gzip.decompress(corpus_model.converted.read_bytes()).decode())
     mechanism = build_mechanism(model)
-    # Those with constraints have a test of their own.
+    # Other tests cover constraints.
     locks = tuple(item for item in mechanism.constraints if isinstance(item, Lock))
     mechanism = replace(mechanism, constraints=locks)
     bare = CompiledEngine(mechanism, Forces(()))
@@ -109,7 +113,10 @@ def test_same_accelerations_under_constraints(corpus_model):
 
 
 def conditioning(mechanism):
-    """How many times more than usual rounding counts: a thousandth of the condition of the mass matrix, or 1."""
+    """Return the factor by which rounding errors may exceed the usual tolerance.
+
+    It is a thousandth of the condition number of the scaled mass matrix, at least 1.
+    """
     q, _ = state_near(mechanism, 0)
     matrix = mechanism.mass_matrix(q)
     free = [

@@ -1,4 +1,7 @@
-"""Real files of all versions in one layout: they say what they said before, to us and to OpenSim."""
+"""Check that formatting corpus files of all versions keeps their meaning.
+
+The comparison is made with osimlite's reader and with OpenSim.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from tests.conftest import CorpusModel
 
 
 def layout(corpus_model: CorpusModel) -> str:
-    """The text of a real file in our layout; the test is skipped if it holds no model."""
+    """Return a corpus file in osimlite's layout; skip the test if the file holds no model."""
     try:
         return format_document(Source.from_file(corpus_model.path))
     except DocumentError as fault:
@@ -26,7 +29,13 @@ def layout(corpus_model: CorpusModel) -> str:
 
 
 def words(source: Source) -> tuple[int, str]:
-    """The version of a document and what it says, white space aside, which classes of plug-ins keep."""
+    """Read a document for a comparison of its content.
+
+    White space is normalised, because classes of plug-ins keep theirs.
+
+    Returns:
+        The version and the printed content.
+    """
     document = read_document(source, expected_class=Object)
     return document.version, re.sub(
         r"\s+", " ", re.sub(r"\s*([<>])\s*", r"\1", to_text(document.top))
@@ -35,7 +44,7 @@ def words(source: Source) -> tuple[int, str]:
 
 def test_the_same_is_said_and_nothing_changes_twice(corpus_model: CorpusModel) -> None:
     text = layout(corpus_model)
-    # What is included lies beside the file.
+    # Name the source like the file, so that included files are found in its folder.
     again = Source(text.encode(), str(corpus_model.path))
     assert words(again) == words(Source.from_file(corpus_model.path))
     assert format_document(again) == text
@@ -59,6 +68,6 @@ def test_opensim_reads_the_same(corpus_model: CorpusModel, tmp_path: Path) -> No
             model.printToXML(str(tmp_path / "printed"))
             prints.append((tmp_path / "printed").read_bytes())
         except RuntimeError as error:
-            # One model it loads and cannot print.
+            # OpenSim can load but not print one of the models. Then the errors must agree.
             prints.append(str(error).encode())
     assert prints[0] == prints[1]

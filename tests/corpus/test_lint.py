@@ -1,4 +1,8 @@
-"""Real files: no error where OpenSim does what the file says, and the reason where OpenSim refuses it."""
+"""Check the linter's errors on corpus models.
+
+There must be no error where OpenSim does what the file says, and the right error where OpenSim
+rejects the file.
+"""
 
 from __future__ import annotations
 
@@ -11,24 +15,24 @@ from osimlite.lint import validate
 from tests.conftest import CorpusModel
 
 PROVED = {
-    # Massless fingers at the end of their chains: the mass matrix is singular, accelerations are
-    # NaN.
+    # Massless fingers end a chain: the mass matrix is singular, and accelerations are NaN.
     "m0109": {"OSIM407"},
-    # derivative_smoothing is no property of the class: OpenSim's own print of the file has lost it.
+    # The class has no property derivative_smoothing: it is missing in OpenSim's own print of the
+    # file.
     "m0115": {"OSIM101"},
-    # The muscle starts where it ends, on two bodies: OpenSim's acceleration is NaN.
+    # The muscle starts and ends at the same point of two bodies: OpenSim's acceleration is NaN.
     "m0123": {"OSIM541"},
-    # Curves under tags that the muscle does not have any more: OpenSim prints its own defaults in
-    # their place.
+    # The tags of the curves do not belong to the muscle any more: OpenSim prints its default curves
+    # instead.
     "m0117": {"OSIM101"},
-    # enable_controller, false in the file, is no property: OpenSim prints the controller without
-    # <enabled>: it is on.
+    # The file sets enable_controller to false, which is no property: OpenSim prints the controller
+    # without <enabled>, so that it is on.
     "m0189": {"OSIM101"},
-    # <publications> three times: OpenSim prints the first alone.
+    # The file has <publications> three times: OpenSim prints only the first.
     "m0225": {"OSIM104"},
-    # Two joints called 'back': OpenSim has one as /jointset/back_0.
+    # Two joints are named 'back': OpenSim renames one to /jointset/back_0.
     "m0239": {"OSIM311"},
-    # No model in the document: OpenSim loads an empty one.
+    # The document holds no model: OpenSim loads an empty one.
     "m0356": {"OSIM003"},
 }
 
@@ -57,14 +61,13 @@ REASONS = {
     "m0923": ("OSIM102", "<FixationController", "no class 'FixationController'"),
     "m1004": ("OSIM102", "<OrientationSensor", "no class 'OrientationSensor'"),
 }
-"""Of each file that OpenSim refuses: the code, what stands in the line, and words of the message."""
+"""Expected error for each file that OpenSim rejects: code, content of the line, words of the message."""
 
 
 def test_no_error_without_proof(corpus_model: CorpusModel) -> None:
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
-    # The errors among the rules about what is measured are proved in
-    # tests/oracle/test_lint_measures.py.
+    # tests/oracle/test_lint_measures.py verifies the rules that measure paths and muscles.
     report = validate(corpus_model.path, ignore="OSIM63")
     assert {finding.code for finding in report.errors} == PROVED.get(corpus_model.id, set()), str(
         report

@@ -1,4 +1,4 @@
-"""Where the validator thinks bodies are in the default pose is where OpenSim has them."""
+"""Compare the linter's positions of bodies in the default pose with OpenSim's."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""OpenSim's own print of real files, read and printed in its manner, is the same text without its comments.
+"""Check that OpenSim's print of corpus files survives reading and printing byte for byte, except for comments.
 
-There is no exception: every file of the corpus that OpenSim can print comes back byte for byte.
+There is no exception among the files of the corpus that OpenSim can print.
 """
 
 from __future__ import annotations

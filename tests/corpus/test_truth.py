@@ -1,4 +1,4 @@
-"""What real files say, read in whatever version they were published, against what OpenSim makes of them."""
+"""Compare corpus files, read in the version in which they were published, with OpenSim's values."""
 
 from __future__ import annotations
 
@@ -15,14 +15,19 @@ from osimlite.schema.model import Model
 from osimlite.schema.tree import is_a
 from tests.conftest import CorpusModel
 
-# The truth holds 12 significant digits; OpenSim's conversion of old files rounds some values to 6.
+# The reference data have 12 significant digits. OpenSim's upgrade of old files rounds some values
+# to 6 digits.
 DIGITS = 1e-11
 ROUNDED = 1e-5
 
 
 @pytest.fixture
 def file(corpus_model: CorpusModel) -> tuple[Model, dict[str, Any], float]:
-    """A file as published, OpenSim's account of it, and the relative digits in which they must agree."""
+    """Read a corpus file as published.
+
+    Returns:
+        The model, OpenSim's values, and the relative tolerance between them.
+    """
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
     if corpus_model.id == "m0356":

@@ -1,7 +1,7 @@
-"""Real files of old versions, upgraded, equal OpenSim's own conversion: every component, every property.
+"""Compare upgraded corpus files of old versions with OpenSim's conversion: every component and property.
 
-Where the two differ OpenSim loses something or adds what it only computes; `comparison.excepted`
-has every such case.
+Where the two differ, OpenSim loses something or adds what it only computes; `comparison.excepted`
+lists every such case.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.io.document.upgrade.comparison import differences
 
 
 def old(corpus_model: CorpusModel) -> Document:
-    """The document of a real file; the test is skipped if it is of the current version."""
+    """Return the document of a corpus file; skip the test if it has the current version."""
     text = corpus_model.path.read_bytes()
     if b"<OpenSimDocument" not in text or b'Version="40600"' in text[:500]:
         pytest.skip("not an older version")
@@ -28,7 +28,7 @@ def old(corpus_model: CorpusModel) -> Document:
 
 
 def conversion(corpus_model: CorpusModel) -> Model:
-    """OpenSim's conversion of it."""
+    """Return OpenSim's conversion of a corpus file; skip the test if OpenSim cannot load it."""
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
     return read_text(gzip.decompress(corpus_model.converted.read_bytes()))
@@ -59,7 +59,11 @@ def test_a_file_upgraded_is_read_again_equal(corpus_model: CorpusModel) -> None:
 
 
 def test_references_lead_where_opensim_finds_them(corpus_model: CorpusModel) -> None:
-    """An upgrade breaks none; in files that need next to none, those that OpenSim connects have none broken."""
+    """No reference is broken after the upgrade.
+
+    Files since version 40000, which need hardly any upgrade, are skipped if OpenSim cannot connect
+    them.
+    """
     document = old(corpus_model)
     truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))
     tree = document.model.tree()

@@ -1,4 +1,4 @@
-"""Every real model that is a mechanism can be shown."""
+"""Check that every corpus model with a mechanism can be displayed in the viewer."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ def test_a_page_can_be_made(corpus_model) -> None:
     data = page_data(model, scene, None, (), q)
     assert json.loads(json.dumps(data, allow_nan=False))["tree"]
     assert data["size"] > 0.0 and np.isfinite(data["center"]).all()
-    # What is not drawn is a mesh that is not here, or one of the shapes and frames that are not
-    # known.
+    # Parts that are not drawn are missing mesh files, or unsupported shapes and frames.
     for path, said in scene.remarks:
         assert path and any(
             word in said
