@@ -1,4 +1,4 @@
-"""Infinite bounds of a study, which leave no value, are an error before the optimizer starts."""
+"""Check that a Moco study with bounds that admit no value is an error before the optimizer starts."""
 
 from __future__ import annotations
 

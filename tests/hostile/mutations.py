@@ -1,8 +1,8 @@
 """Damage files at random, run a command on each, and look for crashes, hangs and changed files.
 
-One process serves all commands and is started anew when it dies or hangs, so that
-thousands of commands take minutes. `python -m tests.hostile.mutations 500 [--seed 7] [.mot ...]`
-prints the table of all kinds, or of those that are named.
+One process serves all commands and is restarted when it dies or hangs, so that thousands of
+commands take minutes. `python -m tests.hostile.mutations 500 [--seed 7] [.mot ...]` prints a table
+of all kinds of files, or of the named ones.
 """
 
 from __future__ import annotations
@@ -29,15 +29,18 @@ ROOT = Path(osimlite.__file__).parents[1]
 FIXTURES = ROOT / "fixtures"
 
 HANG_SECONDS = 10.0
-"""Processor time of a command beyond which it counts as a hang."""
+"""Processor time (s) of a command above which it counts as a hang."""
 
 SEARCH_SECONDS = 60.0
-"""The same of the search for the solution of a study, which has a limit of iterations of its own."""
+"""Processor time (s) above which solving a Moco study counts as a hang.
+
+It is longer because a study limits its own number of iterations.
+"""
 
 TERMINATED = "crash -15"
 
 WALL_SECONDS = 240.0
-"""Time by the clock after which a command is ended: other programs may be busy."""
+"""Wall-clock time (s) after which a command is stopped; it allows for a busy machine."""
 
 SERVER = """
 import contextlib, io, json, os, resource, sys, time, traceback
@@ -64,12 +67,12 @@ for line in sys.stdin:
 
 
 class Kind(NamedTuple):
-    """One kind of file: which files are damaged, what lies beside them, and the commands that read them."""
+    """Kind of files: files to be damaged, further files in their folder, and commands that read them."""
 
     ending: str
-    sources: tuple[str, ...]  # below the fixtures
+    sources: tuple[str, ...]  # paths below the fixtures
     beside: tuple[str, ...]
-    commands: tuple[tuple[str, ...], ...]  # @ is the damaged file
+    commands: tuple[tuple[str, ...], ...]  # @ stands for the damaged file
 
 
 _PENDULUM = ("pipelines/pendulum/model.osim",)
@@ -177,7 +180,7 @@ VALUES = (
     b"0", b"-1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"-inf", b"9" * 30, b"1e9", b"2147483648", b"", b"x",
     b"0 0", b"true", b"../..", b"/", b"a b", b"1.5", b"0.001", b"1e6",
 )  # fmt: skip
-"""What is put in the place of numbers and names."""
+"""Values that replace numbers and names."""
 
 _WORD = re.compile(
     rb"(?<=>)[^<>\s][^<>]*(?=<)|(?<=[\s=:{\[,~\"])[-+]?[0-9][0-9.e+-]*|(?<== )[\w./*]+"
@@ -185,14 +188,17 @@ _WORD = re.compile(
 
 
 def damage(data: bytes, rng: random.Random) -> bytes:
-    """Return a file with one to four random changes: bytes, pieces lost, doubled, moved or replaced by tokens."""
+    """Return a file with one to four random changes.
+
+    Changes replace bytes, or remove, repeat, move or replace pieces of the file by tokens.
+    """
     result = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         size = len(result)
         # Half of the changes are near the beginning, where headers are.
         place = rng.randrange(min(size, 600) if rng.random() < 0.5 else size) if size else 0
         if rng.random() < 0.5 and (spans := [*_WORD.finditer(result)]):
-            # Another number or name in the place of one: the file stays well-formed.
+            # Replace a number or name by another one, so that the file stays well-formed.
             start, stop = rng.choice(spans).span()
             result[start:stop] = rng.choice((*VALUES, rng.choice(spans)[0]))
             continue
@@ -217,14 +223,18 @@ def damage(data: bytes, rng: random.Random) -> bytes:
 
 
 class Server:
-    """A process that runs commands, with a cache of its own, and is started anew after a crash or a hang."""
+    """Process that runs commands with a private cache, and is restarted after a crash or a hang."""
 
     def __init__(self) -> None:
         self._cache = tempfile.TemporaryDirectory()
         self._process: subprocess.Popen[str] | None = None
 
     def run(self, words: list[str], folder: Path) -> tuple[str, float, str]:
-        """Return how a command in a folder ends, its processor time (s) and its last words."""
+        """Run a command in a folder.
+
+        Returns:
+            The exit code or how the process ended, its processor time (s), and its last output.
+        """
         if self._process is None:
             environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
             environment |= {"XDG_CACHE_HOME": self._cache.name}
@@ -255,15 +265,15 @@ class Server:
         return "hang", WALL_SECONDS, ""
 
     def close(self) -> None:
-        """End the process, and remove its cache."""
+        """End the process and remove its cache."""
         self.end()
         self._cache.cleanup()
 
     def end(self) -> None:
-        """End the process; the next command starts another."""
+        """End the process; the next command starts another one."""
         if self._process is not None:
             self._process.kill()
-            # Leaving the context closes the pipes and waits.
+            # Leaving the context closes the pipes and waits for the process.
             with self._process:
                 pass
             self._process = None
@@ -275,13 +285,14 @@ def run_kind(
     """Damage files of a kind and run its commands on them.
 
     Args:
-        name: of the kind, an ending.
-        count: of mutations.
+        name: file ending, which is the name of the kind.
+        count: number of damaged files.
         server: process that runs the commands.
-        seed: the same seed, the same mutations.
+        seed: seed of the random changes.
 
-    Returns: How often commands ended in each way, and a line for each fault: a traceback, a crash,
-        a hang or a file that was changed.
+    Returns:
+        How often commands ended in each way, and a line for each fault: a traceback, a crash, a
+            hang or a file that was changed.
     """
     kind, rng, faults, counts = (
         KINDS[name],
@@ -310,12 +321,13 @@ def run_kind(
                     [file.name if word == "@" else word for word in command], folder
                 )
                 if code == TERMINATED:
-                    # Nothing here sends that signal: somebody else has ended the process. It is
-                    # asked again.
+                    # This program does not send SIGTERM, so another one has ended the process.
+                    # Repeat the command.
                     code, used, text = server.run(
                         [file.name if word == "@" else word for word in command], folder
                     )
-                # A study is searched as long as it says, which no damage to it makes endless.
+                # A study iterates as long as it specifies, and no damage makes that endless. Allow
+                # more time.
                 limit = SEARCH_SECONDS if name == ".omoco" and command[0] == "run" else HANG_SECONDS
                 is_good = code in ("0", "1", "2") and used <= limit
                 counts[code if is_good else "fault"] += 1
@@ -363,7 +375,7 @@ def _made(name: str) -> bytes:
         case "id":
             return SETUP.encode()
         case "markers.osim":
-            # The markers have the names of those in the files.
+            # The marker names must be those in the marker file.
             text = (FIXTURES / _PENDULUM[0]).read_text()
             return text.replace('"m0"', '"one"').replace('"m1"', '"two"').encode()
         case "mesh.osim":
@@ -397,14 +409,14 @@ def _digests(top: Path) -> dict[str, str]:
 
 
 def _keep(file: Path, number: int) -> None:
-    """Keep a file with a fault where the user has asked for it."""
+    """Save a file with a fault into the folder that the user named, if any."""
     if folder := os.environ.get("OSIMLITE_KEEP_MUTATIONS"):
         Path(folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(file, Path(folder, f"{number}{file.suffix}"))
 
 
 def main() -> None:
-    """Print the table of all kinds, or of those that are named."""
+    """Print a table of all kinds of files, or of the named ones."""
     parser = argparse.ArgumentParser()
     parser.add_argument("count", type=int)
     parser.add_argument("names", nargs="*", default=list(KINDS))

@@ -1,4 +1,4 @@
-"""Nothing of the current folder is executed, whatever packages do while they are loaded."""
+"""Check that no code in the current folder is executed, even by packages while they are imported."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MODULES = (
 
 @pytest.fixture
 def trap(tmp_path: Path) -> Path:
-    """A folder of a stranger, with modules of many names and settings of packages."""
+    """Return a folder from an untrusted source, with modules of many names and settings of packages."""
     for name in MODULES:
         (tmp_path / f"{name}.py").write_text(
             f"open({str(tmp_path / 'EXECUTED')!r}, 'a').write('{name} ')\n"
@@ -74,8 +74,8 @@ def test_translate_executes_nothing_of_the_folder(
 
 
 def test_ipopt_reads_no_options_of_the_folder(trap: Path, repo: Path) -> None:
-    """They may name a file to write to, and a library to load."""
-    # It is not imported here: CasADi cannot be loaded beside OpenSim.
+    """Options of Ipopt may name a file to write to and a library to load."""
+    # Do not import CasADi here: it cannot be loaded together with OpenSim.
     if find_spec("casadi") is None:
         pytest.skip("needs casadi (extra 'casadi')")
     for name in ("slide.omoco", "slide.osim", "slide_guess.sto", "slide_states.sto"):
@@ -101,7 +101,7 @@ def test_packages_are_imported_from_another_folder(
         sys.path.insert(0, "/added")
     assert Path.cwd() == trap and sys.path == ["/added", *before]
     assert SAFE_PATH not in os.environ
-    # A module that is loaded already costs nothing.
+    # Requiring a module that is loaded already costs no time.
     assert require("json", extra="x", purpose="x") is sys.modules["json"]
 
 

@@ -1,4 +1,4 @@
-"""Damaged and endless inputs: each ends soon, in one plain error."""
+"""Check that damaged and endless inputs end soon with one plain error."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ pipes = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes
 
 
 def write_includes(folder: Path, count: int, times: int) -> Path:
-    """Write files of which each includes the next one several times."""
+    """Write a chain of files, each including the next one several times; return the first."""
     for number in range(count):
         (folder / f"e{number}.scone").write_text(f"<< e{number + 1}.scone >>\n" * times)
     (folder / f"e{count}.scone").write_text("a = 1\n")
@@ -163,7 +163,16 @@ def test_damaged_c3d_files_end_no_process(tmp_path: Path, fixtures: Path, damage
 def compressed_mesh(
     kind: str, size: int, blocks: int, promised: int, dtype: str = "Float64", pieces: int = 1
 ) -> bytes:
-    """Return a mesh of zeros whose header promises some bytes in each block, used by each piece."""
+    """Return a compressed mesh of zeros for tests of limits.
+
+    Args:
+        kind: compressor of VTK, ``ZLib`` or ``LZMA``.
+        size: actual size of a block (bytes).
+        blocks: number of blocks.
+        promised: size of a block (bytes) according to the header.
+        dtype: type of the numbers.
+        pieces: number of pieces that use the same data.
+    """
     import lzma
 
     compress = zlib.compress if kind == "ZLib" else lzma.compress
@@ -242,7 +251,7 @@ def test_the_time_of_a_text_is_that_of_its_length(word: str, fixtures: Path) -> 
 
     check(1)
     short, long = check(4000), check(16000)
-    # Four times the text takes four times as long; before, it took sixteen times.
+    # The time must grow linearly: four times the text took sixteen times as long before.
     assert long < 10.0 * short + 1.0
 
 

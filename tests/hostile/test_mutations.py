@@ -1,4 +1,4 @@
-"""Random damage to files of all kinds: no traceback, no crash, no hang, and no file that nobody asked for."""
+"""Check that randomly damaged files cause no traceback, no crash, no hang, and no unexpected file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ NEEDS = {".c3d": "ezc3d", ".scone": "numpy", ".yaml": "yaml", ".omoco": "casadi"
 
 
 def skip_without(name: str) -> None:
-    """Skip where a package is missing; it is not imported: CasADi cannot be loaded beside OpenSim."""
+    """Skip the test if a package is missing.
+
+    The package is not imported, because CasADi cannot be loaded together with OpenSim.
+    """
     package = NEEDS.get(name, "numpy")
     if find_spec(package) is None:
         pytest.skip(f"needs the package {package}")
@@ -26,7 +29,7 @@ def skip_without(name: str) -> None:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    """One process for all kinds of files."""
+    """Return one process that serves all kinds of files."""
     result = Server()
     yield result
     result.close()

@@ -1,4 +1,4 @@
-"""Names that would break a table, and elements that stand many times."""
+"""Check names that would break a table, and elements that are repeated."""
 
 from __future__ import annotations
 

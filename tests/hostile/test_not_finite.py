@@ -1,4 +1,4 @@
-"""Forces that are no numbers are refused."""
+"""Check that forces which are not finite are an error instead of a result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from osimlite.errors import SimulationError
 
 
 def test_forces_that_are_no_numbers_are_no_result(fixtures: Path) -> None:
-    """The library refuses them as the command does."""
+    """The library raises an error as the command does."""
     model = osimlite.read(fixtures / "pipelines" / "pendulum" / "model.osim")
     motion = {
         coordinate.name: [0.01 * k * k for k in range(12)]

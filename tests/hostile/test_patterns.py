@@ -1,4 +1,4 @@
-"""Patterns of studies and of files: matched in linear time, whatever they are."""
+"""Check that patterns in studies and files are matched in linear time, whatever they contain."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ CHAIN = """<OpenSimDocument Version="40600"><AnalyzeTool name="a"><model_file>m.
 def test_setups_that_name_each_other_are_read_once(
     last: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """3^30 paths lead through them; in a circle there are more."""
+    """The setups form 3^30 chains of references, and more if the last one refers to the first."""
     count = 30
     for number in range(count):
         following = f"s{number + 1}.xml" if number + 1 < count else last

@@ -1,4 +1,4 @@
-"""The user's cache loses what nobody uses, and nothing else."""
+"""Check that pruning the user's cache removes unused entries and nothing else."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ needs_links = pytest.mark.skipif(sys.platform == "win32", reason="Windows users 
 
 
 def make_entry(folder: Path, name: str, age_s: float, size: int = 10) -> Path:
-    """Make an entry that was used some time ago."""
+    """Make a cache entry that was last used `age_s` seconds ago."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(b"x" * size)

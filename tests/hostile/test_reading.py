@@ -1,4 +1,4 @@
-"""Every file that a user or a document names is opened by `osimlite.base.reading`."""
+"""Check that every file named by a user or a document is opened by `osimlite.base.reading`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ METHODS = {
     "genfromtxt",
     "iterparse",
 }
-"""Methods and functions of modules that open a file under any owner."""
+"""Names of methods and functions that open a file, whatever object or module has them."""
 
 OF_MODULES = {
     "np": {"load"},
@@ -34,10 +34,10 @@ OF_MODULES = {
     "zipfile": {"ZipFile"},
     "tarfile": {"TarFile"},
 }
-"""Functions of modules that open or read a file."""
+"""Functions of certain modules that open or read a file."""
 
 OTHERS = {"webbrowser", "document"}
-"""What has a method `open` that opens no file."""
+"""Objects and modules whose method `open` does not open a file."""
 
 ALLOWED = {
     "base/reading.py": "the module that opens files",
@@ -58,12 +58,12 @@ ALLOWED = {
     "cli/demo.py": "data of the package, and the model that it has written",
     "base/pruning.py": "folders of the cache, without links",
 }
-"""Modules that open files in another way, and why they may."""
+"""Modules of the package that open files in another way, and why they may."""
 
 
 _CALLED = "|".join({"open", *METHODS, *(name for names in OF_MODULES.values() for name in names)})
 _ANY_CALL = re.compile(rf"\b(?:{_CALLED})\s*\(")
-"""What stands in every source with such a call: most sources need not be parsed."""
+"""Pattern that every source with such a call contains; most sources need not be parsed."""
 
 
 def find_reads(text: str) -> Iterator[tuple[int, str]]:

@@ -1,4 +1,4 @@
-"""Where commands write: never where nobody asked them to (SECURITY.md states the rule)."""
+"""Check that commands write only where the user has asked them to (SECURITY.md states the rule)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MESSY = '<OpenSimDocument Version="40600"><Model name="m"><gravty>0 -5 0</gravty
 
 @pytest.fixture(autouse=True)
 def cache(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Keep what commands cache in a folder of the test."""
+    """Redirect the user's cache to a folder of the test."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     return folder
@@ -41,7 +41,7 @@ def cache(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFact
 
 @pytest.fixture
 def study(tmp_path: Path, fixtures: Path) -> Path:
-    """A study of a stranger beside the home of the user."""
+    """Return the folder of a project from an untrusted source, next to the home of the user."""
     folder, home = tmp_path / "study", tmp_path / "home"
     folder.mkdir()
     home.mkdir()
@@ -55,7 +55,7 @@ def study(tmp_path: Path, fixtures: Path) -> Path:
 
 
 def compute(study: Path, folder: str, name: str, *words: object) -> Done:
-    """Run a setup that names a folder and a file of results."""
+    """Run a setup that names an output folder and a result file."""
     (study / "setup.xml").write_text(SETUP.format(folder=folder, name=name))
     return run("run", "setup.xml", *words, folder=study)
 
@@ -76,7 +76,7 @@ def test_a_setup_cannot_name_any_file(study: Path, folder: str, name: str, words
     before = contents(study.parent)
     done = compute(study, folder, name)
     if name == "-":
-        # OpenSim gives a name without an ending one.
+        # OpenSim accepts a name without an ending.
         assert done.code == 0
         return
     assert done.code == 2 and words in " ".join(done.err.split())
@@ -208,7 +208,7 @@ def test_a_damaged_journal_counts_for_nothing(study: Path, damage: dict[str, obj
 
 
 def test_findings_are_not_kept_in_a_project(tmp_path: Path, cache: Path) -> None:
-    """Links that were committed to the old place of the cache lead nowhere."""
+    """Links that a project has at the old location of the cache are not followed."""
     own, repo = tmp_path / "mine", tmp_path / "repo"
     own.write_text(OWN)
     repo.mkdir()
@@ -341,12 +341,16 @@ def test_names_of_results_without_a_tool(tmp_path: Path) -> None:
 
 
 def contents(folder: Path) -> dict[Path, bytes]:
-    """Return all files below a folder."""
+    """Return all files below a folder.
+
+    Returns:
+        The content of each file by its path.
+    """
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_table_without_a_name_is_a_result(tmp_path: Path) -> None:
-    """OpenSim calls the states of RRA and CMC 'UNKNOWN'."""
+    """OpenSim names the states of RRA and CMC 'UNKNOWN'."""
     writer = ResultWriter.for_document(tmp_path / "setup.xml", tmp_path)
     path = tmp_path / "it_states.sto"
     path.write_text(RESULT.replace(RESULT.partition("\n")[0], "UNKNOWN"))
